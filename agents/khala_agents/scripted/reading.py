@@ -45,15 +45,21 @@ _COUNT = re.compile(r"(?:^|, )(\d{1,4}) (\w+)", re.ASCII)
 _MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
 _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTILINE | re.ASCII)
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
+_IDLE = re.compile(r"(\d{1,4}) (\w+) \((?:\d+ working, )?(?:(\d{1,4}) )?idle\)", re.ASCII)
+_WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
+_MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
 _RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
 _SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
 _FIELD = re.compile(rf"^ +Pylon 0x[0-9a-f]+ at minimap [^,]+,[^,]+, screen {_POINT}", re.MULTILINE | re.ASCII)
 _UNLISTED = re.compile(r"^ {8}[^:\n]+: (.*)", re.MULTILINE)
-_FRIENDS = re.compile(rf"^        \S+: \d+ .* at minimap {_POINT}", re.MULTILINE | re.ASCII)
+_FRIENDS = re.compile(r"^    ([\w.-]+)\n((?:        .*\n?)*)", re.MULTILINE | re.ASCII)
+_FRIEND = re.compile(rf"^        \S+: (\d.*) at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
 _TASK = re.compile(r"^    (?:Team ([\w.-]+)(?:, now)?: )?(.*)", re.MULTILINE)
+_ALARM = re.compile(rf"^    Under attack at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _TAG = re.compile(r"tag (0x[0-9a-f]+)", re.ASCII)
 _AT = re.compile(_POINT, re.ASCII)
 _PART = re.compile(rf"{_NUMBER}/{_NUMBER}", re.ASCII)
@@ -94,6 +100,26 @@ class TextUnit(NamedTuple):
     def share(self) -> float:
         """Remaining part of its hit points: 0 to 1."""
         return self.hit_points / self.full if self.full else 1.0
+
+
+class Group(NamedTuple):
+    """A team of another agent."""
+
+    agent: str
+    units: tuple[str, ...]
+    """Types in it."""
+    at: Point
+    """On the minimap."""
+
+
+class Place(NamedTuple):
+    """A place of the map that has a name."""
+
+    name: str
+    at: Point
+    """On the minimap."""
+    about: str
+    """What else its line says: who holds it, and when it was seen."""
 
 
 class Price(NamedTuple):
@@ -152,6 +178,10 @@ class Situation:
     upgrades: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
     """Units and finished structures of the side, by type."""
+    idle: dict[str, int] = field(default_factory=dict)
+    """How many of them do nothing, by type."""
+    warpgates: int = 0
+    """WarpGates that can warp in now."""
     begun: dict[str, int] = field(default_factory=dict)
     """Structures under construction, by type."""
     producing: dict[str, int] = field(default_factory=dict)
@@ -168,10 +198,14 @@ class Situation:
     """Type, tag and place of each power source with room for a unit."""
     known: list[tuple[str, Point]] = field(default_factory=list)
     """Types of enemies, and where on the minimap one of each type is."""
-    friends: list[Point] = field(default_factory=list)
-    """Where on the minimap the teams of other agents are."""
-    alarm: bool = False
-    """Whether own units are under attack."""
+    seen: dict[str, int] = field(default_factory=dict)
+    """Enemies that were seen and are not known to be dead, by type."""
+    groups: list[Group] = field(default_factory=list)
+    """The teams of other agents."""
+    places: list[Place] = field(default_factory=list)
+    """Places of the map, in the order of the text."""
+    alarms: list[Point] = field(default_factory=list)
+    """Where on the minimap own units or structures are under attack."""
     rejected: list[str] = field(default_factory=list)
     """The refusals of the last calls, word for word."""
     task: str = ""
@@ -230,6 +264,8 @@ def _read_counts(situation: Situation, body: str) -> None:
         for number, kind in _COUNT.findall(re.sub(r"\([^()]*\)", "", listed)):
             counts[kind] = counts.get(kind, 0) + int(number)
     situation.known = [(kind, (float(x), float(y))) for kind, x, y in _SEEN_AT.findall(body)]
+    situation.seen = {kind: int(number) for number, kind in _SEEN.findall(body)}
+    situation.idle = {kind: int(idle or number) for number, kind, idle in _IDLE.findall(body)}
 
 
 def _read_task(situation: Situation, body: str) -> None:
@@ -314,11 +350,24 @@ def _read_sites(situation: Situation, body: str) -> None:
 
 
 def _read_others(situation: Situation, body: str) -> None:
-    situation.friends = [(float(x), float(y)) for x, y in _FRIENDS.findall(body)]
+    situation.groups = [
+        Group(agent, tuple(kind for _, kind in _COUNT.findall(units)), (float(x), float(y)))
+        for agent, lines in _FRIENDS.findall(body)
+        for units, x, y in _FRIEND.findall(lines)
+    ]
+
+
+def _read_map(situation: Situation, body: str) -> None:
+    situation.places = [Place(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
+
+
+def _read_warping(situation: Situation, body: str) -> None:
+    if found := _WARPGATES.search(body):
+        situation.warpgates = int(found[1])
 
 
 def _read_alerts(situation: Situation, body: str) -> None:
-    situation.alarm = bool(body)
+    situation.alarms = [(float(x), float(y)) for x, y in _ALARM.findall(body)]
 
 
 def _read_answer(situation: Situation, body: str) -> None:
@@ -344,6 +393,8 @@ _READERS: dict[str, Callable[[Situation, str], None]] = {
     "Game": _read_game,
     "Unit counts": _read_counts,
     "Alerts": _read_alerts,
+    "Map": _read_map,
+    "Warping in": _read_warping,
     "Teams of other agents": _read_others,
     "Places to build at": _read_sites,
     "Valid actions": _read_valid_actions,

@@ -229,7 +229,7 @@ def test_no_more_is_ordered_than_can_be_paid() -> None:
     ("army", "more", "order"),
     [
         ("20 Stalker", "", ["All_Units_Attack"]),
-        ("10 Stalker", "", []),
+        ("10 Stalker", "", ["All_Units_Defend"]),
         ("10 Stalker", "Alerts\n    Under attack at minimap [30, 47]\n\n", ["All_Units_Defend"]),
         ("10 Stalker", "Your last actions\n    accepted: Base <All_Units_Attack()>\n\n", ["All_Units_Attack"]),
         ("4 Stalker", "Your last actions\n    accepted: Base <All_Units_Attack()>\n\n", ["All_Units_Defend"]),
@@ -256,10 +256,9 @@ def test_units_are_warped_in_at_a_phasing_prism() -> None:
 
 
 def test_build_orders_name_types_that_the_player_knows() -> None:
-    made = {kind for build in BUILDS for want in build.wants if not want.upgrade for kind in want.makes.split("|")}
-    structures = {kind for build in BUILDS for kind in build.structures}
-    assert made - structures <= KINDS.keys() | {"Overlord"}
-    assert structures <= KINDS.keys()
+    wants = [want for build in BUILDS for want in build.wants]
+    named = {kind for want in wants for kinds in (want.makes, *want.after) for kind in kinds.split("|")} - {""}
+    assert named | {line.producer for build in BUILDS for line in build.army} - {""} <= KINDS.keys()
 
 
 def test_what_an_observation_says_of_the_side_is_read() -> None:

@@ -11,8 +11,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from khala_agents.scripted.reading import points
-from khala_agents.scripted.skilled.builds import PROTOSS
-from khala_agents.scripted.skilled.economy import met, needs_supply
+from khala_agents.scripted.skilled.builds import BUILDS
+from khala_agents.scripted.skilled.economy import missing, needs_supply
 from khala_agents.scripted.skilled.kinds import TOWN_HALLS, kind_of
 from khala_agents.scripted.skilled.space import distance
 
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from khala_agents.scripted.reading import Point, TextTeam, TextUnit
+    from khala_agents.scripted.skilled.builds import Build
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
-UNPOWERED = frozenset({"Pylon", "Nexus", "Assimilator"})
+GAS = frozenset({"Assimilator", "Refinery", "Extractor"})
 FIELD = 5.5
 """How far from a Pylon a structure is put."""
 ROOM = {"Nexus": 4.6, "Pylon": 2.6}
@@ -44,24 +45,29 @@ def build(plan: ReplyPlan) -> None:
     team, situation = plan.team, plan.situation
     if any(unit.order.startswith("Build") for unit in team.own):
         return
-    wants = [PROTOSS.supply.makes] if needs_supply(situation, PROTOSS) else []
-    wants += [
-        w.action.removeprefix("Build_")
-        for w in PROTOSS.wants
-        if w.action.startswith("Build_") and not met(situation, w)
-    ]
-    for what in wants:
-        if _begin(plan, what):
+    offered = {action.name for action in team.actions} | situation.impossible
+    build = next((b for b in BUILDS if any(name.startswith(f"{_first(b)}_") for name in offered)), None)
+    if build is None:
+        return
+    supply = [build.supply] if build.supply.action.startswith("Build_") and needs_supply(situation, build) else []
+    wants = [want for want in build.wants if want.action.startswith("Build_") and missing(situation, want)]
+    for want in [*supply, *wants]:
+        if _begin(plan, want.action.removeprefix("Build_")):
             return
-        if not situation.counts.get("Pylon") and what == "Pylon":
-            return
+        if want.first or want in supply:
+            return  # its money is saved
+
+
+def _first(build: Build) -> str:
+    """Return the first structure of a build order."""
+    return next(want.action for want in build.wants if want.action.startswith("Build_"))
 
 
 def _begin(plan: ReplyPlan, what: str) -> bool:
     """Order a structure; return whether that was possible."""
     team, situation = plan.team, plan.situation
-    if what in {"Nexus", "Assimilator"}:
-        wanted = "VespeneGeyser" if what == "Assimilator" else ""
+    if what in TOWN_HALLS | GAS:
+        wanted = "VespeneGeyser" if what in GAS else ""
         sites = [tag for kind, tag in situation.sites if (wanted in kind if wanted else "Mineral" in kind)]
         return bool(sites) and plan.give(f"Build_{what}_Near", sites[0])
     if not team.can(f"Build_{what}_Screen"):
@@ -96,7 +102,7 @@ def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
             return False
         return not _between(at, halls, team.resources)
 
-    if what not in UNPOWERED:
+    if fields and what != "Pylon":
         near = [cell for cell in cells if any(distance(cell, field) <= FIELD for field in fields)]
         return min((cell for cell in near if fits(cell)), key=lambda cell: _nearest(cell, fields), default=None)
     around = [cell for cell in cells if halls and 6.0 <= min(distance(cell, hall) for hall in halls) <= 10.0]

@@ -1,8 +1,8 @@
-"""Build orders of the three races, as tables: simple ones that lead to an army of one or two kinds of units."""
+"""Build orders of the three races, as tables: workers and a second base first, then an army of two or three kinds."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 
 class Want(NamedTuple):
-    """Something that the side should have."""
+    """Something that the side should have. Types that count as one have a bar between them."""
 
     action: str
-    makes: str
-    """Unit types that count for it, with a bar between them, or the upgrade."""
+    makes: str = ""
+    """Types that count for it; "" for an upgrade, of which every level is wanted."""
     wanted: int = 1
     after: Mapping[str, int] = {}
     """What must exist before its turn comes, by type."""
@@ -22,9 +22,23 @@ class Want(NamedTuple):
     """Whether the count is for each base."""
     at_once: bool = False
     """Whether at most as many of it are made at a time as there are bases."""
-    upgrade: bool = False
     first: bool = False
     """Whether later wants wait until it can be paid."""
+
+
+class Line(NamedTuple):
+    """Structures of one type, and what they make one at a time."""
+
+    producer: str
+    """"" for larvae."""
+    units: tuple[str, ...]
+    """Actions, the best first."""
+    others: tuple[str, ...] = ()
+    """What else keeps one of them busy."""
+    lab: tuple[str, ...] = ()
+    """Which of the units need a Tech Lab."""
+    most: Mapping[str, int] = {}
+    """How many of a unit are enough."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,95 +48,122 @@ class Build:
     signs: tuple[str, ...]
     """Actions that show which race is playing."""
     supply: Want
-    supply_minerals: int
     wants: tuple[Want, ...]
-    army: tuple[str, ...]
-    """Actions that make units of the army, the best first."""
-    producers: tuple[str, ...] = ()
-    """Types of the structures that make them one at a time; () for larvae."""
-    structures: tuple[str, ...] = field(default=())
+    army: tuple[Line, ...]
+    boosts: tuple[str, ...] = ()
+    """What makes the rest faster and costs energy only."""
 
 
 PROTOSS = Build(
     signs=("Train_Probe", "Build_Pylon", "Train_Zealot", "Train_Stalker", "Build_Gateway"),
     supply=Want("Build_Pylon", "Pylon"),
-    supply_minerals=100,
     wants=(
-        Want("Train_Probe", "Probe", 21, per_hall=True, at_once=True),
+        Want("Train_Probe", "Probe", 22, per_hall=True, at_once=True),
         Want("Build_Pylon", "Pylon", 1, {"Probe": 13}, first=True),
         Want("Build_Gateway", "Gateway|WarpGate", 1, {"Pylon": 1}, first=True),
-        Want("Build_Assimilator", "Assimilator", 1, {"Pylon": 1, "Probe": 15}),
-        Want("Build_CyberneticsCore", "CyberneticsCore", 1, {"Pylon": 1, "Probe": 16}, first=True),
-        Want("Research_WarpGate", "WarpGate", upgrade=True, after={"CyberneticsCore": 1}),
-        Want("Build_Gateway", "Gateway|WarpGate", 3, {"CyberneticsCore": 1, "Probe": 18}),
-        Want("Build_Assimilator", "Assimilator", 2, {"CyberneticsCore": 1, "Probe": 18}),
-        Want("Build_Nexus", "Nexus", 2, {"Stalker": 6}),
-        Want("Build_RoboticsFacility", "RoboticsFacility", 1, {"Stalker": 8}),
-        Want("Build_TwilightCouncil", "TwilightCouncil", 1, {"RoboticsFacility": 1}),
-        Want("Research_Blink", "Blink", upgrade=True, after={"TwilightCouncil": 1}),
-        Want("Build_Gateway", "Gateway|WarpGate", 6, {"Nexus": 2, "Probe": 26}),
-        Want("Build_Forge", "Forge", 1, {"Nexus": 2, "Probe": 30}),
-        Want("Research_ProtossGroundWeapons", "ProtossGroundWeaponsLevel1", upgrade=True, after={"Forge": 1}),
+        Want("Build_Assimilator", "Assimilator", 1, {"Pylon": 1, "Probe": 16}),
+        Want("Build_CyberneticsCore", "CyberneticsCore", 1, {"Gateway|WarpGate": 1}, first=True),
+        Want("Build_Nexus", "Nexus", 2, {"Pylon": 1, "Probe": 19, "Zealot|Stalker": 1}, first=True),
+        Want("Research_WarpGate", after={"CyberneticsCore": 1}),
+        Want("Build_Assimilator", "Assimilator", 2, {"CyberneticsCore": 1, "Probe": 20}),
+        Want("Build_Gateway", "Gateway|WarpGate", 3, {"CyberneticsCore": 1, "Probe": 22}),
+        Want("Build_RoboticsFacility", "RoboticsFacility", 1, {"CyberneticsCore": 1, "Probe": 26}),
+        Want("Build_Gateway", "Gateway|WarpGate", 5, {"Nexus": 2, "Probe": 32}),
         Want("Build_Assimilator", "Assimilator", 4, {"Nexus": 2, "Probe": 34}),
+        Want("Build_Forge", "Forge", 1, {"Nexus": 2, "Probe": 34}),
+        Want("Research_ProtossGroundWeapons", after={"Forge": 1}),
+        Want("Build_TwilightCouncil", "TwilightCouncil", 1, {"Nexus": 2, "Probe": 38}),
+        Want("Research_Charge", after={"TwilightCouncil": 1}),
+        Want("Build_Gateway", "Gateway|WarpGate", 8, {"Nexus": 2, "Probe": 40}),
+        Want("Build_RoboticsFacility", "RoboticsFacility", 2, {"Nexus": 2, "Probe": 42}),
+        Want("Build_Nexus", "Nexus", 3, {"Nexus": 2, "Probe": 44}),
     ),
-    army=("Train_Immortal", "Warp_Stalker", "Train_Stalker", "Warp_Zealot", "Train_Zealot"),
-    producers=("Gateway", "WarpGate", "RoboticsFacility"),
-    structures=(
-        "Nexus", "Pylon", "Assimilator", "Gateway", "WarpGate", "CyberneticsCore", "Forge", "TwilightCouncil",
-        "RoboticsFacility", "RoboticsBay", "Stargate", "FleetBeacon", "TemplarArchive", "DarkShrine", "PhotonCannon",
-        "ShieldBattery",
+    army=(
+        Line("RoboticsFacility", ("Train_Immortal",)),
+        Line("WarpGate", ("Warp_Stalker", "Warp_Zealot")),
+        Line("Gateway", ("Train_Stalker", "Train_Zealot"), ("Morph_WarpGate",)),
     ),
-)  # fmt: skip
+    boosts=("ChronoBoost_Economy", "ChronoBoost_Military"),
+)
 
+_COMMAND = "CommandCenter|OrbitalCommand|PlanetaryFortress"
 TERRAN = Build(
     signs=("Train_SCV", "Build_SupplyDepot", "Train_Marine", "Build_Barracks"),
-    supply=Want("Build_SupplyDepot", "SupplyDepot"),
-    supply_minerals=100,
+    supply=Want("Build_SupplyDepot", "SupplyDepot|SupplyDepotLowered"),
     wants=(
-        Want("Train_SCV", "SCV", 20, per_hall=True, at_once=True),
+        Want("Train_SCV", "SCV", 22, per_hall=True, at_once=True),
         Want("Build_SupplyDepot", "SupplyDepot|SupplyDepotLowered", 1, {"SCV": 13}, first=True),
-        Want("Build_Barracks", "Barracks", 1, {"SCV": 14}, first=True),
-        Want("Build_Refinery", "Refinery", 1, {"SCV": 15}),
-        Want("Build_Barracks", "Barracks", 3, {"SCV": 17}),
-        Want("Morph_OrbitalCommand", "OrbitalCommand", 1, {"Barracks": 1}),
+        Want("Build_Barracks", "Barracks", 1, {"SupplyDepot|SupplyDepotLowered": 1}, first=True),
+        Want("Build_Refinery", "Refinery", 1, {"SCV": 16}),
+        Want("Morph_OrbitalCommand", "OrbitalCommand", 1, {"Barracks": 1}, per_hall=True),
+        Want("Build_CommandCenter", _COMMAND, 2, {"Barracks": 1, "SCV": 19}, first=True),
+        Want("Build_Reactor_Barracks", "BarracksReactor", 1, {"Barracks": 1, "Marine": 1}),
+        Want("Build_Barracks", "Barracks", 3, {"Barracks": 1, "SCV": 22}),
         Want("Build_TechLab_Barracks", "BarracksTechLab", 1, {"Barracks": 2}),
-        Want("Research_Stimpack", "Stimpack", upgrade=True, after={"BarracksTechLab": 1}),
-        Want("Build_CommandCenter", "CommandCenter|OrbitalCommand", 2, {"Marine": 12}),
-        Want("Build_Barracks", "Barracks", 5, {"Marine": 12}),
-        Want("Build_EngineeringBay", "EngineeringBay", 1, {"Marine": 16}),
-        Want("Research_TerranInfantryWeapons", "TerranInfantryWeaponsLevel1", 1, {"EngineeringBay": 1}, upgrade=True),
+        Want("Research_Stimpack", after={"BarracksTechLab": 1}),
+        Want("Research_CombatShield", after={"BarracksTechLab": 1}),
+        Want("Build_Factory", "Factory", 1, {_COMMAND: 2, "SCV": 28}),
+        Want("Build_Refinery", "Refinery", 3, {_COMMAND: 2, "SCV": 30}),
+        Want("Build_Starport", "Starport", 1, {"Factory": 1}),
+        Want("Build_Barracks", "Barracks", 5, {_COMMAND: 2, "SCV": 34}),
+        Want("Build_TechLab_Factory", "FactoryTechLab", 1, {"Factory": 1}),
+        Want("Build_EngineeringBay", "EngineeringBay", 1, {_COMMAND: 2, "SCV": 34}),
+        Want("Research_TerranInfantryWeapons", after={"EngineeringBay": 1}),
+        Want("Build_Reactor_Barracks", "BarracksReactor", 3, {"Barracks": 4}),
+        Want("Build_TechLab_Barracks", "BarracksTechLab", 2, {"Barracks": 5}),
+        Want("Build_Refinery", "Refinery", 4, {_COMMAND: 2, "SCV": 38}),
+        Want("Build_Barracks", "Barracks", 8, {_COMMAND: 2, "SCV": 42}),
+        Want("Build_CommandCenter", _COMMAND, 3, {_COMMAND: 2, "SCV": 44}),
     ),
-    army=("Train_Marauder", "Train_Marine"),
-    producers=("Barracks",),
-    structures=(
-        "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "SupplyDepot", "SupplyDepotLowered", "Refinery",
-        "Barracks", "BarracksTechLab", "BarracksReactor", "EngineeringBay", "Factory", "FactoryTechLab",
-        "FactoryReactor", "Armory", "Starport", "StarportTechLab", "StarportReactor", "Bunker", "MissileTurret",
-        "SensorTower", "GhostAcademy", "FusionCore", "TechLab", "Reactor",
+    army=(
+        Line("Factory", ("Train_SiegeTank",), ("Build_TechLab_Factory",), ("Train_SiegeTank",)),
+        Line("Starport", ("Train_Medivac", "Train_VikingFighter"), most={"Train_Medivac": 6, "Train_VikingFighter": 4}),
+        Line(
+            "Barracks",
+            ("Train_Marauder", "Train_Marine"),
+            ("Build_TechLab_Barracks", "Build_Reactor_Barracks"),
+            ("Train_Marauder",),
+        ),
     ),
-)  # fmt: skip
+    boosts=("Calldown_MULE",),
+)
 
+_HATCHERY = "Hatchery|Lair|Hive"
 ZERG = Build(
     signs=("Train_Drone", "Train_Overlord", "Train_Zergling", "Train_Roach", "Build_SpawningPool"),
     supply=Want("Train_Overlord", "Overlord"),
-    supply_minerals=100,
     wants=(
-        Want("Train_Drone", "Drone", 14),
-        Want("Build_SpawningPool", "SpawningPool", 1, {"Drone": 14}, first=True),
-        Want("Build_Extractor", "Extractor", 1, {"Drone": 13, "SpawningPool": 1}),
+        Want("Train_Drone", "Drone", 13),
+        Want("Train_Overlord", "Overlord", 2, first=True),
+        Want("Train_Drone", "Drone", 17),
+        Want("Build_SpawningPool", "SpawningPool", 1, {"Drone": 17}, first=True),
+        Want("Build_Hatchery", _HATCHERY, 2, {"Drone": 16}, first=True),
+        Want("Build_Extractor", "Extractor", 1, {"Drone": 17}),
+        Want("Train_Drone", "Drone", 20),
         Want("Train_Queen", "Queen", 1, {"SpawningPool": 1}, per_hall=True),
-        Want("Train_Drone", "Drone", 19, {"SpawningPool": 1}),
-        Want("Build_RoachWarren", "RoachWarren", 1, {"SpawningPool": 1, "Drone": 16}, first=True),
-        Want("Build_Hatchery", "Hatchery|Lair|Hive", 2, {"Roach": 8}),
-        Want("Train_Drone", "Drone", 32, {"Hatchery": 2}),
-        Want("Build_Extractor", "Extractor", 3, {"Hatchery": 2, "Drone": 24}),
+        Want("Train_Zergling", "Zergling", 6, {"SpawningPool": 1}),
+        Want("Train_Drone", "Drone", 28, {"SpawningPool": 1}),
+        Want("Build_RoachWarren", "RoachWarren", 1, {"SpawningPool": 1, "Drone": 24}, first=True),
+        Want("Train_Roach", "Roach", 6, {"RoachWarren": 1}),
+        Want("Build_Extractor", "Extractor", 3, {_HATCHERY: 2, "Drone": 28}),
+        Want("Train_Drone", "Drone", 40, {_HATCHERY: 2}),
+        Want("Morph_Lair", "Lair|Hive", 1, {"RoachWarren": 1, "Drone": 34}),
+        Want("Build_EvolutionChamber", "EvolutionChamber", 1, {_HATCHERY: 2, "Drone": 34}),
+        Want("Research_ZergMissileWeapons", after={"EvolutionChamber": 1}),
+        Want("Research_GlialRegeneration", after={"Lair|Hive": 1}),
+        Want("Build_HydraliskDen", "HydraliskDen", 1, {"Lair|Hive": 1}),
+        Want("Build_Hatchery", _HATCHERY, 3, {_HATCHERY: 2, "Drone": 38, "Roach": 8}),
+        Want("Build_Extractor", "Extractor", 5, {_HATCHERY: 2, "Drone": 38, "Roach": 8}),
+        Want("Train_Drone", "Drone", 60, {_HATCHERY: 3, "Roach": 16}),
     ),
-    army=("Inject_Larva", "Train_Roach", "Train_Zergling"),
-    structures=(
-        "Hatchery", "Lair", "Hive", "Extractor", "SpawningPool", "EvolutionChamber", "RoachWarren", "BanelingNest",
-        "SpineCrawler", "SporeCrawler", "HydraliskDen", "LurkerDen", "InfestationPit", "Spire", "GreaterSpire",
-        "UltraliskCavern", "NydusNetwork", "NydusCanal", "CreepTumor", "CreepTumorBurrowed", "CreepTumorQueen",
+    army=(
+        Line(
+            "",
+            ("Train_Hydralisk", "Train_Roach", "Train_Zergling"),
+            most={"Train_Hydralisk": 20, "Train_Zergling": 16},
+        ),
     ),
-)  # fmt: skip
+    boosts=("Inject_Larva", "Spread_Creep"),
+)
 
 BUILDS = (PROTOSS, TERRAN, ZERG)

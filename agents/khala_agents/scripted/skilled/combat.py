@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from khala_agents.scripted.skilled.journey import told_order, travel
 from khala_agents.scripted.skilled.kinds import IGNORED, TOWN_HALLS, kind_of
 from khala_agents.scripted.skilled.space import away, distance, middle, nearest
 
@@ -17,9 +18,13 @@ if TYPE_CHECKING:
     from khala_agents.scripted.reading import TextTeam, TextUnit
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
+CROWD = 6
+"""Units from which a team fights by itself while it marches."""
 HURT = 0.5
 """Share of hit points below which a unit is pulled back."""
 IN_DANGER = 7.0
+BESIDE = 3.0
+"""World units from its friends' middle within which a team without weapons stays."""
 STEP_BACK = 4.5
 BLINK = 7.5
 WALK_COST = 1.5
@@ -107,7 +112,7 @@ def fight(plan: ReplyPlan, prey: str = "") -> bool:
     target = best_target(plan, prey)
     foes = threats(team)
     if target is None and not foes:
-        return False
+        return _escort(plan)
     if prey != "hall":  # a team that destroys a base does not come back
         save_the_hurt(plan, foes)
     if target is None:
@@ -123,6 +128,22 @@ def shoot(plan: ReplyPlan, target: TextUnit) -> bool:
         return plan.give("Attack_Unit", target.tag)
     given = [plan.give("Select_Unit_Attack_Unit", unit.tag, target.tag) for unit in able]
     return any(given)
+
+
+def marches(plan: ReplyPlan) -> bool:
+    """Return whether a team is so large that it fights on its way by itself: one target would be too few."""
+    return len(plan.team.own) >= CROWD and any(action.name == "Attack_Minimap" for action in plan.team.actions)
+
+
+def march(plan: ReplyPlan) -> bool:
+    """Follow the last order with all units; without one, fight where the team stands if it does not fight yet."""
+    team = plan.team
+    if told_order(plan.situation) is not None:
+        return travel(plan)
+    fighting = sum(unit.order.startswith("Attack") for unit in team.own)
+    if not targets(team) or 2 * fighting >= len(team.own) or team.minimap is None:
+        return False
+    return plan.give("Attack_Minimap", team.minimap)
 
 
 def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> None:
@@ -169,6 +190,16 @@ def _keep_off(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
     if near:
         plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
     return True
+
+
+def _escort(plan: ReplyPlan) -> bool:
+    """Keep a team without weapons in the middle of armed friends, while it sees any; return whether it does."""
+    team = plan.team
+    armed = [ally for ally in team.allies if kind_of(ally).reach >= 0 and kind_of(ally).role == "army"]
+    if not armed or any(kind_of(unit).reach >= 0 for unit in team.own) or any(kind_of(a).structure for a in armed):
+        return False
+    there = middle(armed)
+    return distance(there, middle(team.own)) <= BESIDE or plan.give("Move_Screen", there)
 
 
 def _caught(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:

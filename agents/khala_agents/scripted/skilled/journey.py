@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.scripted.reading import points
 
@@ -14,9 +14,19 @@ if TYPE_CHECKING:
 
 MAP_CENTRE = (32.0, 32.0)
 _PASSING = re.compile(r"\b(do not stop|around|along|out of sight|unseen)\b", re.IGNORECASE)
+_PEACEFUL = re.compile(r"\b(gather|retreat|come home|wait)\b", re.IGNORECASE)
 ARRIVED = 2.0
 """Cells of the minimap."""
 FAR = 6.0
+
+
+class MarchingOrder(NamedTuple):
+    """What a message orders."""
+
+    sender: str
+    goal: Point
+    fights: bool
+    """Whether to fight on the way."""
 
 
 def passing(plan: ReplyPlan) -> bool:
@@ -29,8 +39,8 @@ def passing(plan: ReplyPlan) -> bool:
 
 def travel(plan: ReplyPlan) -> bool:
     """Plan the way of a team; return whether it has one to go."""
-    team, told = plan.team, None if plan.prey else told_goal(plan.situation)
-    goal = told or task_goal(team, plan.situation)
+    team, told = plan.team, None if plan.prey else told_order(plan.situation)
+    goal = told.goal if told else task_goal(team, plan.situation)
     if goal is None or team.minimap is None or math.dist(goal, team.minimap) <= ARRIVED:
         return False
     if told is None and all(unit.order for unit in team.own) and not team.allies:
@@ -40,20 +50,27 @@ def travel(plan: ReplyPlan) -> bool:
     if math.dist(goal, team.minimap) > FAR and plan.give("Ability_AdeptPhaseShift_Minimap", goal):
         plan.give("Move_Minimap", goal)
         return True
-    return plan.give("Move_Minimap", goal)
+    fights = told is not None and (told.fights or bool(team.enemies))
+    return (fights and plan.give("Attack_Minimap", goal)) or plan.give("Move_Minimap", goal)
 
 
-def told_goal(situation: Situation) -> Point | None:
-    """Return the place of the last call for help that names one."""
-    named = [place for _, text in situation.messages for place in points(text)]
-    return named[-1] if named else None
+def told_order(situation: Situation) -> MarchingOrder | None:
+    """Return the last order by a message that names a place; None if there is none."""
+    told = [(sender, text, named[-1]) for sender, text in situation.messages if (named := points(text))]
+    if not told:
+        return None
+    sender, text, goal = told[-1]
+    return MarchingOrder(sender, goal, fights=not _PEACEFUL.search(text))
 
 
 def task_goal(team: TextTeam, situation: Situation) -> Point | None:
-    """Return the last place in the team's task, or else in the side's task, or else the middle of the map."""
+    """Return the last place in the team's task, or else in the side's task; None to wait for a commander's order.
+
+    Who has neither a place nor a commander goes to the middle of the map.
+    """
     for text in (team.task, situation.task):
         if named := points(text):
             return named[-1]
         if text is team.task and text:
             return None
-    return MAP_CENTRE
+    return None if "Commander" in situation.correspondents else MAP_CENTRE

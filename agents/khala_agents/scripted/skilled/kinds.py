@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from khala_agents.scripted.reading import TextUnit
 
 Role = Literal["army", "worker", "structure", "support"]
@@ -146,6 +148,29 @@ KINDS: dict[str, Kind] = {
     **dict.fromkeys(_PLAIN.split(), STRUCTURE),
 }
 UNKNOWN = Kind()
+SUPPLIES = {
+    **dict.fromkeys(("Zergling", "Baneling"), 0.5),
+    **dict.fromkeys(("Marine", "Reaper"), 1.0),
+    **dict.fromkeys(("Ravager", "Lurker", "LurkerBurrowed", "Phoenix", "SiegeTank", "SiegeTankSieged", "Cyclone"), 3.0),
+    **dict.fromkeys(("Liberator", "LiberatorAG", "Banshee", "Oracle", "SwarmHost", "Disruptor"), 3.0),
+    **dict.fromkeys(("Immortal", "Archon", "VoidRay", "BroodLord"), 4.0),
+    **dict.fromkeys(("Tempest",), 5.0),
+    **dict.fromkeys(("Colossus", "Thor", "ThorHighImpactMode", "Carrier", "Battlecruiser", "Ultralisk"), 6.0),
+    "Mothership": 8.0,
+    **dict.fromkeys(("Broodling", "Locust", "AdeptPhaseShift"), 0.0),
+}
+"""Supply of types that use another number of it than 2."""
+
+
+def strength(counts: Mapping[str, int]) -> float:
+    """Return the supply of the units that fight; Queens stay at home and do not count."""
+    return sum(SUPPLIES.get(kind, 2.0) * count for kind, count in counts.items() if fights(kind))
+
+
+def fights(kind: str) -> bool:
+    """Return whether units of a type belong to the army that attacks."""
+    known = KINDS.get(kind, STRUCTURE)
+    return known.role == "army" and not known.structure and kind != "Queen"
 
 
 def kind_of(unit: TextUnit) -> Kind:

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from khala_agents.scripted.reading import points, read
-from khala_agents.scripted.skilled import builder, combat, economy, journey, skills
+from khala_agents.scripted.skilled import brood, builder, combat, command, economy, journey, skills
 from khala_agents.scripted.skilled.kinds import kind_of
 from khala_agents.scripted.skilled.plan import ReplyPlan
 from khala_agents.scripted.skilled.space import middle
@@ -14,13 +14,12 @@ from khala_agents.scripted.writing import point, reply
 
 if TYPE_CHECKING:
     import random
+    from collections.abc import Callable
 
     from khala_agents.scripted.reading import Situation, TextTeam
 
 MESSAGE_SHARE = 0.2
 """Part of the replies that contain a message to others."""
-ORDERS_EVERY_S = 12
-"""How often a commander sends the marching order."""
 _RAID = re.compile(r"\b(raid|workers?|drones?|probes?|scvs?)\b", re.IGNORECASE)
 _GATHER = re.compile(r"\bgather\b", re.IGNORECASE)
 _HALL = re.compile(r"(?<!your )\b(hatchery|nexus|command center)\b", re.IGNORECASE)
@@ -41,25 +40,38 @@ def skilled(observation: str, rng: random.Random) -> str:
 
 
 def _lead(plan: ReplyPlan) -> None:
-    team = plan.team
-    if not team.own:
-        economy.lead(plan)
-        return
-    if any(unit.type.startswith("WarpPrism") for unit in team.own):
-        prism(plan)
-        return
-    if builder.leads(plan):
+    own = plan.team.own
+    special = next((lead for kind, lead in _LEADERS.items() if any(unit.type.startswith(kind) for unit in own)), None)
+    if not own:
+        lead_side(plan)
+    elif special:
+        special(plan)
+    elif builder.leads(plan):
         builder.build(plan)
-        return
-    if all(unit.type == "AdeptPhaseShift" for unit in team.own):
-        shade(plan)
-        return
-    if journey.passing(plan):
+    elif journey.passing(plan):
         journey.travel(plan)
-        return
+    else:
+        battle(plan)
+
+
+def lead_side(plan: ReplyPlan) -> None:
+    """Order what the host carries out with units of the whole side: its army and its production."""
+    command.command(plan)
+    economy.warp_to_the_front(plan)
+    economy.produce(plan)
+
+
+def battle(plan: ReplyPlan) -> None:
+    """Use skills, then fight; without enemies, go where the team is wanted."""
     skills.use(plan, prey=prey(plan))
-    if not combat.fight(plan, prey(plan)):
+    if combat.marches(plan):
+        combat.march(plan)
+    elif not combat.fight(plan, prey(plan)):
         journey.travel(plan)
+
+
+def stay(plan: ReplyPlan) -> None:
+    """Order nothing: it has nothing better to do where it is."""
 
 
 def prey(plan: ReplyPlan) -> str:
@@ -94,6 +106,17 @@ def prism(plan: ReplyPlan) -> None:
         plan.give("Morph_WarpPrismPhasingMode")
 
 
+_LEADERS: dict[str, Callable[[ReplyPlan], None]] = {
+    "WarpPrism": prism,
+    "AdeptPhaseShift": shade,
+    "Queen": brood.tend,
+    "Overlord": stay,
+    "Changeling": stay,
+    "CreepTumor": stay,
+}
+"""Who leads teams with units that do not fight as others do, by the beginnings of the names of their types."""
+
+
 def _analysis(situation: Situation) -> str:
     own = sum(len(team.own) for team in situation.teams.values())
     enemies = {unit.tag: unit for team in situation.teams.values() for unit in team.enemies}
@@ -103,23 +126,25 @@ def _analysis(situation: Situation) -> str:
 
 
 def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
-    """Return a call for help from a team in a fight to its first contact; a commander passes calls on."""
+    """Return what an agent writes: a commander orders, a team in a fight says what it sees, others pass that on.
+
+    A message says what stands in the observation, or orders something; it promises nothing.
+    """
     people = situation.correspondents
     if not people:
         return []
+    if not situation.teams and _GATHER.search(situation.task):
+        return command.marching_orders(situation)
     fighting = [team for team in situation.teams.values() if team.enemies and team.minimap]
     if fighting and rng.random() < MESSAGE_SHARE:
         return [(people[0], _report(fighting[0]))]
-    if situation.friends and _GATHER.search(situation.task) and situation.time_s % ORDERS_EVERY_S < 2:
-        groups = [name for name in people if name.startswith("CombatGroup")]
-        return [(name, economy.marching_order(situation)) for name in groups]
     calls = [(sender, place) for sender, text in situation.messages for place in points(text)]
     if calls and not any(team.own for team in situation.teams.values()):
         sender, place = calls[-1]
-        return [(name, f"{sender} fights at {point(place)}: help there.") for name in people if name != sender][:3]
+        return [(name, f"Help {sender} at {point(place)}.") for name in people if name != sender][:3]
     return []
 
 
 def _report(team: TextTeam) -> str:
     assert team.minimap is not None
-    return f"{team.name} fights {len(team.enemies)} enemies at {point(team.minimap)} of the minimap."
+    return f"{team.name} is at {point(team.minimap)} of the minimap and sees {len(team.enemies)} enemies."

@@ -1,0 +1,110 @@
+"""Lead the army as a whole: when it gathers, attacks and comes home, by orders to the host or by messages to groups.
+
+A commander of easy control orders `All_Units_Attack` and its like; one of standard control has no team and writes
+marching orders, each with a place, to the groups that have units (`khala_agents.scripted.skilled.journey` reads them).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from khala_agents.scripted.skilled.kinds import KINDS, fights, strength
+from khala_agents.scripted.writing import point
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from khala_agents.scripted.reading import Place, Point, Situation
+    from khala_agents.scripted.skilled.plan import ReplyPlan
+
+STRONG = 40.0
+"""Supply of army units with which the army sets out."""
+WEAK = 14.0
+"""The army comes home with less than this."""
+CAUTION = 1.4
+"""How much stronger than the enemy's known army the own one has to be to set out."""
+FULL = 185.0
+"""Supply at which it sets out in any case."""
+GATHER_EVERY_S = 10
+"""How often an army at home is ordered to wait at the foremost base."""
+ORDERS_EVERY_S = 6
+"""How often marching orders are written: new units hear of them, and groups that have arrived get the next place."""
+IN_FRONT = 4.0
+"""Cells of the minimap from the foremost base to where the army gathers."""
+MAP_MIDDLE = (32.0, 32.0)
+MOST_MESSAGES = 8
+
+
+def command(plan: ReplyPlan) -> None:
+    """Send the whole army out when it is strong, and home when it is weak and the side is attacked."""
+    situation = plan.situation
+    out = any(name == "All_Units_Attack" for _, name, _ in situation.accepted)
+    if attacks(situation, out=out):
+        plan.give("All_Units_Attack")
+    elif strength(situation.counts) and (out or situation.alarms or situation.time_s % GATHER_EVERY_S < 2):
+        plan.give("All_Units_Defend")
+
+
+def attacks(situation: Situation, *, out: bool) -> bool:
+    """Return whether the army shall attack; one that is out already goes on longer."""
+    mine, theirs = strength(situation.counts), strength(situation.seen)
+    if out:
+        return mine >= max(WEAK, theirs / CAUTION)
+    return mine >= max(STRONG, theirs * CAUTION) or (situation.supply_used >= FULL and mine >= STRONG)
+
+
+def marching_orders(situation: Situation) -> list[tuple[str, str]]:
+    """Return a commander's orders to the groups that fight: the recipient and the text."""
+    groups = [group for group in situation.groups if any(map(marches, group.units))]
+    if not groups or situation.time_s % ORDERS_EVERY_S >= 2:  # a decision every two seconds
+        return []
+    army = _middle(group.at for group in groups)
+    target, home = _target(situation, army), _gathering(situation, army)
+    out = math.dist(army, target) < math.dist(army, home)
+    text = f"Attack {point(target)}." if attacks(situation, out=out) else f"Gather at {point(home)} and defend it."
+    if situation.alarms and text.startswith("Gather"):
+        text = f"Defend {point(min(situation.alarms, key=lambda at: math.dist(at, home)))}."
+    names = dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents)
+    return [(name, text) for name in list(names)[:MOST_MESSAGES]]
+
+
+def marches(kind: str) -> bool:
+    """Return whether units of a type go with the army, to fight or to help."""
+    return fights(kind) or kind in {"Medivac", "Raven", "Observer", "Overseer"}
+
+
+def _target(situation: Situation, army: Point) -> Point:
+    """Return where enemies are known to live, or else where they may: the nearest such place."""
+    known = [at for kind, at in situation.known if kind in KINDS and KINDS[kind].structure]
+    for places in (known, _bases(situation, "the enemy's"), _bases(situation, "may have begun")):
+        if places:
+            return min(places, key=lambda at: math.dist(at, army))
+    unseen = _bases(situation, "never seen") or _bases(situation, "last seen")
+    if unseen:
+        return min(unseen, key=lambda at: math.dist(at, army))
+    return 2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1]  # maps are the same from both ends
+
+
+def _gathering(situation: Situation, army: Point) -> Point:
+    """Return the place in front of the foremost own base; without a map, where the army is."""
+    own = _bases(situation, "yours")
+    if not own:
+        return army
+    enemy = _target(situation, MAP_MIDDLE)
+    base = min(own, key=lambda at: math.dist(at, enemy))
+    way = max(math.dist(base, enemy), IN_FRONT)
+    return tuple(a + (b - a) * IN_FRONT / way for a, b in zip(base, enemy, strict=True))  # type: ignore[return-value]
+
+
+def _bases(situation: Situation, words: str) -> list[Point]:
+    return [place.at for place in situation.places if _is_base(place) and words in place.about]
+
+
+def _is_base(place: Place) -> bool:
+    return any(words in place.about for words in ("yours", "the enemy's", "no town hall"))
+
+
+def _middle(places: Iterable[Point]) -> Point:
+    found = list(places)
+    return sum(x for x, _ in found) / len(found), sum(y for _, y in found) / len(found)
