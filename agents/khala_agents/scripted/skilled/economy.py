@@ -67,7 +67,10 @@ class ReplyBudget:
         price = self.plan.situation.prices.get(action, Price())
         enough = price.minerals <= self.minerals and price.vespene <= self.vespene and price.supply <= self.supply
         larva = action in LARVAE_MAKE
-        if not enough or self.bought[action] >= price.times or self.larvae < larva or not self.plan.give(action):
+        refused = any(f"<{action}(" in text for text in self.plan.situation.rejected)
+        if refused or not enough or self.bought[action] >= price.times or self.larvae < larva:
+            return False
+        if not self.plan.give(action):
             return False
         self.bought[action] += 1
         self.larvae -= larva
@@ -105,7 +108,8 @@ def _order_units(purse: ReplyBudget, line: Line) -> None:
     labs = situation.counts.get(f"{line.producer}TechLab", 0) - sum(situation.producing.get(a, 0) for a in line.lab)
     for action in line.units:
         room = min(free, labs) if action in line.lab else free
-        room = min(room, line.most.get(action, room) - _there(situation, action.partition("_")[2], action))
+        if action in line.most:
+            room = min(room, line.most[action] - _there(situation, action.partition("_")[2], action))
         while room > 0 and purse.buy(action):
             room, free = room - 1, free - 1
 
