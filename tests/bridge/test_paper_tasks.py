@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_bridge.catalogue.catalogue import chosen
+from khala_bridge.catalogue.catalogue import catalogue, chosen
 from khala_bridge.knowledge import knowledge
 from khala_bridge.knowledge.forms import form_of, forms_of
 from khala_bridge.task.maps import known_maps
@@ -132,6 +132,15 @@ def test_units_of_standard_control_have_every_skill_of_their_type(end: str) -> N
     for agent in load_task(f"simple64_sceb{end}").agents:
         for kind, names in agent.actions.items():
             assert set(chosen(["group:skill"], kind)) <= {*names, "Morph_SurveillanceMode", "Morph_ObserverMode"}, kind
+
+
+@pytest.mark.parametrize("end", RACES.values(), ids=RACES)
+def test_units_with_skills_of_their_own_are_explained(end: str) -> None:
+    everywhere = set(chosen(["group:skill"], "Zergling")) | {"BurrowUp"}
+    for agent in load_task(f"simple64_sceb{end}").agents:
+        for kind, names in agent.actions.items():
+            own = {name for name in names if catalogue()[name].group == "skill"} - everywhere
+            assert not own or (knowledge()[kind].abilities and knowledge()[kind].uses), kind
 
 
 @pytest.mark.parametrize("end", RACES.values(), ids=RACES)
