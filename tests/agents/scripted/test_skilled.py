@@ -245,6 +245,97 @@ def test_the_army_sets_out_when_it_is_strong_and_comes_home_when_it_is_not(
     assert names(side(valid, counts, more=more)) == order
 
 
+def leader(army: str, *, at: str, seen: str = "none", more: str = "") -> str:
+    """Return an observation of a commander of groups, whose Marines are at a place."""
+    return (
+        "Game\n    Time: 6:00\n    Minerals: 50, vespene: 0\n    Supply: 90 of 110 used\n\n"
+        "Map\n    Places, numbered by the way from where you began:\n        Base 1 at [16, 18], yours, CommandCenter\n"
+        "        Base 2 at [24, 24], yours, CommandCenter\n"
+        "        Base 3 at [48, 46], no town hall known, the enemy may have begun here, never seen\n\n"
+        f"Unit counts\n    Your units: {army}, 40 SCV\n    Enemies spotted so far: {seen}\n\n{more}"
+        f"Teams of other agents\n    CombatGroup0\n        Marine-1: 30 Marine at minimap {at}, 100% of health\n"
+        "    CombatGroup4\n        Overlord-1: 9 Overlord at minimap [10, 10], 100% of health\n\n"
+        "Task\n    Gather the groups in front of your base until they are strong enough.\n\n"
+        "Communication\n    You can write to:\n        CombatGroup0: Marines.\n        CombatGroup4: Overlords.\n\n"
+        "Answer\n    You have no team to order now.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("army", "at", "more", "order"),
+    [
+        ("20 Marine", "[20, 20]", "", "Gather at [26.9, 26.7] and defend it."),
+        ("20 Marine", "[20, 20]", "Alerts\n    Under attack at minimap [25, 22]: 1 SCV\n\n", "Defend [25.0, 22.0]."),
+        ("45 Marine", "[20, 20]", "", "Attack [48.0, 46.0]."),
+        ("20 Marine", "[44, 44]", "", "Attack [48.0, 46.0]."),
+        ("10 Marine", "[44, 44]", "", "Gather at [26.9, 26.7] and defend it."),
+    ],
+)
+def test_a_commander_orders_places_that_its_text_names_to_groups_that_fight(
+    army: str, at: str, more: str, order: str
+) -> None:
+    said = parse(skilled(leader(army, at=at, more=more), random.Random(1))).messages
+    assert [(message.recipient, message.text) for message in said] == [("CombatGroup0", order)]
+
+
+def test_an_army_that_knows_of_a_stronger_one_waits() -> None:
+    seen = "\n        40 Roach in sight at minimap [40, 40]"
+    (message,) = parse(skilled(leader("45 Marine", at="[20, 20]", seen=seen), random.Random(1))).messages
+    assert message.text.startswith("Gather")
+
+
+MARCH = (*BASIC, "Attack_Minimap(minimap)")
+MARINES = [line(n, "Marine", 12, 9 + n, health="45/45") for n in range(1, 7)]
+ATTACK = "Messages\n    Message from Commander: '''Attack [48.0, 46.0].'''\n\n"
+CONTACT = "Communication\n    You can write to:\n        Commander: It leads.\n\n"
+
+
+def test_a_group_carries_out_what_the_message_says() -> None:
+    assert calls(page(*MARINES, actions=MARCH, more=ATTACK)) == ["Attack_Minimap (48.0, 46.0)"]
+    home = ATTACK.replace("Attack [48.0, 46.0].", "Gather at [20.0, 20.0] and defend it.")
+    assert calls(page(*MARINES, actions=MARCH, more=home)) == ["Move_Minimap (20.0, 20.0)"]
+    assert calls(page(*MARINES, actions=MARCH, more=home, enemies=[ZEALOT])) == ["Attack_Minimap (20.0, 20.0)"]
+
+
+def test_a_large_group_that_fights_already_is_not_disturbed() -> None:
+    assert calls(page(*MARINES, actions=MARCH, enemies=[ZEALOT])) == ["Attack_Minimap (30.0, 32.0)"]
+    busy = [f"{marine} | order Attack minimap [48, 46]" for marine in MARINES]
+    assert calls(page(*busy, actions=MARCH, enemies=[ZEALOT])) == []
+
+
+def test_who_has_a_commander_waits_for_its_order() -> None:
+    assert calls(page(*MARINES, actions=MARCH, more=CONTACT)) == []
+
+
+def test_a_report_says_what_the_observation_says() -> None:
+    text = page(*MARINES, actions=MARCH, more=CONTACT, enemies=[ZEALOT])
+    said = {m.text for seed in range(30) for m in parse(skilled(text, random.Random(seed))).messages}
+    assert said == {"T is at [30.0, 32.0] of the minimap and sees 1 enemies."}
+
+
+def test_unarmed_units_stay_with_their_friends() -> None:
+    medivac = line(1, "Medivac", 12, 12)
+    friends = [line(n, "Marine", 19, 10 + n) for n in (2, 3)]
+    assert calls(page(medivac, allies=friends, actions=MARCH)) == ["Move_Screen (19.0, 12.5)"]
+    beside = [line(n, "Marine", 13, 10 + n) for n in (2, 3)]
+    assert calls(page(medivac, allies=beside, actions=MARCH)) == []
+
+
+def test_a_queen_with_energy_injects_the_nearest_hatchery() -> None:
+    halls = [line(0x30, "Hatchery", 16, 12), line(0x31, "Lair", 22, 12)]
+    actions = (*MARCH, "Effect_InjectLarva_Unit(tag)")
+    ready, tired = (line(1, "Queen", 12, 12, f"energy {energy}/200") for energy in (25, 24))
+    assert calls(page(ready, allies=halls, actions=actions)) == ["Effect_InjectLarva_Unit 0x30"]
+    assert calls(page(tired, allies=halls, actions=actions)) == []
+
+
+def test_a_structure_trains_one_unit_at_a_time() -> None:
+    costs = "        Train_Marine: fights. Costs 50 minerals, 1 supply; enough for 8.\n"
+    counts = "Your units: 44 SCV\n    Your structures: 1 OrbitalCommand, 2 Barracks, 1 BarracksReactor, 4 SupplyDepot\n"
+    counts += "    In production: Train_Marine (1 at 40%)"
+    assert names(side("<Train_Marine()>", counts, costs=costs)).count("Train_Marine") == 2
+
+
 def test_units_are_warped_in_at_a_phasing_prism() -> None:
     fields = "        WarpPrismPhasing 0x3 at minimap [5, 5], radius 3.75, warps in fast, no room for a unit\n"
     fields += "        Pylon 0x1 at minimap [10, 36]\n        WarpPrismPhasing 0x2 at minimap [52, 24]\n\n"

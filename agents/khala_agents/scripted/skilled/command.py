@@ -15,7 +15,7 @@ from khala_agents.scripted.writing import point
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_agents.scripted.reading import Place, Point, Situation
+    from khala_agents.scripted.reading import Point, Situation
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 40.0
@@ -32,6 +32,8 @@ ORDERS_EVERY_S = 6
 """How often marching orders are written: new units hear of them, and groups that have arrived get the next place."""
 IN_FRONT = 4.0
 """Cells of the minimap from the foremost base to where the army gathers."""
+HUNT_S = 60
+"""How long the army looks for the last structures at one base."""
 MAP_MIDDLE = (32.0, 32.0)
 MOST_MESSAGES = 8
 
@@ -62,9 +64,12 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
     army = _middle(group.at for group in groups)
     target, home = _target(situation, army), _gathering(situation, army)
     out = math.dist(army, target) < math.dist(army, home)
-    text = f"Attack {point(target)}." if attacks(situation, out=out) else f"Gather at {point(home)} and defend it."
-    if situation.alarms and text.startswith("Gather"):
+    if attacks(situation, out=out):
+        text = f"Attack {point(target)}."
+    elif situation.alarms and not out:
         text = f"Defend {point(min(situation.alarms, key=lambda at: math.dist(at, home)))}."
+    else:
+        text = f"Gather at {point(home)} and defend it."
     names = dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents)
     return [(name, text) for name in list(names)[:MOST_MESSAGES]]
 
@@ -75,15 +80,18 @@ def marches(kind: str) -> bool:
 
 
 def _target(situation: Situation, army: Point) -> Point:
-    """Return where enemies are known to live, or else where they may: the nearest such place."""
+    """Return where enemies are known to live, or else where they may, the nearest such place; then every base in turn.
+
+    Without a map it is the place opposite of the army: maps are the same from both ends.
+    """
     known = [at for kind, at in situation.known if kind in KINDS and KINDS[kind].structure]
-    for places in (known, _bases(situation, "the enemy's"), _bases(situation, "may have begun")):
+    for places in (known, *(_bases(situation, words) for words in ("the enemy's", "may have begun", "never seen"))):
         if places:
             return min(places, key=lambda at: math.dist(at, army))
-    unseen = _bases(situation, "never seen") or _bases(situation, "last seen")
-    if unseen:
-        return min(unseen, key=lambda at: math.dist(at, army))
-    return 2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1]  # maps are the same from both ends
+    others = _bases(situation, "no town hall")
+    if others:
+        return others[int(situation.time_s / HUNT_S) % len(others)]
+    return 2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1]
 
 
 def _gathering(situation: Situation, army: Point) -> Point:
@@ -98,11 +106,8 @@ def _gathering(situation: Situation, army: Point) -> Point:
 
 
 def _bases(situation: Situation, words: str) -> list[Point]:
-    return [place.at for place in situation.places if _is_base(place) and words in place.about]
-
-
-def _is_base(place: Place) -> bool:
-    return any(words in place.about for words in ("yours", "the enemy's", "no town hall"))
+    """Return the bases whose lines contain some words, in the order of the text."""
+    return [place.at for place in situation.places if place.name.startswith("Base ") and words in place.about]
 
 
 def _middle(places: Iterable[Point]) -> Point:
