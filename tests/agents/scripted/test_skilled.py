@@ -316,9 +316,9 @@ def test_a_report_says_what_the_observation_says() -> None:
 def test_unarmed_units_stay_with_their_friends() -> None:
     medivac = line(1, "Medivac", 12, 12)
     friends = [line(n, "Marine", 19, 10 + n) for n in (2, 3)]
-    assert calls(page(medivac, allies=friends, actions=MARCH)) == ["Move_Screen (19.0, 12.5)"]
+    assert calls(page(medivac, allies=friends, actions=MARCH, more=CONTACT)) == ["Move_Screen (19.0, 12.5)"]
     beside = [line(n, "Marine", 13, 10 + n) for n in (2, 3)]
-    assert calls(page(medivac, allies=beside, actions=MARCH)) == []
+    assert calls(page(medivac, allies=beside, actions=MARCH, more=CONTACT)) == []
 
 
 def test_a_queen_with_energy_injects_the_nearest_hatchery() -> None:

@@ -3,7 +3,8 @@
     skilled(observation, rng) -> reply
 
 `kinds` is common knowledge of StarCraft II players; `space` is geometry on a screen; `plan` collects the calls of a
-team; `skills`, `combat` and `journey` fill it for units, `economy` for the whole side. It keeps nothing from one
+team; `skills`, `combat` and `journey` fill it for units, `brood` for Queens, `builder` for a worker that builds.
+`economy` leads production for the whole side by the tables of `builds`, `command` the army. It keeps nothing from one
 observation to the next, so that it can be asked like a model: it reads from the text whatever it needs to know.
 """
 

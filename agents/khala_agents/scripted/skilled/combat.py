@@ -112,7 +112,7 @@ def fight(plan: ReplyPlan, prey: str = "") -> bool:
     target = best_target(plan, prey)
     foes = threats(team)
     if target is None and not foes:
-        return _escort(plan)
+        return False
     if prey != "hall":  # a team that destroys a base does not come back
         save_the_hurt(plan, foes)
     if target is None:
@@ -144,6 +144,16 @@ def march(plan: ReplyPlan) -> bool:
     if not targets(team) or 2 * fighting >= len(team.own) or team.minimap is None:
         return False
     return plan.give("Attack_Minimap", team.minimap)
+
+
+def escort(plan: ReplyPlan) -> bool:
+    """Keep a team without weapons in the middle of armed friends, while it sees any; return whether it does."""
+    team = plan.team
+    armed = [ally for ally in team.allies if kind_of(ally).reach >= 0 and kind_of(ally).role == "army"]
+    if not armed or any(kind_of(unit).reach >= 0 for unit in team.own) or any(kind_of(a).structure for a in armed):
+        return False
+    there = middle(armed)
+    return distance(there, middle(team.own)) <= BESIDE or plan.give("Move_Screen", there)
 
 
 def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> None:
@@ -190,16 +200,6 @@ def _keep_off(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
     if near:
         plan.give("Move_Screen", away(plan.team, middle(plan.team.own), near, 4.0))
     return True
-
-
-def _escort(plan: ReplyPlan) -> bool:
-    """Keep a team without weapons in the middle of armed friends, while it sees any; return whether it does."""
-    team = plan.team
-    armed = [ally for ally in team.allies if kind_of(ally).reach >= 0 and kind_of(ally).role == "army"]
-    if not armed or any(kind_of(unit).reach >= 0 for unit in team.own) or any(kind_of(a).structure for a in armed):
-        return False
-    there = middle(armed)
-    return distance(there, middle(team.own)) <= BESIDE or plan.give("Move_Screen", there)
 
 
 def _caught(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:

@@ -37,6 +37,11 @@ def passing(plan: ReplyPlan) -> bool:
     return math.dist(named[-1], team.minimap) > ARRIVED
 
 
+def follows(plan: ReplyPlan) -> bool:
+    """Return whether only a commander's orders say where the team goes."""
+    return task_goal(plan.team, plan.situation) is None
+
+
 def travel(plan: ReplyPlan) -> bool:
     """Plan the way of a team; return whether it has one to go."""
     team, told = plan.team, None if plan.prey else told_order(plan.situation)

@@ -66,7 +66,7 @@ def battle(plan: ReplyPlan) -> None:
     skills.use(plan, prey=prey(plan))
     if combat.marches(plan):
         combat.march(plan)
-    elif not combat.fight(plan, prey(plan)):
+    elif not combat.fight(plan, prey(plan)) and not (journey.follows(plan) and combat.escort(plan)):
         journey.travel(plan)
 
 
