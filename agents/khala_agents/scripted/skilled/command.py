@@ -34,6 +34,8 @@ IN_FRONT = 4.0
 """Cells of the minimap from the foremost base to where the army gathers."""
 HUNT_S = 60
 """How long the army looks for the last structures at one base."""
+LIKELY = ("the enemy's", "the enemy began", "may have begun", "never seen")
+"""Words in the line of a base where enemies are, the surest first."""
 MAP_MIDDLE = (32.0, 32.0)
 MOST_MESSAGES = 8
 
@@ -85,7 +87,7 @@ def _target(situation: Situation, army: Point) -> Point:
     Without a map it is the place opposite of the army: maps are the same from both ends.
     """
     known = [at for kind, at in situation.known if kind in KINDS and KINDS[kind].structure]
-    for places in (known, *(_bases(situation, words) for words in ("the enemy's", "may have begun", "never seen"))):
+    for places in (known, *(_bases(situation, words) for words in LIKELY)):
         if places:
             return min(places, key=lambda at: math.dist(at, army))
     others = _bases(situation, "no town hall")
