@@ -76,7 +76,6 @@ PROTOSS = Build(
         Want("Research_Charge", after={"TwilightCouncil": 1}),
         Want("Build_Gateway", "Gateway|WarpGate", 8, {"Nexus": 2, "Probe": 40}),
         Want("Build_RoboticsFacility", "RoboticsFacility", 2, {"Nexus": 2, "Probe": 42}),
-        Want("Build_Nexus", "Nexus", 3, {"Nexus": 2, "Probe": 44}),
     ),
     army=(
         Line("RoboticsFacility", ("Train_Immortal",)),
@@ -113,7 +112,6 @@ TERRAN = Build(
         Want("Build_TechLab_Barracks", "BarracksTechLab", 2, {"Barracks": 5}),
         Want("Build_Refinery", "Refinery", 4, {_COMMAND: 2, "SCV": 38}),
         Want("Build_Barracks", "Barracks", 8, {_COMMAND: 2, "SCV": 42}),
-        Want("Build_CommandCenter", _COMMAND, 3, {_COMMAND: 2, "SCV": 44}),
     ),
     army=(
         Line("Factory", ("Train_SiegeTank",), ("Build_TechLab_Factory",), ("Train_SiegeTank",)),
@@ -144,18 +142,19 @@ ZERG = Build(
         Want("Train_Zergling", "Zergling", 4, {"SpawningPool": 1}),
         Want("Train_Drone", "Drone", 28, {"SpawningPool": 1}),
         Want("Build_RoachWarren", "RoachWarren", 1, {"SpawningPool": 1, "Drone": 24}, first=True),
-        Want("Build_SpineCrawler", "SpineCrawler", 1, {"Queen": 2, "Drone": 26}),
+        Want("Build_SpineCrawler", "SpineCrawler", 2, {"Queen": 2, "Drone": 24}),
         Want("Train_Roach", "Roach", 8, {"RoachWarren": 1}),
         Want("Train_Queen", "Queen", 2, {"RoachWarren": 1}, per_hall=True),
-        Want("Build_Extractor", "Extractor", 3, {_HATCHERY: 2, "Drone": 28}),
+        Want("Build_Extractor", "Extractor", 2, {_HATCHERY: 2, "Drone": 28}),
+        Want("Train_Drone", "Drone", 34, {_HATCHERY: 2}),
+        Want("Train_Roach", "Roach", 16, {"RoachWarren": 1}),
         Want("Train_Drone", "Drone", 40, {_HATCHERY: 2}),
-        Want("Morph_Lair", "Lair|Hive", 1, {"RoachWarren": 1, "Drone": 34}),
-        Want("Build_EvolutionChamber", "EvolutionChamber", 1, {_HATCHERY: 2, "Drone": 34}),
+        Want("Morph_Lair", "Lair|Hive", 1, {"Roach": 14, "Drone": 34}),
+        Want("Build_EvolutionChamber", "EvolutionChamber", 1, {"Roach": 14, "Drone": 34}),
         Want("Research_ZergMissileWeapons", after={"EvolutionChamber": 1}),
         Want("Research_GlialRegeneration", after={"Lair|Hive": 1}),
         Want("Build_HydraliskDen", "HydraliskDen", 1, {"Lair|Hive": 1}),
-        Want("Build_Hatchery", _HATCHERY, 3, {_HATCHERY: 2, "Drone": 38, "Roach": 16}),
-        Want("Build_Extractor", "Extractor", 5, {_HATCHERY: 2, "Drone": 38, "Roach": 8}),
+        Want("Build_Extractor", "Extractor", 4, {_HATCHERY: 2, "Roach": 14, "Drone": 36}),
         Want("Train_Drone", "Drone", 48, {_HATCHERY: 2, "Roach": 16}),
     ),
     army=(
@@ -165,7 +164,7 @@ ZERG = Build(
             most={"Train_Hydralisk": 20},
         ),
     ),
-    boosts=("Inject_Larva", "Spread_Creep"),
+    boosts=("Inject_Larva",),
 )
 
 BUILDS = (PROTOSS, TERRAN, ZERG)
