@@ -46,7 +46,6 @@ _MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
 _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTILINE | re.ASCII)
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
-_IDLE = re.compile(r"(\d{1,4}) (\w+) \((?:\d+ working, )?(?:(\d{1,4}) )?idle\)", re.ASCII)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
@@ -178,8 +177,6 @@ class Situation:
     upgrades: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
     """Units and finished structures of the side, by type."""
-    idle: dict[str, int] = field(default_factory=dict)
-    """How many of them do nothing, by type."""
     warpgates: int = 0
     """WarpGates that can warp in now."""
     begun: dict[str, int] = field(default_factory=dict)
@@ -265,7 +262,6 @@ def _read_counts(situation: Situation, body: str) -> None:
             counts[kind] = counts.get(kind, 0) + int(number)
     situation.known = [(kind, (float(x), float(y))) for kind, x, y in _SEEN_AT.findall(body)]
     situation.seen = {kind: int(number) for number, kind in _SEEN.findall(body)}
-    situation.idle = {kind: int(idle or number) for number, kind, idle in _IDLE.findall(body)}
 
 
 def _read_task(situation: Situation, body: str) -> None:

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 GAS = frozenset({"Assimilator", "Refinery", "Extractor"})
 FIELD = 5.5
 """How far from a Pylon a structure is put."""
-ROOM = {"Nexus": 4.6, "Pylon": 2.6}
+SMALL = frozenset({"Pylon", "SupplyDepot", "SupplyDepotLowered", "SpineCrawler"})
+"""Structures of two by two cells."""
+ROOM = {**dict.fromkeys(TOWN_HALLS, 4.6), **dict.fromkeys(SMALL, 2.6)}
 """Distance of two middles of structures of three cells, with a cell between them to walk on."""
 PLAIN_ROOM = 3.6
 FROM_MINERALS = 3.5
@@ -85,8 +87,8 @@ def _hint(plan: ReplyPlan, what: str) -> Point | None:
 
 
 def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
-    """Return a free place: by a Pylon if it needs power, near the base for Pylons; whole cells for odd sizes."""
-    half = 0.0 if what == "Pylon" else 0.5
+    """Return a free place: by a Pylon if it needs power, else near the base; on whole cells or between."""
+    half = 0.0 if what in SMALL else 0.5
     halls = [unit for unit in team.allies if unit.type in TOWN_HALLS]
     x0, x1, y0, y1 = (int(edge) for edge in team.bounds)
     cells = [(x + half, y + half) for x, y in product(range(x0 + 2, x1 - 2), range(y0 + 2, y1 - 2))]
@@ -94,7 +96,7 @@ def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
 
     def fits(at: Point) -> bool:
         if any(
-            distance(at, unit) < ROOM.get(unit.type, PLAIN_ROOM) + (0.5 if what == "Pylon" else 0.9)
+            distance(at, unit) < ROOM.get(unit.type, PLAIN_ROOM) + (0.5 if what in SMALL else 0.9)
             for unit in structures
         ):
             return False

@@ -23,7 +23,6 @@ FAR = 6.0
 class MarchingOrder(NamedTuple):
     """What a message orders."""
 
-    sender: str
     goal: Point
     fights: bool
     """Whether to fight on the way."""
@@ -61,11 +60,11 @@ def travel(plan: ReplyPlan) -> bool:
 
 def told_order(situation: Situation) -> MarchingOrder | None:
     """Return the last order by a message that names a place; None if there is none."""
-    told = [(sender, text, named[-1]) for sender, text in situation.messages if (named := points(text))]
+    told = [(text, named[-1]) for _, text in situation.messages if (named := points(text))]
     if not told:
         return None
-    sender, text, goal = told[-1]
-    return MarchingOrder(sender, goal, fights=not _PEACEFUL.search(text))
+    text, goal = told[-1]
+    return MarchingOrder(goal, fights=not _PEACEFUL.search(text))
 
 
 def task_goal(team: TextTeam, situation: Situation) -> Point | None:
