@@ -47,6 +47,7 @@ _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTI
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
+_PLAYABLE = re.compile(rf"minimap x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
@@ -201,6 +202,8 @@ class Situation:
     """The teams of other agents."""
     places: list[Place] = field(default_factory=list)
     """Places of the map, in the order of the text."""
+    playable: tuple[float, float, float, float] = (8.0, 8.0, 56.0, 56.0)
+    """Where on the minimap units can be: x and y of two corners."""
     alarms: list[Point] = field(default_factory=list)
     """Where on the minimap own units or structures are under attack."""
     rejected: list[str] = field(default_factory=list)
@@ -355,6 +358,9 @@ def _read_others(situation: Situation, body: str) -> None:
 
 def _read_map(situation: Situation, body: str) -> None:
     situation.places = [Place(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
+    if found := _PLAYABLE.search(body):
+        x0, x1, y0, y1 = (float(number) for number in found.groups())
+        situation.playable = (x0, y0, x1, y1)
 
 
 def _read_warping(situation: Situation, body: str) -> None:

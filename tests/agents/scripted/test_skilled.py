@@ -284,6 +284,14 @@ def test_an_army_that_knows_of_a_stronger_one_waits() -> None:
     assert message.text.startswith("Gather")
 
 
+def test_the_last_structures_are_looked_for_all_over_the_map() -> None:
+    seen = leader("45 Marine", at="[46, 46]").replace("the enemy may have begun here, never seen", "in sight")
+    (message,) = parse(skilled(seen, random.Random(1))).messages
+    later = parse(skilled(seen.replace("6:00", "7:30"), random.Random(1))).messages[0]
+    assert message.text.startswith("Attack")
+    assert message.text not in {"Attack [48.0, 46.0].", later.text}
+
+
 MARCH = (*BASIC, "Attack_Minimap(minimap)")
 MARINES = [line(n, "Marine", 12, 9 + n, health="45/45") for n in range(1, 7)]
 ATTACK = "Messages\n    Message from Commander: '''Attack [48.0, 46.0].'''\n\n"
@@ -295,6 +303,13 @@ def test_a_group_carries_out_what_the_message_says() -> None:
     home = ATTACK.replace("Attack [48.0, 46.0].", "Gather at [20.0, 20.0] and defend it.")
     assert calls(page(*MARINES, actions=MARCH, more=home)) == ["Move_Minimap (20.0, 20.0)"]
     assert calls(page(*MARINES, actions=MARCH, more=home, enemies=[ZEALOT])) == ["Attack_Minimap (20.0, 20.0)"]
+
+
+def test_a_unit_that_is_left_behind_hears_of_the_order_later() -> None:
+    there = "[48.0, 46.0]"
+    assert calls(page(*MARINES, actions=MARCH, more=ATTACK, minimap=there)) == []
+    stray = line(9, "Marine", 60, 40, health="45/45")
+    assert calls(page(*MARINES, stray, actions=MARCH, more=ATTACK, minimap=there)) == ["Attack_Minimap (48.0, 46.0)"]
 
 
 def test_a_large_group_that_fights_already_is_not_disturbed() -> None:

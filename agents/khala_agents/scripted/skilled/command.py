@@ -7,6 +7,7 @@ marching orders, each with a place, to the groups that have units (`khala_agents
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from khala_agents.scripted.skilled.kinds import KINDS, fights, strength
@@ -32,8 +33,8 @@ ORDERS_EVERY_S = 6
 """How often marching orders are written: new units hear of them, and groups that have arrived get the next place."""
 IN_FRONT = 4.0
 """Cells of the minimap from the foremost base to where the army gathers."""
-HUNT_S = 60
-"""How long the army looks for the last structures at one base."""
+HUNT_S = 30
+"""How long a group looks for the last structures at one place."""
 LIKELY = ("the enemy's", "the enemy began", "may have begun", "never seen")
 """Words in the line of a base where enemies are, the surest first."""
 MAP_MIDDLE = (32.0, 32.0)
@@ -65,15 +66,17 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
         return []
     army = _middle(group.at for group in groups)
     target, home = _target(situation, army), _gathering(situation, army)
-    out = math.dist(army, target) < math.dist(army, home)
-    if attacks(situation, out=out):
-        text = f"Attack {point(target)}."
-    elif situation.alarms and not out:
-        text = f"Defend {point(min(situation.alarms, key=lambda at: math.dist(at, home)))}."
-    else:
+    out = math.dist(army, target or MAP_MIDDLE) < math.dist(army, home)
+    names = list(dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents))
+    if not attacks(situation, out=out):
         text = f"Gather at {point(home)} and defend it."
-    names = dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents)
-    return [(name, text) for name in list(names)[:MOST_MESSAGES]]
+        if situation.alarms and not out:
+            text = f"Defend {point(min(situation.alarms, key=lambda at: math.dist(at, home)))}."
+        return [(name, text) for name in names[:MOST_MESSAGES]]
+    hidden = _unwatched(situation) or [MAP_MIDDLE]
+    first = int(situation.time_s / HUNT_S)
+    goals = [target or hidden[(first + number) % len(hidden)] for number in range(len(names))]
+    return [(name, f"Attack {point(goal)}.") for name, goal in zip(names[:MOST_MESSAGES], goals, strict=False)]
 
 
 def marches(kind: str) -> bool:
@@ -81,8 +84,8 @@ def marches(kind: str) -> bool:
     return fights(kind) or kind in {"Medivac", "Raven", "Observer", "Overseer"}
 
 
-def _target(situation: Situation, army: Point) -> Point:
-    """Return where enemies are known to live, or else where they may, the nearest such place; then every base in turn.
+def _target(situation: Situation, army: Point) -> Point | None:
+    """Return where enemies are known to live, or else where they may: the nearest such place; None if all were seen.
 
     Without a map it is the place opposite of the army: maps are the same from both ends.
     """
@@ -90,10 +93,14 @@ def _target(situation: Situation, army: Point) -> Point:
     for places in (known, *(_bases(situation, words) for words in LIKELY)):
         if places:
             return min(places, key=lambda at: math.dist(at, army))
-    others = _bases(situation, "no town hall")
-    if others:
-        return others[int(situation.time_s / HUNT_S) % len(others)]
-    return 2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1]
+    return None if situation.places else (2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1])
+
+
+def _unwatched(situation: Situation) -> list[Point]:
+    """Return where the last structures may be hidden: places out of sight, and points all over the map."""
+    named = [place.at for place in situation.places if not re.search("yours|in sight", place.about)]
+    x0, y0, x1, y1 = situation.playable
+    return named + [(x0 + (x1 - x0) * i / 8, y0 + (y1 - y0) * j / 8) for i in (1, 4, 7) for j in (1, 4, 7)]
 
 
 def _gathering(situation: Situation, army: Point) -> Point:
@@ -101,15 +108,16 @@ def _gathering(situation: Situation, army: Point) -> Point:
     own = _bases(situation, "yours")
     if not own:
         return army
-    enemy = _target(situation, MAP_MIDDLE)
+    enemy = _target(situation, MAP_MIDDLE) or MAP_MIDDLE
     base = min(own, key=lambda at: math.dist(at, enemy))
     way = max(math.dist(base, enemy), IN_FRONT)
     return tuple(a + (b - a) * IN_FRONT / way for a, b in zip(base, enemy, strict=True))  # type: ignore[return-value]
 
 
 def _bases(situation: Situation, words: str) -> list[Point]:
-    """Return the bases whose lines contain some words, in the order of the text."""
-    return [place.at for place in situation.places if place.name.startswith("Base ") and words in place.about]
+    """Return the bases whose lines contain some words; of those that are in sight only the players' own."""
+    bases = [place for place in situation.places if place.name.startswith("Base ") and words in place.about]
+    return [base.at for base in bases if "no town hall known" not in base.about or "in sight" not in base.about]
 
 
 def _middle(places: Iterable[Point]) -> Point:

@@ -18,6 +18,8 @@ _PEACEFUL = re.compile(r"\b(gather|retreat|come home|wait)\b", re.IGNORECASE)
 ARRIVED = 2.0
 """Cells of the minimap."""
 FAR = 6.0
+STRAY = 14.0
+"""World units from the first unit of a team."""
 
 
 class MarchingOrder(NamedTuple):
@@ -45,7 +47,9 @@ def travel(plan: ReplyPlan) -> bool:
     """Plan the way of a team; return whether it has one to go."""
     team, told = plan.team, None if plan.prey else told_order(plan.situation)
     goal = told.goal if told else task_goal(team, plan.situation)
-    if goal is None or team.minimap is None or math.dist(goal, team.minimap) <= ARRIVED:
+    if goal is None or team.minimap is None:
+        return False
+    if math.dist(goal, team.minimap) <= ARRIVED and not (told and _strays(team)):
         return False
     if told is None and all(unit.order for unit in team.own) and not team.allies:
         return True  # already on its way
@@ -56,6 +60,12 @@ def travel(plan: ReplyPlan) -> bool:
         return True
     fights = told is not None and (told.fights or bool(team.enemies))
     return (fights and plan.give("Attack_Minimap", goal)) or plan.give("Move_Minimap", goal)
+
+
+def _strays(team: TextTeam) -> bool:
+    """Return whether a unit without an order is far from the first one: it is new, and has not heard of the order."""
+    head = team.own[0]
+    return any(not unit.order and math.dist((unit.x, unit.y), (head.x, head.y)) > STRAY for unit in team.own)
 
 
 def told_order(situation: Situation) -> MarchingOrder | None:
