@@ -107,9 +107,12 @@ def _place(team: TextTeam, what: str, fields: Sequence[Point]) -> Point | None:
     if fields and what != "Pylon":
         near = [cell for cell in cells if any(distance(cell, field) <= FIELD for field in fields)]
         return min((cell for cell in near if fits(cell)), key=lambda cell: _nearest(cell, fields), default=None)
-    around = [cell for cell in cells if halls and 6.0 <= min(distance(cell, hall) for hall in halls) <= 10.0]
-    apart = [cell for cell in around if all(distance(cell, field) > FIELD for field in fields)] or around
-    return min((cell for cell in apart if fits(cell)), key=lambda cell: (_nearest(cell, halls), cell), default=None)
+    near = [cell for cell in cells if halls and 6.0 <= min(distance(cell, hall) for hall in halls) <= 10.0]
+    apart = [cell for cell in near if all(distance(cell, field) > FIELD for field in fields)]
+    for choice in (apart, near, cells):  # a base that is full is built around
+        if free := [cell for cell in choice if fits(cell)]:
+            return min(free, key=lambda cell: (_nearest(cell, halls), cell))
+    return None
 
 
 def _between(at: Point, halls: Sequence[TextUnit], resources: Sequence[Point]) -> bool:
