@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import random
 from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_agents.scripted.reading import read
+from khala_agents.scripted.reading import points, read
 from khala_agents.scripted.skilled import skilled
 from khala_agents.scripted.skilled.builds import BUILDS
 from khala_agents.scripted.skilled.kinds import KINDS
@@ -342,6 +343,19 @@ def test_a_queen_with_energy_injects_the_nearest_hatchery() -> None:
     ready, tired = (line(1, "Queen", 12, 12, f"energy {energy}/200") for energy in (25, 24))
     assert calls(page(ready, allies=halls, actions=actions)) == ["Effect_InjectLarva_Unit 0x30"]
     assert calls(page(tired, allies=halls, actions=actions)) == []
+
+
+def test_a_builder_builds_in_its_base_and_around_it_when_that_is_full() -> None:
+    hall, worker, build = (
+        line(0x30, "CommandCenter", 2, 2),
+        line(1, "SCV", 12, 12),
+        ("Build_SupplyDepot_Screen(screen)",),
+    )
+    (call,) = calls(page(worker, allies=[hall], actions=build))
+    assert 6.0 <= math.dist((2, 2), points(call.replace("(", "[").replace(")", "]"))[0]) <= 10.0
+    full = [line(0x40 + 9 * i + j, "Barracks", 4 * i, 4 * j) for i in range(4) for j in range(4)]
+    (call,) = calls(page(worker, allies=[hall, *full], actions=build))
+    assert math.dist((2, 2), points(call.replace("(", "[").replace(")", "]"))[0]) > 10.0
 
 
 def test_a_structure_trains_one_unit_at_a_time() -> None:
