@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 CROWD_PERIOD = 2
-"""How often the density of the crowd at a goal is checked; for those who look for targets, whenever they have looked."""
+"""How often the density of the crowd at a goal is checked; of those who look for targets, whenever they have looked."""
 
 
 def carry_out(world: World) -> None:
