@@ -15,7 +15,7 @@ from khala_agents.scripted.writing import call, inside, point, reply
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
 PlayerName = Literal["silent", "random-legal", "focus-fire", "skilled"]
 
@@ -45,6 +45,14 @@ def random_legal(observation: str, rng: random.Random) -> str:
             action = rng.choice(possible)
             orders[team.name] = [call(action.name, *_random_values(action, team, rng))]
     return reply("Something will come of it.", orders, _hello(situation, rng))
+
+
+def random_calls(situation: Situation, rng: random.Random) -> Iterator[str]:
+    """Yield a reply for each valid action of each team, with arguments drawn from what the text calls valid."""
+    for team in situation.teams.values():
+        for action in team.actions:
+            if all(_pools(action, team)):
+                yield reply("This one.", {team.name: [call(action.name, *_random_values(action, team, rng))]}, [])
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
