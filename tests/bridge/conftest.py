@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from s2clientprotocol import raw_pb2
+from s2clientprotocol import common_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.knowledge import knowledge
@@ -87,6 +87,25 @@ def make_snapshot(
     if change is not None:
         change(response, info)
     return read_snapshot(response, read_info(info), **fields)
+
+
+def make_plain(response: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
+    """Make the whole map one walkable and buildable plain."""
+    del response
+    ground, size = info.start_raw, common_pb2.Size2DI(x=info.start_raw.map_size.x, y=info.start_raw.map_size.y)
+    for grid, bits, value in (
+        (ground.placement_grid, 1, b"\xff"),
+        (ground.pathing_grid, 1, b"\xff"),
+        (ground.terrain_height, 8, b"\x80"),
+    ):
+        data = value * (size.x * size.y * bits // 8)
+        grid.CopyFrom(common_pb2.ImageData(bits_per_pixel=bits, size=size, data=data))
+
+
+@pytest.fixture(scope="session")
+def plain() -> Change:
+    """Return a change of a snapshot that makes the whole map one walkable and buildable plain."""
+    return make_plain
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ import math
 import operator
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.filters import needs_sight, unfit
 from khala_bridge.act.rejected import CallRejected
+from khala_bridge.auto.aims import aim_of, needs_sight, unfit
 from khala_bridge.frames import CAMERA_WIDTH, Camera, MinimapPoint, ScreenPoint, WorldPoint
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
@@ -94,7 +94,7 @@ class Targets:
         own = tag in said.team.team.tags
         if not (anywhere or own or _shows(said.team.camera, unit) or said.team.seen(tag)):
             raise self._out_of_sight(said, unit)
-        if said.action.aim == "unit" and (reason := unfit(said.action, unit)):
+        if said.action.aim == "unit" and (reason := unfit(said.action, aim_of(unit))):
             what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
             raise CallRejected("invalid_target", f"{what}; {said.action.name} needs {reason}.")
         return unit
@@ -133,9 +133,7 @@ class Targets:
         return Camera(*self._units[team.head].pos, then.size)
 
     def _is_seen(self, point: WorldPoint) -> bool:
-        """Return True if the player sees a place now, or if the game sent no map."""
-        if not self._observation.snapshot.visibility.data:
-            return True
+        """Return True if the player sees a place now."""
         cells = land_of(self._observation.snapshot).sight  # (w, h)
         x, y = min(int(point.x), cells.shape[0] - 1), min(int(point.y), cells.shape[1] - 1)
         return bool(cells[x, y] == SEEN_NOW)

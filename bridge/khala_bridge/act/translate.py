@@ -16,16 +16,14 @@ the same reply, since here all commands of a turn reach the game in one loop.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.rejected import CallRejected, reject
 from khala_bridge.act.targets import Targets
 from khala_bridge.auto import RULES, NotAvailable, RuleOrder, RuleRequest
+from khala_bridge.auto.aims import aim_of, reaches
 from khala_bridge.frames import WorldPoint
-from khala_bridge.knowledge import knowledge
-from khala_bridge.names import buff_name
 from khala_bridge.rules import Cost, facts_for, is_attack, is_free, nearest, of_team, price_of, use_of, why_not
 from khala_bridge.state.means import ledger_of, side_of
 
@@ -36,7 +34,6 @@ if TYPE_CHECKING:
     from khala_bridge.catalogue.functions import Function
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.observe.observation import SideObservation
-    from khala_bridge.state import Unit
     from khala_protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
@@ -218,8 +215,9 @@ class Translator:
             return RuleOrder(function, able, WorldPoint(unit.pos.x, unit.pos.y))
         aiming = tuple(tag for tag in able if tag != unit.tag)
         if is_attack(function):
-            aiming = tuple(tag for tag in aiming if self._hits(self._snapshot.units[tag], unit))
-            where = "in the air" if _is_aloft(unit) else "on the ground"
+            aim = aim_of(unit)
+            aiming = tuple(tag for tag in aiming if reaches(self._snapshot.units[tag].name, aim))
+            where = "in the air" if aim.aloft else "on the ground"
             what = f"{hex(unit.tag)} is a {unit.name} {where}"
             if not aiming:
                 raise CallRejected(
@@ -230,22 +228,3 @@ class Translator:
                 "invalid_target", f"{hex(unit.tag)} is the unit itself; {said.action.name} needs another one."
             )
         return RuleOrder(function, aiming, unit.tag)
-
-    @staticmethod
-    def _hits(unit: Unit, target: Unit) -> bool:
-        """Return True if a unit has a weapon against another one, or if its weapons are unknown."""
-        return _reaches(unit.name, target.name, _is_aloft(target))
-
-
-def _is_aloft(unit: Unit) -> bool:
-    """Return True if a unit is hit in the air: it flies, or a Phoenix holds it up with its beam."""
-    return unit.is_flying or any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)
-
-
-@functools.cache
-def _reaches(unit_type: str, target_type: str, is_flying: bool) -> bool:  # a key of the cache
-    mine, other = knowledge().get(unit_type), knowledge().get(target_type)
-    if mine is None or other is None or not mine.weapons:
-        return True
-    planes = {*other.planes, "air"} - {"ground"} if is_flying else {*other.planes, "ground"}
-    return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)

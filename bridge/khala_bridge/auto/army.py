@@ -43,7 +43,7 @@ def army_attack(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: there is no army that is free.
     """
-    units = _army(ask)
+    units = free_army(ask)
     middle = _middle(units)
     close = [u for u in enemies_in_reach(ask.snapshot, units) if _is_close(u, units, middle)]
     known = [unit for unit in close if is_armed(unit)] or close or enemy_structures(ask.snapshot)
@@ -60,14 +60,10 @@ def army_defend(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: there is no army that is free.
     """
-    units = _army(ask, home=True)
-    homes = [place(unit) for unit in own_structures(ask.snapshot)]
-    enemies = [unit for unit in enemies_in_reach(ask.snapshot, units) if not is_structure(unit) or is_armed(unit)]
-    intruders = [u for u in enemies if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
-    if intruders:
+    units = home_army(ask)
+    if intruders := _intruders(ask, units):
         halls = [place(hall) for hall in land_of(ask.snapshot).own_halls]
-        return _send(ask, units, _nearest(intruders, halls or homes), fight=True)
-    units = _army(ask)
+        return _send(ask, units, _nearest(intruders, halls or _homes(ask)), fight=True)
     return _send(ask, units, _rally(ask, _middle(units)), fight=True)
 
 
@@ -77,21 +73,56 @@ def army_retreat(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: there is no army that is free, or nothing to retreat to.
     """
-    units = _army(ask)
-    if not own_structures(ask.snapshot):
-        raise not_available(ask, "you have no base to retreat to; name a place with a Move action.")
+    units = army_with_base(ask)
     return _send(ask, units, _rally(ask, _middle(units)), fight=False)
 
 
-def _army(ask: RuleRequest, *, home: bool = False) -> list[Unit]:
-    """Return the army without the units that an agent has ordered in this turn."""
+def army_with_base(ask: RuleRequest) -> list[Unit]:
+    """Return the free army of a side that has something to retreat to.
+
+    Raises:
+        NotAvailable: it has none, or no army.
+    """
+    units = free_army(ask)
+    if not own_structures(ask.snapshot):
+        raise not_available(ask, "you have no base to retreat to; name a place with a Move action.", "no base")
+    return units
+
+
+def home_army(ask: RuleRequest) -> list[Unit]:
+    """Return the free army and the Queens, which leave their work only for intruders.
+
+    Raises:
+        NotAvailable: there is neither, or only Queens and no intruder.
+    """
+    units = free_army(ask, home=True)
+    return units if _intruders(ask, units) else free_army(ask)
+
+
+def free_army(ask: RuleRequest, *, home: bool = False) -> list[Unit]:
+    """Return the army without the units that an agent has ordered in this turn.
+
+    Raises:
+        NotAvailable: there is none.
+    """
     found = army(ask.snapshot, home=home)
     if not found:
-        raise not_available(ask, "you have no army; train units first.")
+        raise not_available(ask, "you have no army; train units first.", "no army")
     free = [unit for unit in found if unit.tag not in ask.ledger.busy]
     if not free:
         raise not_available(ask, "every unit of the army has an order already in this turn.")
     return free
+
+
+def _homes(ask: RuleRequest) -> list[WorldPoint]:
+    return [place(unit) for unit in own_structures(ask.snapshot)]
+
+
+def _intruders(ask: RuleRequest, units: list[Unit]) -> list[Unit]:
+    """Return the enemies near own structures that some units can fight."""
+    homes = _homes(ask)
+    enemies = [unit for unit in enemies_in_reach(ask.snapshot, units) if not is_structure(unit) or is_armed(unit)]
+    return [u for u in enemies if any(math.dist(place(u), home) <= INTRUDES for home in homes)]
 
 
 def _middle(units: list[Unit]) -> WorldPoint:
@@ -117,8 +148,7 @@ def _rally(ask: RuleRequest, middle: WorldPoint) -> WorldPoint:
     fronts = [front(land, place(hall)) for hall in land.own_halls]
     enemies = land.ground.starts
     if not fronts:
-        homes = [place(unit) for unit in own_structures(ask.snapshot)]
-        return min(homes, key=lambda home: (math.dist(home, middle), home), default=middle)
+        return min(_homes(ask), key=lambda home: (math.dist(home, middle), home), default=middle)
     if not enemies:
         return min(fronts, key=lambda point: (math.dist(point, middle), point))
     ways = np.min([land.ground.ways_from(start) for start in enemies], axis=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_bridge.auto.builders import GAS_STRUCTURES, builder
-from khala_bridge.auto.places import for_structure, free_base, free_geyser
+from khala_bridge.auto.places import for_structure, free_base, free_geyser, has_room
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised
 from khala_bridge.catalogue.functions import functions
@@ -39,7 +39,7 @@ def build_at(ask: RuleRequest) -> list[RuleOrder]:
     assert ask.point is not None, f"{ask.action.name} is said with a point"
     ask.able()
     if _is_gas(ask):
-        near_by = [u for u in _free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
+        near_by = [u for u in free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
         if not near_by:
             raise NotAvailable("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
         return _on_geyser(ask, near_by[0])
@@ -57,7 +57,7 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
     ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
-        free = _free_geysers(ask)
+        free = free_geysers(ask)
         found = min(free, key=lambda u: (math.dist(place(u), place(unit)), u.tag), default=None)
         if found is None or math.dist(place(found), place(unit)) > NEAR:
             raise NotAvailable("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
@@ -93,15 +93,35 @@ def build_auto(ask: RuleRequest) -> list[RuleOrder]:
     ask.able()
     land, structure = land_of(ask.snapshot), _structure(ask)
     if _is_gas(ask):
-        orders = _on_geyser(ask, free_geyser(ask, _free_geysers(ask)))
+        orders = _on_geyser(ask, free_geyser(ask, free_geysers(ask)))
     elif sites()[structure].clear:
         orders = _at(ask, free_base(ask, land, structure))
     else:
         cell = for_structure(land, ask.ledger, structure)
         if cell is None:
-            raise not_available(ask, f"there is no room for it at your bases{_lack(structure)}.")
+            raise _no_room(ask)
         orders = _at(ask, footprint_need(structure).middle(cell))
     return [*orders, *_back_to_work(ask, orders[-1])]
+
+
+def any_place(ask: RuleRequest) -> None:
+    """Raise the error of `build_auto` if there is no place at the beginning of a turn.
+
+    Raises:
+        NotAvailable: there is no place.
+    """
+    land, structure = land_of(ask.snapshot), _structure(ask)
+    if _is_gas(ask):
+        free_geyser(ask, free_geysers(ask))
+    elif sites()[structure].clear:
+        free_base(ask, land, structure)
+    elif not has_room(land, structure):
+        raise _no_room(ask)
+
+
+def _no_room(ask: RuleRequest) -> NotAvailable:
+    lack = _lack(_structure(ask))
+    return not_available(ask, f"there is no room for it at your bases{lack}.", f"no room{lack.partition(';')[0]}")
 
 
 # the order ------------------------------------------------------------------------------------------------------------
@@ -229,7 +249,7 @@ def _base_of(ask: RuleRequest, unit: Unit) -> Base:
     return found
 
 
-def _free_geysers(ask: RuleRequest) -> list[Unit]:
+def free_geysers(ask: RuleRequest) -> list[Unit]:
     """Return the geysers without a gas structure or a planned one, by ascending tags."""
     land = land_of(ask.snapshot)
     standing = land.standing("geyser")

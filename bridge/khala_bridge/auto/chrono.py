@@ -29,8 +29,7 @@ def chrono_economy(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: no structure does, or no Nexus can.
     """
-    why = "no Nexus trains Probes that is not boosted yet; train Probes first."
-    return _boost(ask, [unit for unit, facts in _at_work(ask) if _is_worker(facts)], why)
+    return _boost(ask, training_workers(ask))
 
 
 def chrono_military(ask: RuleRequest) -> list[RuleOrder]:
@@ -39,9 +38,7 @@ def chrono_military(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: no structure does, or no Nexus can.
     """
-    why = "no structure trains an army unit that is not boosted yet; train one first."
-    training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
-    return _boost(ask, [*training, *_recharging(ask)], why)
+    return _boost(ask, training_army(ask))
 
 
 def chrono_research(ask: RuleRequest) -> list[RuleOrder]:
@@ -50,8 +47,44 @@ def chrono_research(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: no structure does, or no Nexus can.
     """
-    why = "no structure researches anything that is not boosted yet; research something first."
-    return _boost(ask, [unit for unit, facts in _at_work(ask) if facts.researches is not None], why)
+    return _boost(ask, researching(ask))
+
+
+def training_workers(ask: RuleRequest) -> list[Unit]:
+    """Return the structures that train workers and are not boosted yet, at least one.
+
+    Raises:
+        NotAvailable: there is none.
+    """
+    found = [unit for unit, facts in _at_work(ask) if _is_worker(facts)]
+    return _unboosted(ask, found, "no Nexus trains Probes that is not boosted yet; train Probes first.")
+
+
+def training_army(ask: RuleRequest) -> list[Unit]:
+    """Return the structures that train something else, then the WarpGates that recharge, at least one.
+
+    Raises:
+        NotAvailable: there is none that is not boosted yet.
+    """
+    training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
+    why = "no structure trains an army unit that is not boosted yet; train one first."
+    return _unboosted(ask, [*training, *_recharging(ask)], why)
+
+
+def researching(ask: RuleRequest) -> list[Unit]:
+    """Return the structures that research and are not boosted yet, at least one.
+
+    Raises:
+        NotAvailable: there is none.
+    """
+    found = [unit for unit, facts in _at_work(ask) if facts.researches is not None]
+    return _unboosted(ask, found, "no structure researches anything that is not boosted yet; research something first.")
+
+
+def working(ask: RuleRequest) -> list[Unit]:
+    """Return every structure that works or recharges and is not boosted yet; it may be none."""
+    found = [unit for unit, facts in _at_work(ask) if facts.does == "train" or facts.researches is not None]
+    return [unit for unit in (*found, *_recharging(ask)) if BOOSTED not in unit.buff_ids]
 
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
@@ -77,12 +110,17 @@ def _recharging(ask: RuleRequest) -> list[Unit]:
     return [gate for gate in gates if not ask.can(gate.tag, zealot.id)]
 
 
-def _boost(ask: RuleRequest, targets: Sequence[Unit], nothing: str) -> list[RuleOrder]:
-    """Boost the first of some structures that is not boosted yet."""
+def _unboosted(ask: RuleRequest, units: Sequence[Unit], nothing: str) -> list[Unit]:
+    """Return those of some structures that are not boosted, nor going to be by an earlier call of this turn."""
     aimed = ask.ledger.aimed
-    left = [u for u in targets if BOOSTED not in u.buff_ids and (ask.function.name, u.tag) not in aimed]
+    left = [u for u in units if BOOSTED not in u.buff_ids and (ask.function.name, u.tag) not in aimed]
     if not left:
-        raise not_available(ask, nothing)
-    unit = caster(ask, place(left[0]))
-    aimed.add((ask.function.name, left[0].tag))
-    return [RuleOrder(ask.function, (unit.tag,), left[0].tag)]
+        raise not_available(ask, nothing, "nothing to boost")
+    return left
+
+
+def _boost(ask: RuleRequest, targets: Sequence[Unit]) -> list[RuleOrder]:
+    """Boost the first of some structures."""
+    unit = caster(ask, place(targets[0]))
+    ask.ledger.aimed.add((ask.function.name, targets[0].tag))
+    return [RuleOrder(ask.function, (unit.tag,), targets[0].tag)]

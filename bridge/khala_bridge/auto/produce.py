@@ -27,7 +27,7 @@ def train(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: there is no producer, or none can do it now.
     """
-    best = min(_producers(ask), key=lambda unit: _rank(ask, unit))
+    best = min(producers(ask), key=lambda unit: _rank(ask, unit))
     facts = ask.facts(best.type)
     ask.charge(facts)
     _note(ask, best, facts)
@@ -63,8 +63,12 @@ def morph_warpgates(ask: RuleRequest) -> list[RuleOrder]:
 # the producer ---------------------------------------------------------------------------------------------------------
 
 
-def _producers(ask: RuleRequest) -> list[UnitState]:
-    """Return the producers that can do it now; for an add-on those with room, as the game may refuse for that alone."""
+def producers(ask: RuleRequest) -> list[UnitState]:
+    """Return the producers that can do it now; for an add-on those with room, as the game may refuse for that alone.
+
+    Raises:
+        NotAvailable: there is none.
+    """
     facts = abilities().get(ask.function.ability_id)
     if facts is None or facts.does != "build_addon":
         return ask.able()
@@ -83,7 +87,8 @@ def _producers(ask: RuleRequest) -> list[UnitState]:
 
 
 def _no_room(ask: RuleRequest, who: str) -> NotAvailable:
-    return not_available(ask, f"something stands where the add-on of your {who} would be; lift it off and land it.")
+    why = f"something stands where the add-on of your {who} would be; lift it off and land it."
+    return not_available(ask, why, f"no room beside {who}")
 
 
 def _has_room(ask: RuleRequest, land: Land, unit: UnitState) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from khala_bridge.knowledge import abilities
-from khala_bridge.rules import asked_by, facts_for, nearest, nobody, of_side, price_of, why_not
+from khala_bridge.rules import asked_by, brief, facts_for, nearest, nobody, of_side, price_of, why_not
 from khala_bridge.state.means import side_of
 
 if TYPE_CHECKING:
@@ -105,9 +105,16 @@ class NotAvailable(Exception):
     """The rule finds no order; the message is a sentence for the model."""
 
     def __init__(
-        self, reason: RejectionReason, message: str, place: WorldPoint | None = None, why: Unavailable | None = None
+        self,
+        reason: RejectionReason,
+        message: str,
+        place: WorldPoint | None = None,
+        why: Unavailable | None = None,
+        lack: str = "",
     ) -> None:
         self.reason, self.message = reason, message
+        self.lack = lack or (brief(why) if why else "")
+        """The reason in the shortest form, for the list of what is not possible; "" if it depends on the arguments."""
         self.why = why
         """The judgement of `khala_bridge.rules`; None if the rule found no place or target."""
         self.place = place
@@ -118,7 +125,17 @@ class NotAvailable(Exception):
 Rule: TypeAlias = Callable[[RuleRequest], list[RuleOrder]]
 
 
-def not_available(ask: RuleRequest, why: str | Unavailable) -> NotAvailable:
-    """Return the error to raise if something stands in the way: `Build_Pylon is not possible now: <why>`."""
+Check: TypeAlias = Callable[[RuleRequest], object]
+"""The part of a rule that may find nothing, whatever the arguments: it raises `NotAvailable`, or returns."""
+
+
+def not_available(ask: RuleRequest, why: str | Unavailable, lack: str = "") -> NotAvailable:
+    """Return the error to raise if something stands in the way: `Build_Pylon is not possible now: <why>`.
+
+    Args:
+        ask: the question.
+        why: a sentence for a refusal, or the judgement.
+        lack: the same in the shortest form; the one of a judgement is known.
+    """
     said, judged = (why, None) if isinstance(why, str) else (of_side(why), why)
-    return NotAvailable("not_available", f"{ask.action.name} is not possible now: {said}", why=judged)
+    return NotAvailable("not_available", f"{ask.action.name} is not possible now: {said}", why=judged, lack=lack)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 
 from khala_bridge.frames import WorldPoint
+from khala_bridge.rules import Ledger
 from khala_bridge.state.ground import footprint_of, sites
 from khala_bridge.state.ground.footprints import ADDON
 from khala_bridge.state.ground.land import SEEN_NOW
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from khala_bridge.rules import Ledger
     from khala_bridge.state.ground import Footprint, Land
     from khala_bridge.state.ground.footprints import Cells
     from khala_bridge.state.ground.terrain import Bools, Floats
@@ -33,6 +33,10 @@ PYLON_REACH: Final = 4
 """A structure of 3 x 3 whose middle is at most this many cells away on both axes is in the field of a Pylon (6.5)."""
 BASE_REACH: Final = 16.0
 """A place that is farther from every town hall, as the crow flies, belongs to no base."""
+
+
+NO_ORDERS: Final = Ledger(0.0, 0.0, 0.0)
+"""The accounts before the first call of a turn, as far as ground goes."""
 
 
 def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
@@ -64,6 +68,17 @@ def promised(land: Land, ledger: Ledger) -> Bools:
     for x0, y0, x1, y1 in ledger.sites:
         taken[max(int(x0), 0) : int(np.ceil(x1)), max(int(y0), 0) : int(np.ceil(y1))] = True
     return taken
+
+
+def any_good(land: Land, structure: str) -> bool:
+    """Return True if `good` marks a cell at the beginning of a turn; structures of the same needs share the answer."""
+    site, footprint = sites()[structure], footprint_need(structure)
+    key = site.ground, site.clear, site.seen, footprint.rows
+    if key not in land.answers:
+        ground = _ground(land, NO_ORDERS, structure) & ~land.kept & (land.sight > 0)
+        land.answers[key] = bool((_fitting(land, structure, ground) & _reached(land)).any())
+    found: bool = land.answers[key]
+    return found
 
 
 def good(land: Land, ledger: Ledger, structure: str) -> Bools:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_bridge.auto.cast import caster, casters, note
-from khala_bridge.auto.rule import RuleOrder, not_available
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.auto.sites import best, near, promised
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
@@ -18,7 +18,6 @@ from khala_bridge.state.side import finished, name, of_types, place
 if TYPE_CHECKING:
     from khala_bridge.auto.rule import RuleRequest
     from khala_bridge.state import Unit
-    from khala_bridge.state.ground import Land
 
 INJECTED: Final = 11
 """The game's number of the buff of an injected hatchery."""
@@ -38,6 +37,20 @@ def mule(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: no Orbital Command can, or there are no minerals at the bases.
     """
+    fields = fields_at_bases(ask)
+    aimed = ask.ledger.aimed
+    left = [field for field in fields if (ask.function.name, field.tag) not in aimed] or fields
+    field = min(left, key=lambda unit: (-unit.mineral_contents, unit.tag))
+    aimed.add((ask.function.name, field.tag))
+    return [RuleOrder(ask.function, (caster(ask, place(field)).tag,), field.tag)]
+
+
+def fields_at_bases(ask: RuleRequest) -> list[Unit]:
+    """Return the mineral fields in sight at finished bases; at least one.
+
+    Raises:
+        NotAvailable: there is none.
+    """
     land = land_of(ask.snapshot)
     halls = [place(hall) for hall in finished(land.own_halls)]
     fields = [
@@ -46,12 +59,9 @@ def mule(ask: RuleRequest) -> list[RuleOrder]:
         if field.tag in ask.snapshot.units and any(math.dist(place(field), hall) <= OWN_FIELD for hall in halls)
     ]
     if not fields:
-        raise not_available(ask, "there is no mineral field in sight at a finished base of yours.")
-    aimed = ask.ledger.aimed
-    left = [field for field in fields if (ask.function.name, field.tag) not in aimed] or fields
-    field = min(left, key=lambda unit: (-unit.mineral_contents, unit.tag))
-    aimed.add((ask.function.name, field.tag))
-    return [RuleOrder(ask.function, (caster(ask, place(field)).tag,), field.tag)]
+        why = "there is no mineral field in sight at a finished base of yours."
+        raise not_available(ask, why, "no mineral field at your bases")
+    return fields
 
 
 def inject(ask: RuleRequest) -> list[RuleOrder]:
@@ -61,10 +71,7 @@ def inject(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: no Queen can, or no hatchery needs it.
     """
     queens = casters(ask, None)
-    needy = [unit for unit in finished(of_types(ask.snapshot, HATCHERIES)) if INJECTED not in unit.buff_ids]
-    needy = [unit for unit in needy if (ask.function.name, unit.tag) not in ask.ledger.aimed]
-    if not needy:
-        raise not_available(ask, "every finished Hatchery has it already; try again in half a minute.")
+    needy = needy_hatcheries(ask)
     pairs = sorted((math.dist(place(q), place(h)), q.tag, h.tag) for q in queens for h in needy)
     orders: dict[int, RuleOrder] = {}
     injected: set[int] = set()
@@ -77,29 +84,62 @@ def inject(ask: RuleRequest) -> list[RuleOrder]:
     return list(orders.values())
 
 
+def needy_hatcheries(ask: RuleRequest) -> list[Unit]:
+    """Return the finished hatcheries that nobody has injected; at least one.
+
+    Raises:
+        NotAvailable: there is none.
+    """
+    needy = [unit for unit in finished(of_types(ask.snapshot, HATCHERIES)) if INJECTED not in unit.buff_ids]
+    needy = [unit for unit in needy if (ask.function.name, unit.tag) not in ask.ledger.aimed]
+    if not needy:
+        why = "every finished Hatchery has it already; try again in half a minute."
+        raise not_available(ask, why, "every finished Hatchery has it already")
+    return needy
+
+
 def creep_tumor(ask: RuleRequest) -> list[RuleOrder]:
     """Plant a tumor with every tumor that can, or else with one Queen, where it spreads the creep most.
 
     Raises:
         NotAvailable: no unit can, or there is no room on creep in sight.
     """
-    able = casters(ask, None)
-    tumors = [unit for unit in able if name(unit) in TUMORS]
-    land = land_of(ask.snapshot)
     orders = []
-    for unit in tumors or able[:1]:
-        spot = _edge(ask, land, unit, TUMOR_REACH if unit in tumors else QUEEN_REACH)
+    for unit, reach in _planters(ask):
+        spot = _edge(ask, unit, reach)
         if spot is not None:
             ask.ledger.promise(spot, 1, 1)
             note(ask, unit)
             orders.append(RuleOrder(ask.function, (unit.tag,), spot))
     if not orders:
-        raise not_available(ask, "there is no free creep in sight within reach.")
+        raise _no_creep(ask)
     return orders
 
 
-def _edge(ask: RuleRequest, land: Land, unit: Unit, reach: float) -> WorldPoint | None:
+def free_creep(ask: RuleRequest) -> None:
+    """Raise the error of `creep_tumor` if there is nothing to plant on.
+
+    Raises:
+        NotAvailable: no unit can, or there is no room on creep in sight.
+    """
+    if not any(_edge(ask, unit, reach) for unit, reach in _planters(ask)):
+        raise _no_creep(ask)
+
+
+def _planters(ask: RuleRequest) -> list[tuple[Unit, float]]:
+    """Return the tumors that can spread, or else one Queen, and how far each reaches."""
+    able = casters(ask, None)
+    tumors = [unit for unit in able if name(unit) in TUMORS]
+    return [(unit, TUMOR_REACH) for unit in tumors] or [(unit, QUEEN_REACH) for unit in able[:1]]
+
+
+def _no_creep(ask: RuleRequest) -> NotAvailable:
+    return not_available(ask, "there is no free creep in sight within reach.", "no free creep within reach")
+
+
+def _edge(ask: RuleRequest, unit: Unit, reach: float) -> WorldPoint | None:
     """Return the free place on creep, within reach of a unit, that is farthest from all tumors and hatcheries."""
+    land = land_of(ask.snapshot)
     free = land.free & land.creep & (land.sight >= SEEN_NOW) & ~land.kept & ~promised(land, ask.ledger)
     away = near(land, [place(unit)], reach=reach)
     sources = [place(u) for u in of_types(ask.snapshot, (*TUMORS, *HATCHERIES))]

@@ -45,11 +45,25 @@ class PowerField(NamedTuple):
 
 def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
     """Return the player's power fields, by ascending tags."""
-    ledger = ledger_of(snapshot)
-    return tuple(
-        PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
-        for source in land_of(snapshot).power_sources
-    )
+    land = land_of(snapshot)
+    if fields not in land.answers:
+        ledger = ledger_of(snapshot)
+        land.answers[fields] = tuple(
+            PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
+            for source in land.power_sources
+        )
+    found: tuple[PowerField, ...] = land.answers[fields]
+    return found
+
+
+def any_field(ask: RuleRequest) -> None:
+    """Raise the error of `warp_auto` if no field has room at the beginning of a turn.
+
+    Raises:
+        NotAvailable: no field has room.
+    """
+    if not any(field.room for field in fields(ask.snapshot)):
+        raise _no_field(ask)
 
 
 def warp_near(ask: RuleRequest) -> list[RuleOrder]:
@@ -88,7 +102,11 @@ def warp_auto(ask: RuleRequest) -> list[RuleOrder]:
         cell = _room(ask.snapshot, ask.ledger, source)
         if cell is not None:
             return _warp(ask, gate, cell)
-    raise not_available(ask, "no power field has room for it; build a Pylon first.")
+    raise _no_field(ask)
+
+
+def _no_field(ask: RuleRequest) -> NotAvailable:
+    return not_available(ask, "no power field has room for it; build a Pylon first.", "no power field with room")
 
 
 def _warp(ask: RuleRequest, gate: Unit, cell: tuple[int, int]) -> list[RuleOrder]:

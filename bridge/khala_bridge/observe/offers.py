@@ -1,8 +1,9 @@
 """The actions that a team can use now, their costs, and why the others are not possible.
 
 `khala_bridge.rules` judges each action for the units of a team, or, for a team without units, for those of the whole
-side that would carry it out; the rules of `khala_bridge.auto` later choose the unit and the place. Here the answers
-become a part of the team's view. `khala_bridge.act` decides whether to carry out a call, by the state at that time.
+side that would carry it out. The rules of `khala_bridge.auto`, which later choose the unit and the place, say whether
+there is any to choose. Here the answers become a part of the team's view. `khala_bridge.act` decides whether to carry
+out a call, by the state at that time.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
+from khala_bridge.auto import lack
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
 from khala_bridge.rules import asked_by, brief, cases, distinct, facts_for, nearest, nobody, price_of, why_no_one
@@ -40,6 +42,7 @@ class Possible:
 
     def __init__(self, snapshot: Snapshot) -> None:
         """Take the side and its accounts."""
+        self._snapshot = snapshot
         self._abilities = snapshot.abilities
         self._side = side_of(snapshot)
         self._ledger = ledger_of(snapshot)
@@ -65,7 +68,7 @@ class Possible:
                     doers[name] = unit_type
                 else:
                     reasons.append(why)
-        judged = {name: None if name in doers else _of_team(whys) for name, whys in found.items()}
+        judged = {name: None if name in doers else brief(_of_team(whys)) for name, whys in found.items()}
         return self._choice(judged, doers)
 
     def skills(self, agent: AgentConfig, body: Body) -> tuple[str, ...]:
@@ -78,17 +81,17 @@ class Possible:
 
     def for_side(self, names: Iterable[str]) -> Choice:
         """Return the choice of a side team's actions; possible are those that some unit of the side can carry out."""
-        judged: dict[str, Unavailable | None] = {}
+        judged: dict[str, str | None] = {}
         doers: dict[str, str] = {}
         for name in names:
             judged[name] = self._why_nobody(catalogue()[name])
             doers[name] = next((kind for kind in catalogue()[name].units if kind in self._side.standing), "")
         return self._choice(judged, doers)
 
-    def _choice(self, judged: Mapping[str, Unavailable | None], doers: Mapping[str, str]) -> Choice:
+    def _choice(self, judged: Mapping[str, str | None], doers: Mapping[str, str]) -> Choice:
         valid = [catalogue()[name] for name, why in judged.items() if why is None]
         offers = [self._offer(action, doers[action.name]) for action in valid]
-        barred = tuple([_barred(name, brief(why)) for name, why in judged.items() if why is not None])
+        barred = tuple([_barred(name, why) for name, why in judged.items() if why is not None])
         return Choice(tuple([a.spec for a in valid]), tuple([offer for offer in offers if offer is not None]), barred)
 
     def _offer(self, action: Action, unit_type: str) -> ActionCost | None:
@@ -113,14 +116,19 @@ class Possible:
 
     # --- why not ----------------------------------------------------------------------------------------------
 
-    def _why_nobody(self, action: Action) -> Unavailable | None:
-        """Return why no unit of the side can do an action now; None if one can."""
+    def _why_nobody(self, action: Action) -> str | None:
+        """Return why no unit of the side can do an action now, or what its rule would not find; None if one can."""
         use = asked_by(action, of_side=True)
         if use is None:
             return None
-        if action.units:
-            units = self._of_types(action.units)
-            return why_no_one(use, units, self._side, self._ledger) if units else nobody(action.units)
+        if why := self._why_no_one(use, action.units):
+            return brief(why)
+        return lack(action, self._snapshot, self._ledger)
+
+    def _why_no_one(self, use: Use, types: tuple[str, ...]) -> Unavailable | None:
+        if types:
+            units = self._of_types(types)
+            return why_no_one(use, units, self._side, self._ledger) if units else nobody(types)
         able = self._side.able
         return None if able is None or use.ability in able else nobody(())
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from s2clientprotocol import common_pb2
 
 from khala_bridge.catalogue.functions import functions, general
 from khala_bridge.observe import Feedback, Observer
@@ -175,7 +174,7 @@ def _resources(unit: Make) -> Iterable[raw_pb2.Unit]:
 
 
 @pytest.fixture
-def look(snapshot: Snap) -> Callable[..., Snapshot]:
+def look(snapshot: Snap, plain: Any) -> Callable[..., Snapshot]:
     """Return a snapshot of units on plain ground, with power and abilities."""
 
     def make(
@@ -185,13 +184,7 @@ def look(snapshot: Snap) -> Callable[..., Snapshot]:
         given: dict[str, Any] = {"abilities": ABILITIES, "player": player, **fields}
 
         def change(response: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
-            ground = info.start_raw
-            for grid, bits, value in (
-                (ground.placement_grid, 1, b"\xff"),
-                (ground.pathing_grid, 1, b"\xff"),
-                (ground.terrain_height, 8, b"\x80"),
-            ):
-                grid.CopyFrom(_plain(bits, value))
+            plain(response, info)
             for unit in units:
                 if unit.tag == PYLON:
                     source = response.observation.raw_data.player.power_sources.add(tag=PYLON, radius=6.5)
@@ -201,11 +194,6 @@ def look(snapshot: Snap) -> Callable[..., Snapshot]:
         return snapshot(units, loop=loop, size=(SIDE, SIDE), change=change, **given)
 
     return make
-
-
-def _plain(bits: int, value: bytes) -> common_pb2.ImageData:
-    size = common_pb2.Size2DI(x=SIDE, y=SIDE)
-    return common_pb2.ImageData(bits_per_pixel=bits, size=size, data=value * (SIDE * SIDE * bits // 8))
 
 
 @pytest.fixture

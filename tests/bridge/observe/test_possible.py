@@ -164,13 +164,14 @@ def test_what_somebody_can_do_is_offered_with_its_price(asked: bool, unit: Any, 
     assert not offer.first
 
 
-@pytest.mark.parametrize(("standing", "first"), [((), True), (("Forge",), False)])
+@pytest.mark.parametrize(("standing", "first"), [((), True), (("EngineeringBay",), False)])
 def test_the_first_structure_of_its_kind_is_marked(
-    standing: tuple[str, ...], first: bool, unit: Any, team: Any
+    standing: tuple[str, ...], first: bool, unit: Any, team: Any, plain: Any
 ) -> None:
-    others = [unit(2 + number, name, 20, 16) for number, name in enumerate(standing)]
-    units = [unit(1, "Probe", 16, 16), *others]
-    view = team(units, "Build_Forge", abilities={1: able("Build_Forge_screen")}, player=RICH)
+    others = [unit(3 + number, name, 20, 16) for number, name in enumerate(standing)]
+    units = [unit(1, "SCV", 16, 16), unit(2, "CommandCenter", 10.5, 10.5), *others]
+    able_to = {1: able("Build_EngineeringBay_screen")}
+    view = team(units, "Build_EngineeringBay", abilities=able_to, player=RICH, change=plain)
     assert [offer.first for offer in view.offers] == [first]
 
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from s2clientprotocol import common_pb2
 
 from khala_bridge.act.addressee import Addressees
 from khala_bridge.act.recognise import recognise
@@ -160,21 +159,10 @@ def vocabulary(race: str) -> Vocabulary:
     return Vocabulary(config(race).agents[0])
 
 
-def open_ground(_: Any, info: Any) -> None:
-    """Make the whole map one walkable and buildable plain."""
-    ground = info.start_raw
-    for grid, bits, value in (
-        (ground.placement_grid, 1, b"\xff"),
-        (ground.pathing_grid, 1, b"\xff"),
-        (ground.terrain_height, 8, b"\x80"),
-    ):
-        size = common_pb2.Size2DI(x=SIDE, y=SIDE)
-        image = common_pb2.ImageData(bits_per_pixel=bits, size=size, data=value * (SIDE * SIDE * bits // 8))
-        grid.CopyFrom(image)
-
-
 @pytest.fixture
-def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callable[[str, State], SideObservation]:
+def look(
+    unit: Callable[..., Any], snapshot: Callable[..., Snapshot], plain: Any
+) -> Callable[[str, State], SideObservation]:
     """Return the observation of the agent of a race in a state."""
 
     def see(race: str, state: State) -> SideObservation:
@@ -200,7 +188,7 @@ def look(unit: Callable[..., Any], snapshot: Callable[..., Snapshot]) -> Callabl
         ]
         seen = snapshot(
             made, size=(SIDE, SIDE), upgrades=state.upgrades, player=state.player,
-            abilities=able if state.asked else None, change=open_ground,
+            abilities=able if state.asked else None, change=plain,
         )  # fmt: skip
         return Observer(config(race)).observe(seen)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class Land:
     def __init__(self, snapshot: Snapshot) -> None:
         self.ground = MapGround.of(snapshot.info)
         self._snapshot = snapshot
+        self.answers: dict[Any, Any] = {}
+        """Answers of layers above about this moment, by their questions."""
 
     @functools.cached_property
     def _standing(self) -> list[tuple[str, Footprint, Unit]]:
@@ -164,12 +166,14 @@ class Land:
     @functools.cached_property
     def creep(self) -> Bools:
         """(w, h): cells with creep."""
-        return self._state(self._snapshot.creep.cells()) > 0
+        cells = self._snapshot.creep.cells()
+        return cells > 0 if cells is not None else np.zeros(self.ground.size, np.bool_)
 
     @functools.cached_property
     def sight(self) -> Bytes:
-        """(w, h): 2 where the player sees, 1 where it once saw, 0 elsewhere."""
-        return self._state(self._snapshot.visibility.cells())
+        """(w, h): 2 where the player sees, 1 where it once saw, 0 elsewhere; all is seen if the game sent no map."""
+        cells = self._snapshot.visibility.cells()
+        return cells if cells is not None else np.full(self.ground.size, SEEN_NOW, np.uint8)
 
     @functools.cached_property
     def power_sources(self) -> tuple[PowerSource, ...]:
@@ -212,9 +216,6 @@ class Land:
     def _flying(self) -> frozenset[int]:
         units = self._snapshot.known.values()
         return frozenset(unit.tag for unit in units if unit.is_flying or unit.name == "WarpPrismPhasing")
-
-    def _state(self, found: Bytes | None) -> Bytes:
-        return found if found is not None else np.zeros(self.ground.size, np.uint8)
 
     # --- bases ------------------------------------------------------------------------------------------------
 

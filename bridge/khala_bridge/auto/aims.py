@@ -1,0 +1,147 @@
+"""What an action can be aimed at: the game's target filters in words, and which weapons reach which unit.
+
+The words of the filters are those of `khala_bridge.knowledge` (`AbilityFacts.must`, `must_not`). The game alone judges
+those that do not apply to units in sight (`missile`, `item`, …) or that the API does not show (`stasis`). Both offers
+and refusals ask here.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala_bridge.catalogue.functions import functions
+from khala_bridge.knowledge import abilities, knowledge
+from khala_bridge.names import buff_name, unit_name
+from khala_bridge.state import Alliance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_bridge.catalogue.action import Action
+    from khala_bridge.knowledge import AbilityFacts, UnitFacts
+    from khala_bridge.state import Unit
+
+
+class Aim(NamedTuple):
+    """A unit as far as it matters to those that aim at it: units of the same values are equally good targets."""
+
+    unit_type: int
+    alliance: Alliance
+    flying: bool
+    aloft: bool
+    """Whether it is hit in the air: it flies, or a Phoenix holds it up with its beam."""
+    burrowed: bool
+    unfinished: bool
+    has_energy: bool
+    can_have_energy: bool
+
+    @property
+    def type(self) -> str:
+        """The name of its type."""
+        return unit_name(self.unit_type)
+
+
+def aim_of(unit: Unit) -> Aim:
+    """Return a unit as a target."""
+    return Aim(
+        unit.unit_type,
+        unit.alliance,
+        unit.is_flying,
+        unit.is_flying or (bool(unit.buff_ids) and any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)),
+        unit.is_burrowed,
+        unit.build_progress < 1.0,
+        unit.energy > 0,
+        unit.energy_max > 0,
+    )
+
+
+_STATES: dict[str, Callable[[Aim], bool]] = {
+    "player": lambda aim: aim.alliance == Alliance.OWN,
+    "ally": lambda aim: aim.alliance == Alliance.ALLY,
+    "enemy": lambda aim: aim.alliance == Alliance.ENEMY,
+    "neutral": lambda aim: aim.alliance == Alliance.NEUTRAL,
+    "ground": lambda aim: not aim.flying,
+    "air": lambda aim: aim.flying,
+    "buried": lambda aim: aim.burrowed,
+    "underconstruction": lambda aim: aim.unfinished,
+    "canhaveenergy": lambda aim: aim.can_have_energy,
+    "hasenergy": lambda aim: aim.has_energy,
+}
+"""What the API shows of a unit."""
+_ATTRIBUTES = frozenset({"biological", "mechanical", "massive", "heroic"})
+_NEEDED = {
+    "ground": "a unit on the ground",
+    "air": "a unit in the air",
+    "structure": "a structure",
+    "biological": "a biological unit",
+    "mechanical": "a mechanical unit",
+    "canhaveenergy": "a unit with energy",
+    "hasenergy": "a unit with energy",
+}
+_BARRED = {
+    "player": "a unit that is not yours",
+    "ally": "a unit that is not an ally's",
+    "enemy": "a unit that is no enemy",
+    "neutral": "a unit that is somebody's",
+    "structure": "a unit that is no structure",
+    "massive": "a unit that is not massive",
+    "heroic": "a unit that is not heroic",
+    "buried": "a unit that is not burrowed",
+    "underconstruction": "a unit that is finished",
+}
+
+
+def unfit(action: Action, aim: Aim) -> str | None:
+    """Return what the target of an action must be and this one is not: `an enemy unit`; None if it fits."""
+    return _unfit(action.target, action.function, aim)
+
+
+@functools.lru_cache(8192)
+def _unfit(target: str | None, function: str | None, aim: Aim) -> str | None:
+    enemy = aim.alliance == Alliance.ENEMY
+    if target == "enemy" and not enemy:
+        return "an enemy unit"
+    if target == "own" and (enemy or aim.alliance == Alliance.NEUTRAL):
+        return "an own unit"
+    facts = _facts(function)
+    if facts is None:
+        return None
+    known = knowledge().get(aim.type)
+    for word in facts.must:
+        if word in _NEEDED and _is(word, aim, known) is False:
+            return _NEEDED[word]
+    for word in facts.must_not:
+        if word in _BARRED and _is(word, aim, known):
+            return _BARRED[word]
+    return None
+
+
+@functools.lru_cache(8192)
+def reaches(unit_type: str, aim: Aim) -> bool:
+    """Return True if units of a type have a weapon against a target, or if its weapons are unknown."""
+    mine, other = knowledge().get(unit_type), knowledge().get(aim.type)
+    if mine is None or other is None or not mine.weapons:
+        return True
+    planes = {*other.planes, "air"} - {"ground"} if aim.aloft else {*other.planes, "ground"}
+    return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
+
+
+def needs_sight(action: Action) -> bool:
+    """Return True if the place that an action is aimed at must be in sight."""
+    facts = _facts(action.function)
+    return facts is not None and facts.target != "unit" and "visible" in facts.must
+
+
+def _is(word: str, aim: Aim, known: UnitFacts | None) -> bool | None:
+    """Return whether a word of the filters applies to a target; None if its type is unknown."""
+    if word in _STATES:
+        return _STATES[word](aim)
+    if known is None:
+        return None
+    return known.structure if word == "structure" else word in (_ATTRIBUTES & {a.casefold() for a in known.attributes})
+
+
+@functools.cache
+def _facts(function: str | None) -> AbilityFacts | None:
+    return None if function is None else abilities().get(functions()[function].ability_id)
