@@ -66,6 +66,12 @@ class MapFrame:
         scale = self._cells_per_unit
         return WorldPoint(point.x / scale, self.height - point.y / scale)
 
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """The playable part in minimap cells: x0, y0, x1, y1."""
+        left, bottom, right, top = self.playable
+        return *self.minimap(left, top), *self.minimap(right, bottom)
+
     def holds(self, point: WorldPoint) -> bool:
         """Return True if a world position is on the playable part of the map."""
         x0, y0, x1, y1 = self.playable

@@ -261,6 +261,18 @@ class UnavailableAction(Frozen):
     """As the end of a sentence: `no Stargate`."""
 
 
+class ValidArguments(Frozen):
+    """Arguments with which a valid action is accepted, if not all do that its kind suggests."""
+
+    action: str
+    units: tuple[str, ...] = ()
+    """Tags of the units that can carry it out; () for every unit of the team."""
+    tags: tuple[str, ...] = ()
+    """Tags of targets that will do, the first ones of many; () for every enemy, or every other unit, on the screen."""
+    points: tuple[Point, ...] = ()
+    """Some points of the screen that will do; () if every place on the map does."""
+
+
 class TeamView(Frozen):
     """One team of an agent: its units, and what they see on their screen."""
 
@@ -277,6 +289,8 @@ class TeamView(Frozen):
     """Actions that are valid for this team now."""
     offers: tuple[ActionCost, ...] = ()
     """Valid actions that have a cost."""
+    arguments: tuple[ValidArguments, ...] = ()
+    """Valid actions for which only some arguments will do."""
     barred: tuple[UnavailableAction, ...] = ()
     """Actions of this team that are not valid now."""
     resources: tuple[UnitView, ...] = ()
@@ -467,6 +481,8 @@ class View(Frozen):
     """Seconds on the game's clock: game loop / 22.4."""
     resources: Resources = Resources()
     upgrades: tuple[str, ...] = ()
+    bounds: tuple[float, float, float, float] = (0.0, 0.0, 64.0, 64.0)
+    """The part of the minimap frame that is the playable map: x0, y0, x1, y1."""
     teams: tuple[TeamView, ...] = ()
     counts: Counts | None = None
     """For commanders, developers and builders, like all that follows."""

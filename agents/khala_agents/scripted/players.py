@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, Literal
 
-from khala_agents.scripted.reading import Situation, TextAction, TextTeam, TextUnit, read
+from khala_agents.scripted.reading import ANY, Situation, TextAction, TextTeam, TextUnit, read
 from khala_agents.scripted.skilled import skilled
 from khala_agents.scripted.writing import call, inside, point, reply
 
@@ -40,10 +40,10 @@ def random_legal(observation: str, rng: random.Random) -> str:
     situation = read(observation)
     orders = {}
     for team in situation.teams.values():
-        possible = [action for action in team.actions if all(_pools(action, team))]
+        possible = [action for action in team.actions if all(_pools(action, team, situation))]
         if possible:
             action = rng.choice(possible)
-            orders[team.name] = [call(action.name, *_random_values(action, team, rng))]
+            orders[team.name] = [call(action.name, *_random_values(action, team, situation, rng))]
     return reply("Something will come of it.", orders, _hello(situation, rng))
 
 
@@ -51,8 +51,10 @@ def random_calls(situation: Situation, rng: random.Random) -> Iterator[str]:
     """Yield a reply for each valid action of each team, with arguments drawn from what the text calls valid."""
     for team in situation.teams.values():
         for action in team.actions:
-            if all(_pools(action, team)):
-                yield reply("This one.", {team.name: [call(action.name, *_random_values(action, team, rng))]}, [])
+            if all(_pools(action, team, situation)):
+                yield reply(
+                    "This one.", {team.name: [call(action.name, *_random_values(action, team, situation, rng))]}, []
+                )
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
@@ -123,24 +125,33 @@ def _middle(team: TextTeam) -> tuple[float, float]:
 # --- arguments --------------------------------------------------------------------------------------
 
 
-def _pools(action: TextAction, team: TextTeam) -> list[list[TextUnit]]:
-    """Return, for each tag that an action takes, the possible units."""
-    hostile = any(word in action.name for word in ("Attack", "Storm", "Feedback", "Beam", "Stasis"))
-    targets = team.enemies if hostile else team.allies or team.own
-    count = action.args.count("tag")
-    if action.name.startswith("Select_Unit_"):  # its first argument names the unit that acts
-        return [team.own, targets][:count]
-    return [targets] * count
+def _pools(action: TextAction, team: TextTeam, situation: Situation) -> list[list[str]]:
+    """Return, for each tag that an action takes, those that the text calls valid."""
+    count, will = action.args.count("tag"), team.will.get(action.name, ANY)
+    own = [unit.tag for unit in team.own]
+    targets = list(will.tags)
+    if not targets:
+        around = team.enemies if action.name in situation.hostile else [*team.allies, *team.own]
+        targets = [unit.tag for unit in around]
+    if not action.name.startswith("Select_"):
+        return [targets] * count
+    named = 2 if action.name.startswith("Select_Two_") else 1  # the first arguments name the units that act
+    return [list(will.units) or own] * named + [targets] * (count - named)
 
 
-def _random_values(action: TextAction, team: TextTeam, rng: random.Random) -> list[str]:
-    pools = iter(_pools(action, team))
-    values = []
+def _random_values(action: TextAction, team: TextTeam, situation: Situation, rng: random.Random) -> list[str]:
+    pools = iter(_pools(action, team, situation))
+    places = team.will.get(action.name, ANY).points
+    values: list[str] = []
     for kind in action.args:
         if kind == "tag":
-            values.append(rng.choice(next(pools)).tag)
+            pool = next(pools)
+            values.append(rng.choice([tag for tag in pool if tag not in values] or pool))
         elif kind == "minimap":
-            values.append(point((rng.uniform(1, 63), rng.uniform(1, 63))))
+            x0, x1, y0, y1 = situation.playable
+            values.append(point((rng.uniform(x0, x1), rng.uniform(y0, y1))))
+        elif places:
+            values.append(point(rng.choice(places)))
         else:
             x, y = (middle + rng.uniform(-8, 8) for middle in SCREEN_CENTRE)
             values.append(point(inside((x, y), team)))

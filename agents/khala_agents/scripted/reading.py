@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,6 +50,10 @@ _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE 
 _PLAYABLE = re.compile(rf"minimap x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
+_WILL_DO = re.compile(r"^    What will do for team (\S+):\n((?:        .*\n?)*)", re.MULTILINE)
+_DOES = re.compile(r"^        ([\w, ]+): ((?:unit|tag|a place) .*)", re.MULTILINE)
+_ENEMY = re.compile(r"^        (\w+): [^\n]*\benemy unit with", re.MULTILINE)
+_PLAYABLE = re.compile(rf"the playable map is x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
 _RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
 _SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
@@ -138,6 +142,17 @@ class TextAction(NamedTuple):
     args: tuple[str, ...]
 
 
+class Will(NamedTuple):
+    """The arguments that will do for an action, where not all do."""
+
+    units: tuple[str, ...] = ()
+    tags: tuple[str, ...] = ()
+    points: tuple[Point, ...] = ()
+
+
+ANY: Final = Will()
+
+
 @dataclass(slots=True)
 class TextTeam:
     """A team, as its block and its line of valid actions describe it."""
@@ -147,6 +162,8 @@ class TextTeam:
     allies: list[TextUnit] = field(default_factory=list)
     enemies: list[TextUnit] = field(default_factory=list)
     actions: list[TextAction] = field(default_factory=list)
+    will: dict[str, Will] = field(default_factory=dict)
+    """By the name of an action, the arguments that will do; only actions for which not all do."""
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
     hit: set[str] = field(default_factory=set)
@@ -168,6 +185,10 @@ class Situation:
 
     teams: dict[str, TextTeam] = field(default_factory=dict)
     max_actions: int = 1
+    playable: tuple[float, float, float, float] = (0.0, 64.0, 0.0, 64.0)
+    """Part of the minimap that is the playable map: x from, to, y from, to."""
+    hostile: set[str] = field(default_factory=set)
+    """Names of actions whose last tag is that of an enemy."""
     correspondents: list[str] = field(default_factory=list)
     time_s: float = 0.0
     minerals: int = 0
@@ -334,9 +355,26 @@ def _read_valid_actions(situation: Situation, body: str) -> None:
         _team(situation, team).actions += [
             TextAction(name, tuple(args.split(", ")) if args else ()) for name, args in _ACTION.findall(listed)
         ]
+    for team, lines in _WILL_DO.findall(body):
+        for names, words in _DOES.findall(lines):
+            _team(situation, team).will |= dict.fromkeys(names.split(", "), _will(words))
+    situation.hostile = set(_ENEMY.findall(body))
     for name, price, times in _COSTS.findall(body):
         amounts = {what: int(amount) for amount, what in _PRICE.findall(price)}
         situation.prices[name] = Price(**amounts, times=int(times or 1))
+
+
+def _will(words: str) -> Will:
+    """Return the arguments of `unit 0x1 or 0x2; tag 0x3; a place such as [1, 2]`."""
+    parts = {part.split(" ")[0]: part for part in words.split("; ")}
+    units, tags = (tuple(_HEX.findall(parts.get(kind, ""))) for kind in ("unit", "tag"))
+    return Will(units, tags, tuple(points(parts.get("a", ""))))
+
+
+def _read_arguments(situation: Situation, body: str) -> None:
+    if found := _PLAYABLE.search(body):
+        x0, x1, y0, y1 = map(float, found.groups())
+        situation.playable = x0, x1, y0, y1
 
 
 def _read_impossible(situation: Situation, body: str) -> None:
@@ -401,6 +439,7 @@ _READERS: dict[str, Callable[[Situation, str], None]] = {
     "Places to build at": _read_sites,
     "Valid actions": _read_valid_actions,
     "Not possible now": _read_impossible,
+    "Arguments": _read_arguments,
     "Task": _read_task,
     "Answer": _read_answer,
 }

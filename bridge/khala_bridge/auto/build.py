@@ -38,12 +38,12 @@ def build_at(ask: RuleRequest) -> list[RuleOrder]:
     """
     assert ask.point is not None, f"{ask.action.name} is said with a point"
     ask.able()
-    if _is_gas(ask):
+    if is_gas(ask):
         near_by = [u for u in free_geysers(ask) if math.dist(place(u), ask.point) <= ON_GEYSER]
         if not near_by:
-            raise NotAvailable("invalid_target", f"There is no free geyser there; {_structure(ask)} stands on one.")
+            raise NotAvailable("invalid_target", f"There is no free geyser there; {structure_of(ask)} stands on one.")
         return _on_geyser(ask, near_by[0])
-    footprint = footprint_need(_structure(ask))
+    footprint = footprint_need(structure_of(ask))
     return _checked(ask, footprint.middle(footprint.cell(*ask.point)))
 
 
@@ -55,8 +55,8 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
     """
     unit = _named(ask)
     ask.able()
-    land, structure = land_of(ask.snapshot), _structure(ask)
-    if _is_gas(ask):
+    land, structure = land_of(ask.snapshot), structure_of(ask)
+    if is_gas(ask):
         free = free_geysers(ask)
         found = min(free, key=lambda u: (math.dist(place(u), place(unit)), u.tag), default=None)
         if found is None or math.dist(place(found), place(unit)) > NEAR:
@@ -80,7 +80,7 @@ def lock_base(ask: RuleRequest) -> list[RuleOrder]:
     """
     unit = _named(ask)
     ask.able()
-    footprint = footprint_need(_structure(ask))
+    footprint = footprint_need(structure_of(ask))
     return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
 
@@ -91,8 +91,8 @@ def build_auto(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: there is no place, or as `build_at`.
     """
     ask.able()
-    land, structure = land_of(ask.snapshot), _structure(ask)
-    if _is_gas(ask):
+    land, structure = land_of(ask.snapshot), structure_of(ask)
+    if is_gas(ask):
         orders = _on_geyser(ask, free_geyser(ask, free_geysers(ask)))
     elif sites()[structure].clear:
         orders = _at(ask, free_base(ask, land, structure))
@@ -110,8 +110,8 @@ def any_place(ask: RuleRequest) -> None:
     Raises:
         NotAvailable: there is no place.
     """
-    land, structure = land_of(ask.snapshot), _structure(ask)
-    if _is_gas(ask):
+    land, structure = land_of(ask.snapshot), structure_of(ask)
+    if is_gas(ask):
         free_geyser(ask, free_geysers(ask))
     elif sites()[structure].clear:
         free_base(ask, land, structure)
@@ -120,7 +120,7 @@ def any_place(ask: RuleRequest) -> None:
 
 
 def _no_room(ask: RuleRequest) -> NotAvailable:
-    lack = _lack(_structure(ask))
+    lack = _lack(structure_of(ask))
     return not_available(ask, f"there is no room for it at your bases{lack}.", f"no room{lack.partition(';')[0]}")
 
 
@@ -135,7 +135,7 @@ def _checked(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
 
 def _at(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
     """Return the orders to build at the middle of some cells."""
-    structure = _structure(ask)
+    structure = structure_of(ask)
     worker, queued = builder(ask, middle)
     orders = _go(ask, worker, middle, queued=queued)
     width, height = footprint_need(structure).size
@@ -177,7 +177,7 @@ def _back_to_work(ask: RuleRequest, build: RuleOrder) -> list[RuleOrder]:
 
 def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
     """Raise an error if the structure cannot stand there, with the nearest place where it can."""
-    structure = _structure(ask)
+    structure = structure_of(ask)
     footprint = footprint_need(structure)
     allowed = legal(land, ask.ledger, structure)
     cell = footprint.cell(*middle)
@@ -193,15 +193,15 @@ def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
 
 def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
     """Return why a structure cannot stand on a cell and those around it, as half a sentence."""
-    site, footprint = sites()[_structure(ask)], footprint_need(_structure(ask))
+    site, footprint = sites()[structure_of(ask)], footprint_need(structure_of(ask))
     cells = [(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells]
     if not all(land.ground.holds(x, y) and land.ground.buildable[x, y] for x, y in cells):
         return "a cliff, a ramp or the edge of the map is in its way."
     x, y = np.array(cells).T
     standing = land.standing_on(cells)
-    again = (_structure(ask), footprint.middle(cell)) in land.plans
+    again = (structure_of(ask), footprint.middle(cell)) in land.plans
     reasons = (
-        (again, f"a {_structure(ask)} is going to be built there already."),
+        (again, f"a {structure_of(ask)} is going to be built there already."),
         (land.taken[x, y].any(), f"a {name(standing) if standing else 'unit'} is in its way."),
         ((land.planned | promised(land, ask.ledger))[x, y].any(), "something else is going to be built there."),
         (site.ground == "creep" and not land.creep[x, y].all(), "it needs creep under all of it."),
@@ -239,14 +239,19 @@ def _named(ask: RuleRequest) -> Unit:
 
 def _base_of(ask: RuleRequest, unit: Unit) -> Base:
     """Return the place for a town hall beside a unit."""
-    bases = land_of(ask.snapshot).bases
-    found = min(bases, key=lambda base: (math.dist(base.place, place(unit)), base.place), default=None)
-    if found is None or math.dist(found.place, place(unit)) > OF_BASE:
+    found = nearest_base(land_of(ask.snapshot), unit)
+    if found is None:
         raise NotAvailable(
             "invalid_target",
             f"The {name(unit)} {hex(unit.tag)} is at no place for a town hall; name a mineral field or geyser there.",
         )
     return found
+
+
+def nearest_base(land: Land, unit: Unit) -> Base | None:
+    """Return the place for a town hall that a unit is at; None if it is at none."""
+    found = min(land.bases, key=lambda base: (math.dist(base.place, place(unit)), base.place), default=None)
+    return found if found is not None and math.dist(found.place, place(unit)) <= OF_BASE else None
 
 
 def free_geysers(ask: RuleRequest) -> list[Unit]:
@@ -272,11 +277,13 @@ def _has_gas(unit: Unit) -> bool:
 # names ----------------------------------------------------------------------------------------------------------------
 
 
-def _structure(ask: RuleRequest) -> str:
+def structure_of(ask: RuleRequest) -> str:
+    """Return the structure that an action builds."""
     structure = ask.action.produces
     assert structure is not None, f"{ask.action.name} builds something"
     return structure
 
 
-def _is_gas(ask: RuleRequest) -> bool:
-    return sites()[_structure(ask)].ground == "geyser"
+def is_gas(ask: RuleRequest) -> bool:
+    """Return True if an action's structure stands on a geyser."""
+    return sites()[structure_of(ask)].ground == "geyser"

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 BOOSTED: Final = 281
 """The game's number of the buff of Chrono Boost."""
+CHRONO: Final = "Effect_ChronoBoostEnergyCost_screen"
 WARP: Final = "TrainWarp_Zealot_screen"
 """The ability that a WarpGate always has unless it recharges."""
 

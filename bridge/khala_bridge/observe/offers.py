@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from khala_bridge.auto import lack
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import knowledge
+from khala_bridge.observe.arguments import Around, Asker, Lack
 from khala_bridge.rules import asked_by, brief, cases, distinct, facts_for, nearest, nobody, price_of, why_no_one
 from khala_bridge.state.means import ledger_of, side_of
 from khala_protocol.messages import ActionCost, UnavailableAction
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from khala_bridge.catalogue.action import Action
+    from khala_bridge.frames import MapFrame
     from khala_bridge.observe.body import Body
     from khala_bridge.rules import Unavailable, UnitState, Use
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import AgentConfig
-    from khala_protocol.messages import ActionSpec
+    from khala_protocol.messages import ActionSpec, ValidArguments
 
 
 class Choice(NamedTuple):
@@ -34,23 +36,25 @@ class Choice(NamedTuple):
 
     actions: tuple[ActionSpec, ...]
     offers: tuple[ActionCost, ...]
+    arguments: tuple[ValidArguments, ...]
     barred: tuple[UnavailableAction, ...]
 
 
 class Possible:
     """The means of a side at one moment, and the actions that they allow."""
 
-    def __init__(self, snapshot: Snapshot) -> None:
-        """Take the side and its accounts."""
+    def __init__(self, snapshot: Snapshot, world: MapFrame) -> None:
+        """Take the side, its accounts, and the frame of its map."""
         self._snapshot = snapshot
         self._abilities = snapshot.abilities
         self._side = side_of(snapshot)
         self._ledger = ledger_of(snapshot)
         self._distinct: dict[tuple[str, ...], list[UnitState]] = {}
+        self._of_side = Asker(snapshot, self._side, self._ledger, Around(world))
         self.promised = round(self._ledger.aside[0]), round(self._ledger.aside[1])
         """Minerals and vespene that are set aside for what workers are on their way to build."""
 
-    def for_team(self, agent: AgentConfig, members: Sequence[Body]) -> Choice:
+    def for_team(self, agent: AgentConfig, members: Sequence[Body], around: Around) -> Choice:
         """Return the choice of the actions of a team's types of units, in the order of the task's lists."""
         by_type: dict[str, list[UnitState]] = {}
         for body in members:
@@ -69,7 +73,8 @@ class Possible:
                 else:
                     reasons.append(why)
         judged = {name: None if name in doers else brief(_of_team(whys)) for name, whys in found.items()}
-        return self._choice(judged, doers)
+        states = [self._side.units[body.tag] for body in members]
+        return self._choice(judged, doers, self._of_side._replace(agent=agent, members=states, around=around))
 
     def skills(self, agent: AgentConfig, body: Body) -> tuple[str, ...]:
         """Return the skills that the agent has and this very unit can use now; none if the game was not asked."""
@@ -86,13 +91,15 @@ class Possible:
         for name in names:
             judged[name] = self._why_nobody(catalogue()[name])
             doers[name] = next((kind for kind in catalogue()[name].units if kind in self._side.standing), "")
-        return self._choice(judged, doers)
+        return self._choice(judged, doers, self._of_side)
 
-    def _choice(self, judged: Mapping[str, str | None], doers: Mapping[str, str]) -> Choice:
+    def _choice(self, judged: Mapping[str, str | None], doers: Mapping[str, str], asker: Asker) -> Choice:
+        judged, arguments = _with_arguments(judged, asker)
         valid = [catalogue()[name] for name, why in judged.items() if why is None]
         offers = [self._offer(action, doers[action.name]) for action in valid]
         barred = tuple([_barred(name, why) for name, why in judged.items() if why is not None])
-        return Choice(tuple([a.spec for a in valid]), tuple([offer for offer in offers if offer is not None]), barred)
+        paid = tuple([offer for offer in offers if offer is not None])
+        return Choice(tuple([a.spec for a in valid]), paid, tuple(arguments), barred)
 
     def _offer(self, action: Action, unit_type: str) -> ActionCost | None:
         """Return the cost of an action for a type of unit that can do it; None if it is free."""
@@ -137,6 +144,20 @@ class Possible:
         if types not in self._distinct:
             self._distinct[types] = distinct(self._side.of_types(types))
         return self._distinct[types]
+
+
+def _with_arguments(
+    judged: Mapping[str, str | None], asker: Asker
+) -> tuple[Mapping[str, str | None], list[ValidArguments]]:
+    """Return the judgement after a look at the arguments, and the arguments where only some will do."""
+    result, arguments = dict(judged), []
+    for name, why in judged.items():
+        found = None if why is not None else asker.arguments(catalogue()[name])
+        if isinstance(found, Lack):
+            result[name] = found.why
+        elif found is not None:
+            arguments.append(found)
+    return result, arguments
 
 
 def _of_team(reasons: Sequence[Unavailable]) -> Unavailable:

@@ -14,13 +14,16 @@ the words; `khala_bridge.observe.observer` is above.
 from __future__ import annotations
 
 import functools
+import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from khala_bridge.auto.aims import aim_of
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, Camera
+from khala_bridge.observe.arguments import Around
 from khala_bridge.observe.body import body, rounded
 from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.observation import TeamObservation
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from khala_bridge.auto.aims import Aim
     from khala_bridge.auto.warp import PowerField
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.events import Events
@@ -49,6 +53,8 @@ if TYPE_CHECKING:
 
 UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
 _HALF = CAMERA_WIDTH / 2
+SLACK = 1e-6
+"""Tenths of a cell that rounding of floats may take."""
 _NO_DETAILS = UnitDetails()
 
 
@@ -67,7 +73,7 @@ class Scene:
         """Their views, by tag."""
         self.totals = {tag: view.health + view.shield for tag, view in self.views.items()}
         """Health and shield by tag."""
-        self.possible = Possible(snapshot)
+        self.possible = Possible(snapshot, self.world)
         self._arrange()
 
     def _arrange(self) -> None:
@@ -114,6 +120,7 @@ class Scene:
                 promised=self.possible.promised,
             ),
             upgrades=self.snapshot.upgrades,
+            bounds=_edges(self.world.bounds),
         )
 
     def team(
@@ -140,7 +147,8 @@ class Scene:
         friends = friends[np.argsort(self._rank[friends], kind="stable")]
         foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
         bodies = [self._order[index] for index in members.tolist()]
-        view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies)).but(
+        around = Around(self.world, camera, self._aims(foes), self._aims(np.append(friends, members)))
+        view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies, around)).but(
             units=self._skilled(agent, bodies, self._units(looked, members, "own")),
             allies=self._units(looked, friends, "ally"),
             enemies=self._units(looked, foes, "enemy"),
@@ -150,6 +158,18 @@ class Scene:
         tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
         happened = events.of_team(before.view, before.tags, tags) if before else ()
         return TeamObservation(team, camera, view.but(events=happened), tags)
+
+    @functools.cached_property
+    def _aim(self) -> list[Aim]:
+        """What matters of each body as a target."""
+        return [aim_of(self.snapshot.units[tag]) for tag in self._index]
+
+    def _aims(self, rows: NDArray[np.intp]) -> dict[Aim, list[int]]:
+        """Return the tags of bodies, those that are equally good targets together."""
+        found: dict[Aim, list[int]] = {}
+        for row in rows.tolist():
+            found.setdefault(self._aim[row], []).append(self._order[row].tag)
+        return found
 
     def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
         return tuple([self._tags[row] for row in rows.tolist()])
@@ -209,7 +229,8 @@ def _with_skills(view: UnitView, ready: tuple[str, ...], ready_somewhere: Iterab
 
 
 def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:
-    return TeamView(name=name, minimap=minimap, actions=choice.actions, offers=choice.offers, barred=choice.barred)
+    actions, offers, arguments, barred = choice
+    return TeamView(name=name, minimap=minimap, actions=actions, offers=offers, arguments=arguments, barred=barred)
 
 
 def on_screen(camera: Camera, seen: Body) -> bool:
@@ -224,5 +245,7 @@ def screen_of(camera: Camera, seen: Body) -> Point:
 
 
 def _edges(bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    x0, y0, x1, y1 = bounds
-    return round(x0, 1), round(y0, 1), round(x1, 1), round(y1, 1)
+    """Return bounds to a tenth of a cell, so that nothing within them is outside of the map."""
+    x0, y0 = (math.ceil(10 * value - SLACK) / 10 for value in bounds[:2])
+    x1, y1 = (math.floor(10 * value + SLACK) / 10 for value in bounds[2:])
+    return x0, y0, x1, y1

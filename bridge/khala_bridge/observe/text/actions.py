@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, n
+from khala_bridge.observe.text.words import INDENT, INDENT2, n, point
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,6 +44,21 @@ def _calls(page: Page) -> Iterator[str]:
     for team in page.teams:
         calls = ", ".join([f"<{action.name}({', '.join(action.args)})>" for action in team.actions])
         yield f"{INDENT}Team {team.name}: {calls or 'none'}"
+    for team in page.teams:
+        if team.arguments:
+            yield f"{INDENT}What will do for team {team.name}:"
+        yield from (f"{INDENT2}{', '.join(names)}: {words}" for words, names in _will_do(team).items())
+
+
+def _will_do(team: TeamView) -> dict[str, list[str]]:
+    """Return actions by the arguments that will do."""
+    found: dict[str, list[str]] = {}
+    for one in team.arguments:
+        parts = [f"unit {' or '.join(one.units)}"] if one.units else []
+        parts += [f"tag {' or '.join(one.tags)}"] if one.tags else []
+        parts += [f"a place such as {' or '.join(map(point, one.points))}"] if one.points else []
+        found.setdefault("; ".join(parts), []).append(one.action)
+    return found
 
 
 def _offers(page: Page) -> dict[str, ActionCost]:
@@ -111,6 +126,7 @@ def arguments(page: Page) -> Iterator[str]:
     if "minimap" in kinds:
         yield (
             f"{INDENT}minimap: [x, y] on the map of all, from 0 to {minimap}; x grows to the right, y grows downwards"
+            f"{_playable(page)}"
         )
 
 
@@ -118,6 +134,15 @@ def arguments(page: Page) -> Iterator[str]:
 def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
     """Show nothing: the briefing explains the arguments as well."""
     yield from ()
+
+
+def _playable(page: Page) -> str:
+    """Return the part of the minimap that orders may name, if it is not all of it."""
+    x0, y0, x1, y1 = page.view.bounds
+    size = page.task.frames.minimap
+    if (x0, y0, x1, y1) == (0.0, 0.0, size, size):
+        return ""
+    return f"; the playable map is x {n(x0)} to {n(x1)}, y {n(y0)} to {n(y1)}"
 
 
 def _example(page: Page) -> str:
