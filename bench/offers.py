@@ -57,6 +57,8 @@ class Tally:
     calls: int = 0
     refused: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     """By the kind of the agent, the action and the reason, with `#` for figures."""
+    overtaken: int = 0
+    """Those that are accepted alone: another agent spent or took what they need in the same turn."""
 
     @property
     def share(self) -> float:
@@ -98,6 +100,7 @@ class Table:
             refused += [(name, one) for name, found in joint.rejections.items() for one in found]
             if not judged:
                 self._count(words, refused, tally)
+                tally.overtaken += sum(self._is_overtaken(seen, name, one) for name, one in refused)
             self._feedback = {
                 name: Feedback(joint.accepted.get(name, ()), tuple(one for who, one in refused if who == name))
                 for name in texts
@@ -111,6 +114,12 @@ class Table:
                 words = {name: parse(call)}
                 found = self._actor.joint(seen, words).rejections.get(name, ())
                 self._count(words, [(name, one) for one in found], tally)
+
+    def _is_overtaken(self, seen: SideObservation, name: str, refused: Rejection) -> bool:
+        if refused.reason != "not_available":
+            return False
+        alone = parse(f"Actions:\n    Team {refused.team}:\n        {refused.text}")
+        return bool(self._actor.joint(seen, {name: alone}).accepted.get(name))
 
     def _count(self, words: Mapping[str, Speech], refused: list[tuple[str, Rejection]], tally: Tally) -> None:
         tally.calls += sum(len(speech.calls) for speech in words.values())
@@ -137,7 +146,9 @@ def measure(name: str, *, steps: int, seeds: list[int], judged: bool) -> Tally:
 
 def report(name: str, tally: Tally, most: int) -> Iterator[str]:
     """Yield the lines of a task: its share, and the most frequent refusals."""
-    yield f"{name:22} {tally.calls:6} calls {sum(tally.refused.values()):5} refused {tally.share:5.1f} %"
+    refused = sum(tally.refused.values())
+    apart = f", {tally.overtaken} of them overtaken by another agent" if tally.overtaken else ""
+    yield f"{name:22} {tally.calls:6} calls {refused:5} refused {tally.share:5.1f} %{apart}"
     for (kind, action, reason), count in tally.refused.most_common(most):
         yield f"    {count:4} {kind:12} {action:28} {reason[:170]}"
 
@@ -160,7 +171,12 @@ def main() -> int:
             print("\n".join(report(name, found[name], given.most)), flush=True)
     if given.json:
         rows = {
-            name: {"calls": one.calls, "refused": sum(one.refused.values()), "percent": round(one.share, 2)}
+            name: {
+                "calls": one.calls,
+                "refused": sum(one.refused.values()),
+                "percent": round(one.share, 2),
+                "overtaken": one.overtaken,
+            }
             for name, one in found.items()
         }
         print(json.dumps(rows))

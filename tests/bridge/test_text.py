@@ -70,7 +70,8 @@ def test_a_page_of_an_agent_that_can_talk(page: Any, battle: list[raw_pb2.Unit],
 
 
 def test_a_first_page_has_no_section_without_content(page: Any, unit: Make) -> None:
-    text = page("3s_vs_3z", "CombatGroupSmac", [unit(1, "Stalker", 16, 16)])
+    units = [unit(1, "Stalker", 16, 16), unit(2, "Zealot", 20, 16, alliance="enemy")]
+    text = page("3s_vs_3z", "CombatGroupSmac", units)
     headings = [line for line in text.splitlines() if line and not line.startswith(" ")]
     assert headings == ["Game", "Team Stalker-1", "Unit knowledge", "Valid actions", "Arguments", "Task", "Answer"]
 

@@ -23,6 +23,8 @@ REACH = 4.0
 """World units: an enemy is in reach if it is at most this much farther than the team's nearest one."""
 SCREEN_CENTRE = (12.0, 12.0)
 MAP_CENTRE = (32.0, 32.0)
+HOSTILE = ("Attack", "Storm", "Feedback", "Beam")
+"""Words in the names of actions at enemies, for a text without descriptions."""
 MESSAGE_SHARE = 0.25
 """Part of the replies in which a player with a contact writes a message."""
 
@@ -131,7 +133,8 @@ def _pools(action: TextAction, team: TextTeam, situation: Situation) -> list[lis
     own = [unit.tag for unit in team.own]
     targets = list(will.tags)
     if not targets:
-        around = team.enemies if action.name in situation.hostile else [*team.allies, *team.own]
+        hostile = action.name in situation.hostile or any(word in action.name for word in HOSTILE)
+        around = team.enemies if hostile else [*team.allies, *team.own]
         targets = [unit.tag for unit in around]
     if not action.name.startswith("Select_"):
         return [targets] * count

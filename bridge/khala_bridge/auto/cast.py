@@ -32,13 +32,15 @@ def recall_near(ask: RuleRequest) -> list[RuleOrder]:
     """Recall the units around the named one.
 
     Raises:
-        NotAvailable: no unit can.
+        NotAvailable: no unit can, or the named one is no unit that could be recalled itself.
     """
-    _, where = _target(ask)
-    if where is None:
-        raise NotAvailable("unknown_target", "Name the unit around which the others are recalled by its tag.")
-    unit = caster(ask, where)
-    return [RuleOrder(ask.function, (unit.tag,), where)]
+    named = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
+    if named is None or not named.is_own or is_structure(named):
+        raise NotAvailable(
+            "invalid_target", f"{hex(ask.tag or 0)} is no unit of yours; name the one around which all are recalled."
+        )
+    unit = caster(ask, place(named))
+    return [RuleOrder(ask.function, (unit.tag,), place(named))]
 
 
 def stop_building(ask: RuleRequest) -> list[RuleOrder]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Final
 
 from khala_bridge.auto.cast import caster
-from khala_bridge.auto.rule import RuleOrder, not_available
+from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.knowledge import abilities, knowledge
 from khala_bridge.rules import price_of
 from khala_bridge.state.side import ability, finished, is_structure, name, place
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
 BOOSTED: Final = 281
 """The game's number of the buff of Chrono Boost."""
-CHRONO: Final = "Effect_ChronoBoostEnergyCost_screen"
+MAKING: Final = frozenset({"train", "research", "warp_in"})
+"""Kinds of abilities that Chrono Boost speeds up."""
 WARP: Final = "TrainWarp_Zealot_screen"
 """The ability that a WarpGate always has unless it recharges."""
 
@@ -49,6 +51,21 @@ def chrono_research(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: no structure does, or no Nexus can.
     """
     return _boost(ask, researching(ask))
+
+
+def chrono_unit(ask: RuleRequest) -> list[RuleOrder]:
+    """Boost the named structure.
+
+    Raises:
+        NotAvailable: it is no finished structure that makes anything, or no Nexus can.
+    """
+    unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
+    if unit is None or unit.build_progress < 1 or not makes_something(name(unit)):
+        what = hex(ask.tag or 0) if unit is None else f"{name(unit)} {hex(unit.tag)}"
+        raise NotAvailable(
+            "invalid_target", f"The {what} is no finished structure that trains, researches or warps in; name one."
+        )
+    return _boost(ask, [unit])
 
 
 def training_workers(ask: RuleRequest) -> list[Unit]:
@@ -86,6 +103,21 @@ def working(ask: RuleRequest) -> list[Unit]:
     """Return every structure that works or recharges and is not boosted yet; it may be none."""
     found = [unit for unit, facts in _at_work(ask) if facts.does == "train" or facts.researches is not None]
     return [unit for unit in (*found, *_recharging(ask)) if BOOSTED not in unit.buff_ids]
+
+
+def boostable(ask: RuleRequest) -> list[Unit]:
+    """Return the finished structures that the game takes as targets; it may be none."""
+    return [unit for unit in finished(ask.snapshot.own) if makes_something(name(unit))]
+
+
+@functools.cache
+def makes_something(unit_type: str) -> bool:
+    """Return True if units of a type are structures that train, research or warp in."""
+    known = knowledge().get(unit_type)
+    if known is None or not known.structure:
+        return False
+    facts = (abilities()[number] for number in known.ability_ids if number in abilities())
+    return any(one.does in MAKING or one.researches is not None for one in facts)
 
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:

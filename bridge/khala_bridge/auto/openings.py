@@ -13,14 +13,14 @@ import numpy as np
 
 from khala_bridge.auto.aims import aim_of, unfit
 from khala_bridge.auto.build import NEAR, free_geysers, is_gas, nearest_base, structure_of
-from khala_bridge.auto.chrono import CHRONO, working
+from khala_bridge.auto.chrono import boostable, working
 from khala_bridge.auto.rule import NotAvailable, RuleRequest
 from khala_bridge.auto.sites import NO_ORDERS, footprint_need, legal, on_corner
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, WorldPoint
 from khala_bridge.state.ground import land_of, sites
 from khala_bridge.state.ground.land import SEEN_NOW
-from khala_bridge.state.side import finished, is_structure, own_structures, place
+from khala_bridge.state.side import is_structure, own_structures, place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -70,11 +70,13 @@ def _with_power(ask: RuleRequest) -> list[Unit]:
 
 
 def _castable(ask: RuleRequest) -> list[Unit]:
-    """Return the units that an ability can be aimed at; for Chrono Boost the structures at work, if there are any."""
-    if ask.function.name == CHRONO:
-        return working(ask) or finished(own_structures(ask.snapshot))
     known = ask.snapshot.units.values()
     return [unit for unit in known if not unit.is_enemy and unfit(ask.action, aim_of(unit)) is None]
+
+
+def _to_boost(ask: RuleRequest) -> list[Unit]:
+    """Return the structures at work that are not boosted; if there are none, those that could work."""
+    return working(ask) or boostable(ask)
 
 
 def _own_units(ask: RuleRequest) -> list[Unit]:
@@ -130,6 +132,7 @@ _TARGETS: Final[dict[str, Callable[[RuleRequest], list[Unit]]]] = {
     "cancel_building": _unfinished,
     "warp_near": _with_power,
     "cast": _castable,
+    "chrono_unit": _to_boost,
     "recall_near": _own_units,
     "build_near": _near_which,
     "lock_base": _of_bases,

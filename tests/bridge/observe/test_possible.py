@@ -59,7 +59,7 @@ RICH = {"minerals": 1000, "vespene": 1000, "food_used": 10, "food_cap": 50}
 
 
 def test_an_action_is_valid_if_some_unit_of_the_team_can_do_it(unit: Any, team: Any) -> None:
-    units = [unit(1, "Stalker", 16, 16), unit(2, "Stalker", 17, 16)]
+    units = [unit(1, "Stalker", 16, 16), unit(2, "Stalker", 17, 16), unit(3, "Zealot", 20, 16, alliance="enemy")]
     given = {1: able("Attack_screen"), 2: able("Attack_screen", "Effect_Blink_screen")}
     view = team(units, abilities=given, upgrades=(87,))
     assert names(view) == ["Attack_Unit", "No_Operation", "Ability_Blink_Screen"]
@@ -79,7 +79,7 @@ def test_what_another_type_of_the_team_can_do_counts_only_if_it_is_listed_for_it
 
 
 def test_without_the_games_word_nothing_is_barred_that_is_not_known_to_be(unit: Any, team: Any) -> None:
-    view = team([unit(1, "Stalker", 16, 16)], abilities=None)
+    view = team([unit(1, "Stalker", 16, 16), unit(3, "Zealot", 20, 16, alliance="enemy")], abilities=None)
     assert names(view) == ["Attack_Unit", "Stop", "No_Operation"]
     assert reasons(view) == {"Ability_Blink_Screen": "Blink is not researched"}
 
