@@ -114,13 +114,8 @@ class Targets:
             )
         return point
 
-    def instead(self, said: Recognised, place: WorldPoint) -> str:
-        """Return a valid place as the end of a sentence: on the team's screen if it is there, else on the minimap."""
-        camera = self._camera_now(said)
-        if camera is not None:
-            x, y = camera.screen(place.x, place.y)
-            if 0 <= x < camera.size and 0 <= y < camera.size:
-                return f"; the nearest free place is [{round(x, 1):g}, {round(y, 1):g}]"
+    def instead(self, place: WorldPoint) -> str:
+        """Return a valid place as the end of a sentence, on the minimap: screens move on before this is read."""
         x, y = self._observation.map.minimap(place.x, place.y)
         return f"; the nearest free place is at [{round(x, 1):g}, {round(y, 1):g}] of the minimap"
 
@@ -147,11 +142,7 @@ class Targets:
         x, y = self._in_frame(said, "screen", camera.size, "minimap", self._observation.map.minimap_size)
         point = camera.world(ScreenPoint(x, y))
         if not self._observation.map.holds(point):
-            now = self._camera_now(said) or camera
-            x0, y0, x1, y1 = (f"{round(value, 1):g}" for value in now.bounds(self._observation.map))
-            verb = "is" if now == camera else "is now"
-            inside = f"for team {name} x {verb} from {x0} to {x1} and y from {y0} to {y1}"
-            raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {inside}.")
+            raise CallRejected("out_of_bounds", f"[{x:g}, {y:g}] lies beyond the edge of the map; {self._playable()}.")
         return point
 
     def _minimap_point(self, said: Recognised) -> WorldPoint:
@@ -159,10 +150,13 @@ class Targets:
         x, y = self._in_frame(said, "minimap", self._observation.map.minimap_size, "screen", screen)
         point = self._observation.map.world(MinimapPoint(x, y))
         if not self._observation.map.holds(point):
-            raise CallRejected(
-                "out_of_bounds", f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the playable map."
-            )
+            what = f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the map"
+            raise CallRejected("out_of_bounds", f"{what}; {self._playable()}.")
         return point
+
+    def _playable(self) -> str:
+        x0, y0, x1, y1 = (f"{round(value, 1):g}" for value in self._observation.map.bounds)
+        return f"on the minimap it is x {x0} to {x1}, y {y0} to {y1}"
 
     def _in_frame(self, said: Recognised, frame: str, size: float, other: str, its_size: float) -> tuple[float, float]:
         assert said.point is not None  # recognised by its form

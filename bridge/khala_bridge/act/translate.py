@@ -143,7 +143,7 @@ class Translator:
         try:
             return RULES[rule](RuleRequest(said.action, self._snapshot, self.ledger, units, tag, point))
         except NotAvailable as impossible:
-            better = "" if impossible.place is None else self._targets.instead(said, impossible.place)
+            better = "" if impossible.place is None else self._targets.instead(impossible.place)
             raise CallRejected(impossible.reason, impossible.message.removesuffix(".") + better + ".") from None
 
     def _as_said(self, said: Recognised) -> list[RuleOrder]:

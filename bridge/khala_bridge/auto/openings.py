@@ -14,6 +14,7 @@ import numpy as np
 from khala_bridge.auto.aims import aim_of, unfit
 from khala_bridge.auto.build import NEAR, free_geysers, is_gas, nearest_base, structure_of
 from khala_bridge.auto.chrono import boostable, working
+from khala_bridge.auto.places import is_held
 from khala_bridge.auto.rule import NotAvailable, RuleRequest
 from khala_bridge.auto.sites import NO_ORDERS, footprint_need, legal, on_corner
 from khala_bridge.auto.warp import fields
@@ -99,7 +100,7 @@ def _of_bases(ask: RuleRequest, land: Land | None = None) -> list[Unit]:
     land = land or land_of(ask.snapshot)
     structure = structure_of(ask)
     footprint, allowed = footprint_need(structure), legal_now(land, structure)
-    free = [base for base in land.bases if allowed[footprint.cell(*base.place)]]
+    free = [base for base in land.bases if allowed[footprint.cell(*base.place)] and not is_held(land, base.place)]
     resources = [*land.standing("mineral_field"), *land.standing("geyser")]
     found = []
     for base in free:

@@ -111,7 +111,7 @@ def free_base(ask: RuleRequest, land: Land, structure: str) -> WorldPoint:
     footprint = footprint_need(structure)
     allowed = legal(land, ask.ledger, structure)
     places = [
-        base.place for base in land.bases if allowed[footprint.cell(*base.place)] and not _is_held(land, base.place)
+        base.place for base in land.bases if allowed[footprint.cell(*base.place)] and not is_held(land, base.place)
     ]
     ways = [land.ground.ways_from(place(hall)) for hall in land.own_halls]
 
@@ -124,7 +124,7 @@ def free_base(ask: RuleRequest, land: Land, structure: str) -> WorldPoint:
     return min(reached, key=way)
 
 
-def _is_held(land: Land, place_: WorldPoint) -> bool:
+def is_held(land: Land, place_: WorldPoint) -> bool:
     """Return True if a town hall stands at or near a place, or if it is an unseen start of an enemy."""
     unseen = not land.sight[int(place_.x), int(place_.y)]
     begun = unseen and any(math.dist(start, place_) < OWN_GAS for start in land.ground.starts)

@@ -20,6 +20,7 @@ from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_i
 from khala_bridge.game.meeting import env_of
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
+from khala_bridge.state.grid import NO_GRID
 from khala_protocol.files import MB, read_limited
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from khala_bridge.game.env import Launched
     from khala_bridge.game.invitation import Invitation
     from khala_bridge.state import EpisodeInfo, Snapshot
+    from khala_bridge.state.grid import Grid
 
 _PLACING_LOOPS = 16
 """Loops that a map's script may take until it places the first unit; the battles need none or one."""
@@ -66,6 +68,7 @@ class PySC2Game:
         self._episode = 0
         self._ended = True
         self._maps: tuple[EpisodeInfo, ...] = ()
+        self._creep: list[Grid] = []
         check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
@@ -93,6 +96,7 @@ class PySC2Game:
             steps = self._env.reset()
             self._episode += 1
             self._maps = tuple(map(read_info, self._env.game_info))
+            self._creep = [NO_GRID] * len(self._maps)
             snapshots = self._snapshots(steps)
             for _ in range(_PLACING_LOOPS):
                 if all(snapshot.own or snapshot.ended for snapshot in snapshots):
@@ -144,8 +148,10 @@ class PySC2Game:
                     dead=earlier.dead if earlier else frozenset(),
                     errors=earlier.errors if earlier else (),
                     ended=bool(step.last()),
+                    creep=self._creep[index],
                 )
             )
+            self._creep[index] = made[-1].creep
         self._ended = made[0].ended
         if made[0].outcome == "win" and self._env.forfeit:
             made[0] = dataclasses.replace(made[0], forfeit=self._env.forfeit)

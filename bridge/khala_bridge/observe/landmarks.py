@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from khala_bridge.auto.places import is_held
 from khala_bridge.observe.body import rounded
 from khala_bridge.observe.chronicle import PASSING, is_structure
 from khala_bridge.observe.scene import on_screen, screen_of
@@ -54,9 +55,8 @@ def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
 def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
     """Yield free places for a base, the nearest to the own bases first, then the free geysers of own bases."""
     land = land_of(scene.snapshot)
-    halls = [unit.pos for unit in land.halls]
     own = [unit.pos for unit in land.own_halls]
-    free = [base.place for base in land.bases if _nearest(base.place, halls) > BASE_TAKEN]
+    free = [base.place for base in land.bases if not is_held(land, base.place)]
     fields = [body for body in scene.resources if "Mineral" in body.name]
     for place in sorted(free, key=lambda place: (_nearest(place, own), place))[:MAX_PLACES]:
         yield from _base(scene, place, fields, own)

@@ -37,11 +37,11 @@ class GamePictures:
 
     def layer(self, name: str) -> NDArray[np.int32] | None:
         """Return a feature layer of the screen by the API's name, (height, width), values unchanged."""
-        return _values(getattr(self._observation.feature_layer_data.renders, name, None))
+        return _known(self._observation.feature_layer_data.renders, name)
 
     def minimap_layer(self, name: str) -> NDArray[np.int32] | None:
         """Return a feature layer of the minimap by the API's name, (height, width), values unchanged."""
-        return _values(getattr(self._observation.feature_layer_data.minimap_renders, name, None))
+        return _known(self._observation.feature_layer_data.minimap_renders, name)
 
     def layer_pixel(self, name: str, column: int, row: int) -> int | None:
         """Return one value of a feature layer of the screen, without decoding the others; whole bytes only."""
@@ -51,6 +51,13 @@ class GamePictures:
             return None
         start = (row * image.size.x + column) * width
         return int.from_bytes(image.data[start : start + width], "little")
+
+
+def _known(layers: Any, name: str) -> NDArray[np.int32] | None:
+    """Return a feature layer; creep only where the player has ever been, since the game sends that of the whole map."""
+    values = _values(getattr(layers, name, None))
+    sight = _values(layers.visibility_map) if name == "creep" and values is not None else None
+    return values if values is None or sight is None else values * (sight > 0)
 
 
 def _colours(image: common_pb2.ImageData) -> NDArray[np.uint8] | None:

@@ -22,6 +22,7 @@ from khala_bridge.frames import WorldPoint
 from khala_bridge.knowledge import knowledge
 from khala_bridge.names import unit_name, upgrade_name
 from khala_bridge.state.episode import EpisodeInfo, PictureSizes
+from khala_bridge.state.fog import known_creep
 from khala_bridge.state.grid import NO_GRID, Grid
 from khala_bridge.state.pictures import GamePictures
 from khala_bridge.state.snapshot import ActionError, Effect, PlayerScore, PlayerState, PowerSource, Snapshot
@@ -80,6 +81,7 @@ def read_snapshot(
     errors: tuple[ActionError, ...] = (),
     ended: bool = False,
     outcome: Outcome | None = None,
+    creep: Grid | None = None,
 ) -> Snapshot:
     """Return the snapshot of an observation.
 
@@ -92,13 +94,14 @@ def read_snapshot(
         errors: refusals of the game in these.
         ended: whether the episode is over.
         outcome: the player's result, if the response does not have it.
+        creep: of the snapshot before, `NO_GRID` for the first one; None if nobody remembers what was seen.
     """
     observation = response.observation
     raw = observation.raw_data
     known = _units(raw.units)
     units = {tag: unit for tag, unit in known.items() if unit.display_type is not _REMEMBERED}
     player = _player(observation.player_common)
-    camera = raw.player.camera
+    camera, visibility = raw.player.camera, _grid(raw.map_state.visibility)
     return Snapshot(
         info=info,
         game_loop=observation.game_loop,
@@ -112,8 +115,8 @@ def read_snapshot(
         effects=tuple([_effect(effect) for effect in raw.effects]),
         alerts=tuple(map(_alert, observation.alerts)),
         camera=WorldPoint(camera.x, camera.y),
-        creep=_grid(raw.map_state.creep),
-        visibility=_grid(raw.map_state.visibility),
+        creep=known_creep(_grid(raw.map_state.creep), visibility, creep),
+        visibility=visibility,
         pictures=GamePictures(observation),
         abilities=abilities,
         functions=functions,

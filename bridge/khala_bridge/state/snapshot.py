@@ -113,7 +113,7 @@ class Snapshot:
     camera: WorldPoint
     """The middle of the game's own screen."""
     creep: Grid
-    """1 where creep is."""
+    """1 where the player knows of creep: where it sees it, or saw it last."""
     visibility: Grid
     """2 where the player sees now, 1 where it once saw, 0 elsewhere."""
     pictures: GamePictures = field(repr=False, compare=False)

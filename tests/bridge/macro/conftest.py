@@ -16,6 +16,7 @@ from khala_bridge.knowledge import knowledge
 from khala_bridge.names import unit_name
 from khala_bridge.state import Snapshot, Unit, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
+from khala_bridge.state.grid import NO_GRID
 from khala_bridge.state.means import ledger_of
 from khala_simulator.process.client import Client, command, interface
 
@@ -35,6 +36,7 @@ class Game:
     def __init__(self, map_name: str, race: str, enemy: str, seed: int) -> None:
         self.client = Client()
         self.fed = False
+        self.creep = NO_GRID
         self.client.ask(
             create_game=sc.RequestCreateGame(
                 local_map=sc.LocalMap(map_path=map_name),
@@ -52,7 +54,8 @@ class Game:
     def see(self) -> Snapshot:
         """Look at the game, and begin a new turn with a new ledger."""
         self.response = response = self.client.observe()
-        blind = read_snapshot(response, self.info)
+        blind = read_snapshot(response, self.info, creep=self.creep)
+        self.creep = blind.creep
         answer = self.client.ask(query=question(blind)).query
         self.snapshot = dataclasses.replace(blind, abilities=available(answer))
         self.ledger = ledger_of(self.snapshot)

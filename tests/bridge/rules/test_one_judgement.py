@@ -252,7 +252,8 @@ GROUND = re.compile(
 )
 """Words about the place or the target, which are not judged before there is one."""
 NO_TARGET = re.compile(
-    "^(no (room|free|enemy|unit that fits|place|power field with|mineral field|army|base)|nothing|needs two|every finished)"
+    "^(no (room|free|enemy|unit that fits|place|power field with|mineral field|army|base)|nothing|needs two"
+    "|every finished)"
 )
 """Reasons about the place or the target: the refusal is about the one that was named."""
 MEANINGS = (
