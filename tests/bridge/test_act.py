@@ -277,7 +277,7 @@ REFUSED = [
     (
         "<Move_Screen([1.5, 4])>",
         "out_of_bounds",
-        "[1.5, 4] lies beyond the edge of the map; for team Stalker-1 x is from 2 to 24 and y from 0 to 22.",
+        "[1.5, 4] lies beyond the edge of the map; on the minimap it is x 0 to 64, y 0 to 64.",
     ),
     ("<Move_Minimap([65, 4])>", "out_of_bounds", "[65, 4] is outside of the minimap: x and y are from 0 to 64."),
     (

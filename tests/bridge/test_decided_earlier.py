@@ -8,10 +8,8 @@ import pytest
 
 from khala_bridge.act import Actor, JointAction
 from khala_bridge.act.actor import fate
-from khala_bridge.act.recognise import Recognised
 from khala_bridge.act.screen import ScreenExecutor
 from khala_bridge.act.targets import Targets
-from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
 from khala_bridge.observe import Observer
@@ -173,22 +171,20 @@ def test_words_that_were_never_right_do_not_make_a_decision_adapted(late: Any) -
 EDGE = {S1: ("Stalker", 90.0, 90.0), S2: ("Stalker", 91.0, 90.0)}
 
 
-def test_a_refusal_tells_of_the_screen_that_the_agent_sees_next(late: Any) -> None:
+def test_a_refusal_tells_of_the_minimap_since_screens_move_on(late: Any) -> None:
     joint = late(said("<Move_Screen([20, 12])>"), then=EDGE, moved={S1: ("Stalker", 92, 86)})
     (fault,) = joint.rejections["A"]
-    inside = (
-        "for team Stalker-1 x is now from 0 to 16 and y from 2 to 24"  # around [92, 86]; it was from 0 to 18, 6 to 24
-    )
+    inside = "on the minimap it is x 0 to 64, y 0 to 64"
     assert fault.message == f"[20, 12] lies beyond the edge of the map; {inside}."
 
 
-def test_a_free_place_is_told_on_the_screen_that_the_agent_sees_next(task: Any, moments: Any) -> None:
+def test_a_free_place_is_named_on_the_minimap_since_screens_move_on(task: Any, moments: Any) -> None:
     observer = Observer(task("2s3z", agents=(ARMY,)))
     first, _, now = moments(moved={S1: ("Stalker", 50, 50)})
-    (team,) = (team for team in observer.observe(first).agents["A"].teams if team.view.name == "Stalker-1")
-    call = Recognised(parse("<Stop()>").calls[0], catalogue()["Stop"], team, (), None)
-    place = WorldPoint(51, 50)
-    assert Targets(observer.observe(now)).instead(call, place) == "; the nearest free place is [13, 12]"
+    observer.observe(first)
+    seen = observer.observe(now)
+    where = ", ".join(f"{round(value, 1):g}" for value in seen.map.minimap(51, 50))
+    assert Targets(seen).instead(WorldPoint(51, 50)) == f"; the nearest free place is at [{where}] of the minimap"
 
 
 def test_the_real_camera_goes_to_the_living_head_of_the_team_that_was_meant(task: Any, moments: Any) -> None:

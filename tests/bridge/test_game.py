@@ -20,6 +20,7 @@ from khala_bridge.game import pysc2_game
 from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Patience, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
+from khala_bridge.state.grid import NO_GRID
 from khala_bridge.task.maps import known_maps
 from khala_bridge.task.opponent import Opponent
 from khala_protocol.errors import KhalaError
@@ -211,6 +212,7 @@ def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[St
     env = StubEnv(last_loop)
     game._env, game._ended, game._asks = env, False, False
     game._maps = (EpisodeInfo(), EpisodeInfo())
+    game._creep = [NO_GRID, NO_GRID]
     return env, game.act([plan(steps) for steps in plans])
 
 

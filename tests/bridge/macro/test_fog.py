@@ -1,7 +1,8 @@
 """Nothing unseen leaks: two games that differ only under the fog look the same to every kind of agent.
 
 In both of them enemy structures, creep and units stand where the player never looked: at a free base place, and on the
-screen of a worker that does not see that far, or else far away. Texts, pictures, offers, and what becomes of calls must be equal.
+screen of a worker that does not see that far, or else far away. Texts, pictures, offers, and what becomes of calls must
+be equal.
 """
 
 from __future__ import annotations

@@ -187,6 +187,7 @@ def test_terran_builds_nothing_on_creep(make_game: Callable[..., Game]) -> None:
     game = make_game("Flat64", "terran", enemy="zerg")
     rich(game)
     land_on_creep = WorldPoint(13.5, 44.5)
+    game.put("Raven", *land_on_creep)  # creep that nobody has seen is no reason
     said = game.refusal(
         "Build_SupplyDepot_Screen",
         units=(game.own("SCV")[0].tag,),
