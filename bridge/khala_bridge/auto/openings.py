@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_bridge.auto.aims import aim_of, unfit
-from khala_bridge.auto.build import NEAR, free_geysers, is_gas, nearest_base, structure_of
+from khala_bridge.auto.build import NEAR, free_geysers, is_gas, structure_of
 from khala_bridge.auto.chrono import boostable, working
 from khala_bridge.auto.places import is_held
 from khala_bridge.auto.rule import NotAvailable, RuleRequest
@@ -96,18 +96,14 @@ def _near_which(ask: RuleRequest) -> list[Unit]:
 
 
 def _of_bases(ask: RuleRequest, land: Land | None = None) -> list[Unit]:
-    """Return a resource for each base place where the structure can stand: the nearest to its middle."""
+    """Return a mineral field for each base place where the structure can stand: the nearest to its middle."""
     land = land or land_of(ask.snapshot)
     structure = structure_of(ask)
     footprint, allowed = footprint_need(structure), legal_now(land, structure)
     free = [base for base in land.bases if allowed[footprint.cell(*base.place)] and not is_held(land, base.place)]
-    resources = [*land.standing("mineral_field"), *land.standing("geyser")]
-    found = []
-    for base in free:
-        unit = min(resources, key=lambda unit: (math.dist(place(unit), base.place), unit.tag), default=None)
-        if unit is not None and nearest_base(land, unit) == base:
-            found.append(unit)
-    return _nearest_first(land, found)
+    fields = {(round(unit.pos.x, 3), round(unit.pos.y, 3)): unit for unit in land.standing("mineral_field")}
+    nearest = (min(base.fields, key=lambda at: (math.dist(at, base.place), at)) for base in free if base.fields)
+    return _nearest_first(land, (fields[at] for at in nearest if at in fields))
 
 
 def _nearest_first(land: Land, units: Iterable[Unit]) -> list[Unit]:
@@ -175,21 +171,20 @@ def openings(action: Action, snapshot: Snapshot, camera: Camera, world: MapFrame
 
 def _spread(land: Land, structure: str, camera: Camera, world: MapFrame, most: int) -> list[WorldPoint]:
     """Return free places that do not overlap, out of the workers' ways if there are any."""
-    footprint = footprint_need(structure)
-    x0, y0 = max(math.ceil(camera.x - HALF), 0), max(math.ceil(camera.y - HALF), 0)
-    part = np.s_[x0 : math.floor(camera.x + HALF), y0 : math.floor(camera.y + HALF)]
+    footprint, reach = footprint_need(structure), HALF - EDGE
+    left, bottom, right, top = world.playable
+    x0, y0 = max(math.ceil(max(camera.x - reach, left)), 0), max(math.ceil(max(camera.y - reach, bottom)), 0)
+    part = np.s_[x0 : math.floor(min(camera.x + reach, right)), y0 : math.floor(min(camera.y + reach, top))]
     allowed = legal_now(land, structure)[part]
     aside = allowed & ~land.kept[part]
-    cells = np.argwhere(aside if aside.any() else allowed) + np.array([x0, y0])
-    order = np.argsort(np.hypot(*(cells + 0.5 - (camera.x, camera.y)).T), kind="stable")
-    apart, found = max(footprint.size) + 1, list[tuple[int, int]]()
-    for x, y in cells[order].tolist():
-        clear = all(max(abs(x - i), abs(y - j)) >= apart for i, j in found)
-        if clear and _shows(camera, world, footprint.middle((x, y))):
-            found.append((x, y))
-            if len(found) == most:
-                break
-    return [footprint.middle(cell) for cell in found]
+    cells = np.argwhere(aside if aside.any() else allowed)
+    away = np.hypot(cells[:, 0] + x0 + 0.5 - camera.x, cells[:, 1] + y0 + 0.5 - camera.y)
+    cells = cells[np.argsort(away, kind="stable")]
+    found: list[WorldPoint] = []
+    while len(cells) and len(found) < most:
+        found.append(footprint.middle((int(cells[0, 0]) + x0, int(cells[0, 1]) + y0)))
+        cells = cells[np.abs(cells - cells[0]).max(axis=1) > max(footprint.size)]
+    return found
 
 
 def _shows(camera: Camera, world: MapFrame, at: WorldPoint) -> bool:

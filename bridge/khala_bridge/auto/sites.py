@@ -75,10 +75,39 @@ def any_good(land: Land, structure: str) -> bool:
     site, footprint = sites()[structure], footprint_need(structure)
     key = site.ground, site.clear, site.seen, footprint.rows
     if key not in land.answers:
-        ground = _ground(land, NO_ORDERS, structure) & ~land.kept & (land.sight > 0)
-        land.answers[key] = bool((_fitting(land, structure, ground) & _reached(land)).any())
+        land.answers[key] = _is_good(land, structure, _good_before.get(key)) or _find_good(land, structure, key)
     found: bool = land.answers[key]
     return found
+
+
+_good_before: dict[object, tuple[int, int]] = {}
+"""By needs, a cell that was good last: most often it still is, and the map need not be searched; never the answer."""
+
+
+def _find_good(land: Land, structure: str, key: object) -> bool:
+    ground = _ground(land, NO_ORDERS, structure) & ~land.kept & (land.sight > 0)
+    cells = np.argwhere(_fitting(land, structure, ground) & _reached(land))
+    if len(cells):
+        x, y = cells[len(cells) // 2].tolist()
+        _good_before[key] = x, y
+    return bool(len(cells))
+
+
+def _is_good(land: Land, structure: str, cell: tuple[int, int] | None) -> bool:
+    """Return True if `good` marks a cell, by a look at the cells under the structure alone; not for town halls."""
+    site, footprint = sites()[structure], footprint_need(structure)
+    if (
+        cell is None
+        or site.clear
+        or not all(land.ground.holds(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells)
+    ):
+        return False
+    x, y = np.array(footprint.cells).T + np.array(cell)[:, None]
+    ground = land.free[x, y] & ~land.kept[x, y] & (land.sight[x, y] >= (SEEN_NOW if site.seen else 1))
+    if site.ground != "any":
+        ground &= land.creep[x, y] == (site.ground == "creep")
+    powered = site.ground != "powered" or bool(land.powered(corner=on_corner(structure))[cell])
+    return bool(ground.all()) and powered and bool(_reached(land)[cell])
 
 
 def good(land: Land, ledger: Ledger, structure: str) -> Bools:

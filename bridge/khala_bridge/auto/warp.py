@@ -49,7 +49,7 @@ def fields(snapshot: Snapshot) -> tuple[PowerField, ...]:
     if fields not in land.answers:
         ledger = ledger_of(snapshot)
         land.answers[fields] = tuple(
-            PowerField(source.tag, _is_fast(snapshot, source), _room(snapshot, ledger, source) is not None)
+            PowerField(source.tag, _is_fast(snapshot, source), bool(_free(snapshot, ledger, source).any()))
             for source in land.power_sources
         )
     found: tuple[PowerField, ...] = land.answers[fields]
@@ -144,11 +144,17 @@ def _is_fast(snapshot: Snapshot, source: PowerSource) -> bool:
 def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int, int] | None:
     """Return the nearest cell to a source where a unit touches no other; cells with free neighbours come first."""
     land = land_of(snapshot)
-    ground = land.open & ~promised(land, ledger)
-    free = ground & land.powered(corner=False, by=source.tag) & ~_bodies(snapshot, land, source)
+    free = _free(snapshot, ledger, source)
     away = near(land, [WorldPoint(source.pos.x, source.pos.y)])
-    airy = free & everywhere(ground, BESIDE)
+    airy = free & everywhere(land.open & ~promised(land, ledger), BESIDE)
     return best(airy & ~land.kept, away) or best(airy, away) or best(free, away)
+
+
+def _free(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> Bools:
+    """Return the cells (w, h) of a field where a unit touches no other."""
+    land = land_of(snapshot)
+    field = land.powered(corner=False, by=source.tag) & land.open
+    return field & ~promised(land, ledger) & ~_bodies(snapshot, land, source)
 
 
 def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:
