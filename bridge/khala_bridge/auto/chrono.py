@@ -9,6 +9,7 @@ from khala_bridge.auto.cast import caster
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
 from khala_bridge.knowledge import abilities, knowledge
 from khala_bridge.rules import price_of
+from khala_bridge.state.ground import land_of
 from khala_bridge.state.side import ability, finished, is_structure, name, place
 
 if TYPE_CHECKING:
@@ -122,7 +123,15 @@ def makes_something(unit_type: str) -> bool:
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
     """Return the finished own structures with their work, those with the most work left first."""
-    busy = [unit for unit in finished(ask.snapshot.own) if is_structure(unit) and unit.orders]
+    answers = land_of(ask.snapshot).answers
+    if _at_work not in answers:
+        answers[_at_work] = _find_at_work(ask)
+    found: list[tuple[Unit, AbilityFacts]] = answers[_at_work]
+    return found
+
+
+def _find_at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
+    busy = [unit for unit in finished(ask.snapshot.own) if unit.orders and is_structure(unit)]
     found = [(unit, abilities().get(unit.orders[0].ability_id)) for unit in busy]
     known = [(unit, facts) for unit, facts in found if facts is not None]
     return sorted(known, key=lambda work: (work[0].orders[0].progress, work[0].tag))
