@@ -2,6 +2,7 @@
 
     snapshot   `Snapshot`, one per player and step        unit       `Unit` and `UnitOrder`
     episode    `EpisodeInfo`, one per episode             grid       creep, sight and ground as sent
+    fog        creep as the player knows it
     read       messages of the SC2 API → these values     pictures   the game's own pixels
 
 Below are names, frames and the knowledge of types. Above is everything that observes or acts; it reads no messages.

@@ -210,3 +210,38 @@ def test_what_a_worker_is_on_its_way_to_build_is_promised(unit: Any, look: Any, 
     line = "    Minerals: 150, vespene: 75 (150 minerals of it for what workers are on their way to build)\n"
     assert line in developer.text
     assert reasons(developer.view.teams[0])["Train_Probe"] == "50 minerals too few"
+
+
+# --- what a rule would find, and which arguments will do ------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("action", "lack"),
+    [
+        ("All_Units_Attack", "no army"),
+        ("All_Units_Retreat", "no army"),
+        ("Build_Assimilator", "no free geyser at your bases"),
+        ("Build_Gateway", "no room in the field of a Pylon"),
+        ("ChronoBoost_Military", "nothing to boost"),
+        ("Stop_Building_Unit", "nothing to call off"),
+    ],
+)
+def test_what_no_rule_would_find_is_not_offered(action: str, lack: str, unit: Any, team: Any, plain: Any) -> None:
+    units = [unit(1, "Probe", 16, 16), unit(2, "Nexus", 10.5, 10.5, energy=100.0), unit(3, "Gateway", 20.5, 10.5)]
+    could = ("Attack_screen", "Move_screen", "Build_Assimilator_screen", "Build_Gateway_screen")
+    given = dict.fromkeys((1, 2, 3), able(*could, "Effect_ChronoBoostEnergyCost_screen", "Cancel_Last_quick"))
+    view = team(
+        [*units, unit(4, "Pylon", 28, 28, build_progress=0.5)], action, abilities=given, player=RICH, change=plain
+    )
+    assert reasons(view) == {action: lack}
+
+
+def test_the_units_and_the_targets_that_will_do_are_named(unit: Any, team: Any) -> None:
+    zealots = [unit(1, "Zealot", 16, 16), unit(2, "Zealot", 17, 16)]
+    foes = [unit(3, "Roach", 19, 16, alliance="enemy"), unit(4, "Mutalisk", 20, 16, alliance="enemy", is_flying=True)]
+    given = {1: able("Attack_screen"), 2: able("Attack_screen")}
+    assert [(one.action, one.tags) for one in team([*zealots, *foes], abilities=given).arguments] == [
+        ("Attack_Unit", ("0x3",))
+    ]
+    assert reasons(team([*zealots, foes[1]], abilities=given))["Attack_Unit"] == "no enemy on the screen that fits"
+    assert team([*zealots, foes[0]], abilities=given).arguments == ()
