@@ -65,6 +65,11 @@ class Tally:
         """Share of the calls that were refused, in percent."""
         return 100 * sum(self.refused.values()) / self.calls if self.calls else 0.0
 
+    @property
+    def dishonest(self) -> float:
+        """Share of the calls that were refused for what the text could have known, in percent."""
+        return 100 * (sum(self.refused.values()) - self.overtaken) / self.calls if self.calls else 0.0
+
     def add(self, kind: str, rejection: Rejection) -> None:
         """Count a refusal."""
         action = rejection.text.strip("<>").partition("(")[0]
@@ -154,7 +159,7 @@ def report(name: str, tally: Tally, most: int) -> Iterator[str]:
 
 
 def main() -> int:
-    """Play the tasks that the options name; the exit code is 1 if any has more than 2 % of refusals."""
+    """Play the tasks that the options name; the exit code is 1 if any offers more than 2 % in vain."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--task", nargs="+", default=list(TASKS), metavar="TASK", help="names of tasks")
     options.add_argument("--steps", type=int, default=STEPS, help="decisions of each game")
@@ -180,7 +185,7 @@ def main() -> int:
             for name, one in found.items()
         }
         print(json.dumps(rows))
-    return 1 if any(one.share > 2 for one in found.values()) else 0
+    return 1 if any(one.dishonest > 2 for one in found.values()) else 0
 
 
 if __name__ == "__main__":
