@@ -155,7 +155,7 @@ def test_a_rule_is_asked_with_the_units_of_the_team_and_the_point_in_the_world(
     ("place", "better"),
     [
         (None, ""),
-        (WorldPoint(15.04, 9), "; the nearest free place is [15, 13]"),
+        (WorldPoint(15.04, 9), "; the nearest free place is at [30.1, 46] of the minimap"),
         (WorldPoint(30, 30), "; the nearest free place is at [60, 4] of the minimap"),
     ],
 )
