@@ -494,8 +494,6 @@ class View(Frozen):
     others: tuple[TeamReport, ...] = ()
     landmarks: tuple[Landmark, ...] = ()
     places: tuple[Place, ...] = ()
-    playable: tuple[float, float, float, float] | None = None
-    """The part of the minimap that units can be on: x0, y0, x1, y1."""
     enemy_race: str = ""
     """What the opponent chose, `random` too."""
     army: Army | None = None

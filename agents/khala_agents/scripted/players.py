@@ -151,7 +151,7 @@ def _random_values(action: TextAction, team: TextTeam, situation: Situation, rng
             pool = next(pools)
             values.append(rng.choice([tag for tag in pool if tag not in values] or pool))
         elif kind == "minimap":
-            x0, x1, y0, y1 = situation.playable
+            x0, y0, x1, y1 = situation.playable
             values.append(point((rng.uniform(x0, x1), rng.uniform(y0, y1))))
         elif places:
             values.append(point(rng.choice(places)))

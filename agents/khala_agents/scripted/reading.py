@@ -47,13 +47,11 @@ _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTI
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
-_PLAYABLE = re.compile(rf"minimap x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _WILL_DO = re.compile(r"^    What will do for team (\S+):\n((?:        .*\n?)*)", re.MULTILINE)
 _DOES = re.compile(r"^        ([\w, ]+): ((?:unit|tag|a place) .*)", re.MULTILINE)
 _ENEMY = re.compile(r"^        (\w+): [^\n]*\benemy (?:\w+ ){0,4}(?:unit|structure) with", re.MULTILINE)
-_PLAYABLE = re.compile(rf"the playable map is x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _PRICE = re.compile(r"(\d{1,5}) (minerals|vespene|supply)", re.ASCII)
 _RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
 _SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
@@ -185,8 +183,6 @@ class Situation:
 
     teams: dict[str, TextTeam] = field(default_factory=dict)
     max_actions: int = 1
-    playable: tuple[float, float, float, float] = (0.0, 64.0, 0.0, 64.0)
-    """Part of the minimap that is the playable map: x from, to, y from, to."""
     hostile: set[str] = field(default_factory=set)
     """Names of actions whose last tag is that of an enemy."""
     correspondents: list[str] = field(default_factory=list)
@@ -223,7 +219,7 @@ class Situation:
     """The teams of other agents."""
     places: list[Place] = field(default_factory=list)
     """Places of the map, in the order of the text."""
-    playable: tuple[float, float, float, float] = (8.0, 8.0, 56.0, 56.0)
+    playable: tuple[float, float, float, float] = (0.0, 0.0, 64.0, 64.0)
     """Where on the minimap units can be: x and y of two corners."""
     alarms: list[Point] = field(default_factory=list)
     """Where on the minimap own units or structures are under attack."""
@@ -371,12 +367,6 @@ def _will(words: str) -> Will:
     return Will(units, tags, tuple(points(parts.get("a", ""))))
 
 
-def _read_arguments(situation: Situation, body: str) -> None:
-    if found := _PLAYABLE.search(body):
-        x0, x1, y0, y1 = map(float, found.groups())
-        situation.playable = x0, x1, y0, y1
-
-
 def _read_impossible(situation: Situation, body: str) -> None:
     situation.impossible = {name for names in _UNLISTED.findall(body) for name in names.split(", ")}
 
@@ -396,9 +386,6 @@ def _read_others(situation: Situation, body: str) -> None:
 
 def _read_map(situation: Situation, body: str) -> None:
     situation.places = [Place(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
-    if found := _PLAYABLE.search(body):
-        x0, x1, y0, y1 = (float(number) for number in found.groups())
-        situation.playable = (x0, y0, x1, y1)
 
 
 def _read_warping(situation: Situation, body: str) -> None:
@@ -419,6 +406,9 @@ def _read_lines(situation: Situation, body: str) -> None:
     """Read the lines that are recognised by themselves, whatever their section."""
     if found := _WRITE_TO.search(body):
         situation.correspondents = _NAME.findall(found[1])
+    if found := _PLAYABLE.search(body):
+        x0, x1, y0, y1 = map(float, found.groups())
+        situation.playable = x0, y0, x1, y1
     situation.messages += _MESSAGE.findall(body)
     situation.accepted += _ACCEPTED.findall(body)
     situation.rejected += _REJECTED.findall(body)
@@ -439,7 +429,6 @@ _READERS: dict[str, Callable[[Situation, str], None]] = {
     "Places to build at": _read_sites,
     "Valid actions": _read_valid_actions,
     "Not possible now": _read_impossible,
-    "Arguments": _read_arguments,
     "Task": _read_task,
     "Answer": _read_answer,
 }

@@ -15,7 +15,6 @@ from khala_bridge.observe.body import rounded
 from khala_bridge.observe.chronicle import PASSING, is_structure
 from khala_bridge.observe.scene import on_screen, screen_of
 from khala_bridge.state.ground import land_of
-from khala_bridge.state.ground.atlas import BASE_TAKEN
 from khala_protocol.messages import Landmark
 
 if TYPE_CHECKING:

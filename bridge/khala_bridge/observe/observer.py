@@ -129,7 +129,7 @@ class Observer:
             more["alerts"], more["warnings"] = side.alerts(scene, changes), side.warnings(changes)
         if "map" in parts:
             more["places"] = moment.episode.places.views(scene.snapshot, scene.world)
-            more["playable"], more["enemy_race"] = side.playable(scene), scene.snapshot.info.enemy_race
+            more["enemy_race"] = scene.snapshot.info.enemy_race
         if "army" in parts:
             more["army"] = army.army(scene, moment.episode.places, moment.episode.chronicle)
             more["toll"] = moment.episode.toll(agent.name)

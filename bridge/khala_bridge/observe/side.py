@@ -135,13 +135,6 @@ def _report(agent: str, name: str, bodies: Sequence[Body]) -> TeamReport:
     )
 
 
-def playable(scene: Scene) -> tuple[float, float, float, float]:
-    """Return the part of the minimap that units can be on: x0, y0, x1, y1."""
-    x0, y0, x1, y1 = scene.snapshot.info.playable
-    (left, bottom), (right, top) = scene.world.minimap(x0, y0), scene.world.minimap(x1, y1)
-    return round(left, 1), round(top, 1), round(right, 1), round(bottom, 1)
-
-
 def warp_gates(scene: Scene) -> WarpGates | None:
     """Return the number of WarpGates, and of those that can warp in now; None without WarpGates."""
     gates = [b for b in scene.bodies.values() if b.is_own and b.name == "WarpGate" and b.view.build_progress >= 1]

@@ -29,9 +29,8 @@ def map_(page: Page) -> Iterator[str]:
     yield "Map"
     if view.enemy_race:
         yield f"{INDENT}The enemy's race: {view.enemy_race}"
-    if view.playable:
-        x0, y0, x1, y1 = map(n, view.playable)
-        yield f"{INDENT}Units can be at minimap x {x0} to {x1}, y {y0} to {y1}"
+    x0, y0, x1, y1 = map(n, view.bounds)
+    yield f"{INDENT}On the minimap, the playable map is x {x0} to {x1}, y {y0} to {y1}"
     yield from listed(_PLACES, map(_place, view.places))
 
 
