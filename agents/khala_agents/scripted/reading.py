@@ -48,6 +48,7 @@ _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re
 _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
+_PLAYABLE = re.compile(rf"the playable map is x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
 _COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _WILL_DO = re.compile(r"^    What will do for team (\S+):\n((?:        .*\n?)*)", re.MULTILINE)
 _DOES = re.compile(r"^        ([\w, ]+): ((?:unit|tag|a place) .*)", re.MULTILINE)
