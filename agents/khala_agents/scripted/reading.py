@@ -27,8 +27,7 @@ _PLACE = re.compile(rf"    Minimap position: {_POINT}", re.ASCII)
 _VALID = re.compile(r"^    Team (\S+): (.*(?:\n     +<.*)*)", re.MULTILINE)
 _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
-_WRITE_TO = re.compile(r"^    You can write to:\n((?:        .*\n?)*)", re.MULTILINE)
-_NAME = re.compile(r"^        ([\w.-]+):", re.MULTILINE)
+_WRITE_TO = re.compile(r"^    You can write to: (.*)", re.MULTILINE)
 _TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
 _HIT = re.compile(r"^        own \w+ was hit: (.*)", re.MULTILINE)
@@ -49,7 +48,7 @@ _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _PLAYABLE = re.compile(rf"the playable map is x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
-_COSTS = re.compile(r"^ +(\w+): .*\bCosts ([^.;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
+_COSTS = re.compile(r"^        (\w+): (\d[^;\n]*)(?:; enough for (\d{1,4}))?", re.MULTILINE | re.ASCII)
 _WILL_DO = re.compile(r"^    What will do for team (\S+):\n((?:        .*\n?)*)", re.MULTILINE)
 _DOES = re.compile(r"^        ([\w, ]+): ((?:unit|tag|a place) .*)", re.MULTILINE)
 _ENEMY = re.compile(r"^        (\w+): [^\n]*\benemy (?:\w+ ){0,4}(?:unit|structure) with", re.MULTILINE)
@@ -406,7 +405,7 @@ def _read_answer(situation: Situation, body: str) -> None:
 def _read_lines(situation: Situation, body: str) -> None:
     """Read the lines that are recognised by themselves, whatever their section."""
     if found := _WRITE_TO.search(body):
-        situation.correspondents = _NAME.findall(found[1])
+        situation.correspondents = found[1].split(", ")
     if found := _PLAYABLE.search(body):
         x0, x1, y0, y1 = map(float, found.groups())
         situation.playable = x0, y0, x1, y1

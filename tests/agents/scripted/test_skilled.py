@@ -204,7 +204,7 @@ def side(
 ) -> str:
     return (
         f"Game\n    Time: 2:00\n    Minerals: {minerals}, vespene: 100\n    Supply: {supply} used\n\n"
-        f"Unit counts\n    {counts}\n\n{more}Valid actions\n    Team Base: {valid}\n    What they do:\n{costs}\n"
+        f"Unit counts\n    {counts}\n\n{more}Valid actions\n    Team Base: {valid}\n    What they cost:\n{costs}\n"
         "Answer\n    At most 5 actions per team.\n"
     )
 
@@ -221,7 +221,7 @@ def test_supply_is_built_before_it_is_short() -> None:
 
 
 def test_no_more_is_ordered_than_can_be_paid() -> None:
-    costs = "        Train_Zealot: fights. Costs 100 minerals, 2 supply; enough for 2.\n"
+    costs = "        Train_Zealot: 100 minerals, 2 supply, 27.1 s; enough for 2\n"
     counts = "Your units: 44 Probe (working)\n    Your structures: 1 Nexus, 3 Pylon, 8 Gateway, 1 CyberneticsCore"
     assert names(side("<Train_Zealot()>", counts, minerals=250, costs=costs)) == ["Train_Zealot"] * 2
 
@@ -257,7 +257,7 @@ def leader(army: str, *, at: str, seen: str = "none", more: str = "") -> str:
         f"Teams of other agents\n    CombatGroup0\n        Marine-1: 30 Marine at minimap {at}, 100% of health\n"
         "    CombatGroup4\n        Overlord-1: 9 Overlord at minimap [10, 10], 100% of health\n\n"
         "Task\n    Gather the groups in front of your base until they are strong enough.\n\n"
-        "Communication\n    You can write to:\n        CombatGroup0: Marines.\n        CombatGroup4: Overlords.\n\n"
+        "Communication\n    You can write to: CombatGroup0, CombatGroup4\n\n"
         "Answer\n    You have no team to order now.\n"
     )
 
@@ -296,7 +296,7 @@ def test_the_last_structures_are_looked_for_all_over_the_map() -> None:
 MARCH = (*BASIC, "Attack_Minimap(minimap)")
 MARINES = [line(n, "Marine", 12, 9 + n, health="45/45") for n in range(1, 7)]
 ATTACK = "Messages\n    Message from Commander: '''Attack [48.0, 46.0].'''\n\n"
-CONTACT = "Communication\n    You can write to:\n        Commander: It leads.\n\n"
+CONTACT = "Communication\n    You can write to: Commander\n\n"
 
 
 def test_a_group_carries_out_what_the_message_says() -> None:
@@ -359,7 +359,7 @@ def test_a_builder_builds_in_its_base_and_around_it_when_that_is_full() -> None:
 
 
 def test_a_structure_trains_one_unit_at_a_time() -> None:
-    costs = "        Train_Marine: fights. Costs 50 minerals, 1 supply; enough for 8.\n"
+    costs = "        Train_Marine: 50 minerals, 1 supply; enough for 8\n"
     counts = "Your units: 44 SCV\n    Your structures: 1 OrbitalCommand, 2 Barracks, 1 BarracksReactor, 4 SupplyDepot\n"
     counts += "    In production: Train_Marine (1 at 40%)"
     assert names(side("<Train_Marine()>", counts, costs=costs)).count("Train_Marine") == 2
@@ -368,7 +368,7 @@ def test_a_structure_trains_one_unit_at_a_time() -> None:
 def test_units_are_warped_in_at_a_phasing_prism() -> None:
     fields = "        WarpPrismPhasing 0x3 at minimap [5, 5], radius 3.75, warps in fast, no room for a unit\n"
     fields += "        Pylon 0x1 at minimap [10, 36]\n        WarpPrismPhasing 0x2 at minimap [52, 24]\n\n"
-    costs = "        Warp_Zealot_Near: warps. Costs 100 minerals, 2 supply; enough for 4.\n"
+    costs = "        Warp_Zealot_Near: 100 minerals, 2 supply; enough for 4\n"
     assert (
         calls(side("<Warp_Zealot_Near(tag)>", "Your units: 12 Probe", costs=costs, more=f"Warping in\n{fields}"))
         == ["Warp_Zealot_Near 0x2"] * 4

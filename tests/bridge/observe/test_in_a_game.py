@@ -37,7 +37,7 @@ def everybody(race: str) -> TaskConfig:
         {"name": "Commander", "kind": "commander", "teams": side},
         {"name": "Developer", "kind": "developer", "teams": side},
         {"name": "Builder", "kind": "builder", "admits": "builder", "teams": own, "actions": actions},
-        {"name": "Fighter", "kind": "combat_group", "teams": own, "actions": actions, "text_tokens": 700},
+        {"name": "Fighter", "kind": "combat_group", "teams": own, "actions": actions, "text_tokens": 550},
     ]
     task = {"name": race, "own_map": {"file": "Simple64", "race": race, "opponent": "terran"}, "task": "Win."}
     return TaskConfig.model_validate({**task, "agents": [{"role": "You play.", **agent} for agent in agents]})
@@ -129,5 +129,5 @@ def test_a_builder_is_told_where_a_base_could_stand(game: Any) -> None:
 def test_a_page_keeps_to_its_budget_in_a_game(game: Any) -> None:
     _, observations = game
     text = observations[-1].agents["Fighter"].text
-    assert tokens(text) <= 700 or "only the nearest enemies are told one by one" in text
+    assert tokens(text) <= 550 or "only the nearest enemies are told one by one" in text
     assert "Left out to keep this short" in text

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, n, point
+from khala_bridge.observe.text.words import INDENT, INDENT2, listed, n, point
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from khala_bridge.observe.text.page import Page
     from khala_protocol.messages import ActionCost, TeamView
@@ -18,24 +17,9 @@ if TYPE_CHECKING:
 
 @section("valid_actions")
 def valid_actions(page: Page) -> Iterator[str]:
-    """Show the valid actions of each team, with their effects and costs."""
+    """Show the valid actions of each team, and their costs; the briefing says what each does."""
     yield from _calls(page)
-    offers = _offers(page)
-    described = {action.name: action.description for team in page.teams for action in team.actions}
-    if described:
-        yield f"{INDENT}What they do:"
-    for name, about in described.items():
-        yield f"{INDENT2}{name}: {about}" + (f" {_price(offers[name])}" if name in offers else "")
-
-
-@shorter("valid_actions", rank=40, says="what the actions do")
-def valid_actions_in_short(page: Page) -> Iterator[str]:
-    """Show calls and costs only."""
-    yield from _calls(page)
-    offers = _offers(page)
-    if offers:
-        yield f"{INDENT}What they cost:"
-    yield from (f"{INDENT2}{name}: {_price(offer)}" for name, offer in offers.items())
+    yield from listed("What they cost:", (f"{offer.action}: {_price(offer)}" for offer in _offers(page)))
 
 
 def _calls(page: Page) -> Iterator[str]:
@@ -61,8 +45,8 @@ def _will_do(team: TeamView) -> dict[str, list[str]]:
     return found
 
 
-def _offers(page: Page) -> dict[str, ActionCost]:
-    return {offer.action: offer for team in page.teams for offer in team.offers}
+def _offers(page: Page) -> Iterable[ActionCost]:
+    return {offer.action: offer for team in page.teams for offer in team.offers}.values()
 
 
 def _price(offer: ActionCost) -> str:
@@ -73,7 +57,7 @@ def _price(offer: ActionCost) -> str:
     more = [f"enough for {offer.times}"] if offer.times > 1 else []
     more += [f"takes {offer.footprint[0]} x {offer.footprint[1]} cells of ground"] if offer.footprint else []
     more += ["you have none yet"] if offer.first else []
-    return f"Costs {'; '.join((', '.join(parts), *more))}."
+    return "; ".join((", ".join(parts), *more))
 
 
 @section("impossible")
@@ -109,30 +93,16 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
 
 @section("arguments")
 def arguments(page: Page) -> Iterator[str]:
-    """Show the notation of the valid actions' arguments."""
+    """Show where the playable map ends, for actions that take a point of it; the briefing has the rest."""
     kinds = {kind for team in page.teams for action in team.actions for kind in action.args}
-    if not kinds:
-        return
-    screen, minimap = n(page.task.frames.screen), n(page.task.frames.minimap)
-    yield "Arguments"
-    if "tag" in kinds:
-        yield f"{INDENT}tag: the tag of a unit that stands above{_example(page)}"
-    if "screen" in kinds:
-        step = n(CAMERA_WIDTH / page.task.frames.screen)
-        yield (
-            f"{INDENT}screen: [x, y] on the team's own screen, from 0 to {screen}; x grows to the right, y grows "
-            f"downwards, the team's first unit is in the middle, one step is {step} of distance"
-        )
-    if "minimap" in kinds:
-        yield (
-            f"{INDENT}minimap: [x, y] on the map of all, from 0 to {minimap}; x grows to the right, y grows downwards"
-            f"{_playable(page)}"
-        )
+    if "minimap" in kinds and not page.view.places and (words := _playable(page)):
+        yield "Arguments"
+        yield f"{INDENT}minimap: {words}"
 
 
-@shorter("arguments", rank=50, says="how arguments are written")
+@shorter("arguments", rank=50, says="where the playable map ends")
 def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
-    """Show nothing: the briefing explains the arguments as well."""
+    """Show nothing."""
     yield from ()
 
 
@@ -142,10 +112,4 @@ def _playable(page: Page) -> str:
     size = page.task.frames.minimap
     if (x0, y0, x1, y1) == (0.0, 0.0, size, size):
         return ""
-    return f"; the playable map is x {n(x0)} to {n(x1)}, y {n(y0)} to {n(y1)}"
-
-
-def _example(page: Page) -> str:
-    units = (unit.tag for team in page.teams for unit in (*team.enemies, *team.units))
-    tag = next(units, None) or next((landmark.tag for landmark in page.view.landmarks), None)
-    return f", for example {tag}" if tag else ""
+    return f"the playable map is x {n(x0)} to {n(x1)}, y {n(y0)} to {n(y1)}"

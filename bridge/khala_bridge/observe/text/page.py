@@ -57,9 +57,9 @@ class Page:
         return self.observation.view.teams
 
     @property
-    def correspondents(self) -> list[tuple[str, str]]:
-        """Names and roles of all that this agent may write to."""
-        return [(agent.name, agent.role) for agent in self.task.correspondents(self.observation.agent)]
+    def correspondents(self) -> list[str]:
+        """Names of all that this agent may write to."""
+        return [agent.name for agent in self.task.correspondents(self.observation.agent)]
 
     @property
     def channels(self) -> Sequence[str]:

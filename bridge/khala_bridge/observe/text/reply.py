@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, one_line
+from khala_bridge.observe.text.page import section
+from khala_bridge.observe.text.words import INDENT, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,28 +44,13 @@ def messages(page: Page) -> Iterator[str]:
 
 @section("communication")
 def communication(page: Page) -> Iterator[str]:
-    """Show the possible receivers of messages, and how to write to them."""
-    yield from _communication(page, with_roles=True)
-
-
-@shorter("communication", rank=90, says="what the other agents are there for")
-def communication_in_short(page: Page) -> Iterator[str]:
-    """Show names only."""
-    yield from _communication(page, with_roles=False)
-
-
-def _communication(page: Page, *, with_roles: bool) -> Iterator[str]:
-    people, channels = page.correspondents, page.channels
-    if not people and not channels:
-        return
-    yield "Communication"
-    if people:
-        yield f"{INDENT}You can write to:"
-        yield from (f"{INDENT2}{name}:{f' {one_line(role)}' if with_roles else ''}" for name, role in people)
-        yield f"{INDENT}To write: <MessageTo(name, '''text''')>"
-    if channels:
-        yield f"{INDENT}Channels, heard by all who listen: {', '.join(channels)}"
-        yield f"{INDENT}To write to all of them: <MessageTo(channel, '''text''')>; to listen: <ListenTo(channel)>"
+    """Show the possible receivers of messages; the briefing says who they are and how to write to them."""
+    if page.correspondents or page.channels:
+        yield "Communication"
+    if page.correspondents:
+        yield f"{INDENT}You can write to: {', '.join(page.correspondents)}"
+    if page.channels:
+        yield f"{INDENT}Channels: {', '.join(page.channels)}"
 
 
 def _rejection(fault: Rejection) -> str:
