@@ -37,6 +37,8 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         frames=task.frames,
         clock=task.clock,
         max_actions=task.max_actions_of(agent),
+        memory=task.memory_of(agent),
+        standing_orders=task.standing_orders,
         example=example(task, agent),
     )
 

@@ -75,6 +75,8 @@ Fate = Literal[
 Trigger = Literal["attacked", "idle", "message"]
 AgentKind = Literal["combat_group", "commander", "developer", "builder"]
 Unasked = Literal["no_units", "not_due"]
+Purpose = Literal["decision", "summary"]
+"""What a model is asked for: a reply to an observation, or a summary of the steps so far (`MemoryRule.summary`)."""
 
 
 class Frozen(BaseModel):
@@ -474,6 +476,31 @@ class WarpGates(Frozen):
     """None if the game was not asked."""
 
 
+class NoteView(Frozen):
+    """A note that an agent has written to itself."""
+
+    number: int
+    """From 1, in the order in which the agent wrote them; no other note of the episode has it."""
+    time_s: float
+    """Seconds on the game's clock when it was written."""
+    text: str
+
+
+class StandingView(Frozen):
+    """An order that the host gives again and again until it is revoked or its end is reached."""
+
+    number: int
+    """From 1, in the order in which the agent gave them; no other one of the episode has it."""
+    order: str
+    """The order and its end, `Developer <Train_Probe()> until 22 Probe`."""
+    times: int = 0
+    """How often it was carried out."""
+    waits_for: str = ""
+    """Why it was not carried out in the last step; "" if it was."""
+    ended: str = ""
+    """Why it is no longer in force; "" if it is. The next observation no longer has it."""
+
+
 class View(Frozen):
     """The structured form of an observation's text."""
 
@@ -500,6 +527,8 @@ class View(Frozen):
     toll: Toll | None = None
     economy: Economy | None = None
     warp_gates: WarpGates | None = None
+    notes: tuple[NoteView, ...] = ()
+    standing: tuple[StandingView, ...] = ()
 
 
 class ImageRef(Frozen):
@@ -525,6 +554,8 @@ class Received(Frozen):
     recipient: str
     """The agent's own name, or the channel it listens to."""
     text: str
+    age_s: float | None = None
+    """Seconds of the game since it was written; None if messages are shown once (`MemoryRule.messages_s`)."""
 
 
 class Contact(Frozen):
@@ -630,6 +661,31 @@ class Clock(Frozen):
         return self.rule != "realtime"
 
 
+class MemoryRule(Frozen):
+    """What an agent knows of the steps before. Also in one line: `2`, or `steps=4,summary=20,notes=8`."""
+
+    steps: int = Field(default=0, ge=0, le=100)
+    """Number of past steps in the prompt, in short form: time, thought, orders and what became of them, messages."""
+    whole: bool = False
+    """Whether these steps stand there word for word instead, each with its observation."""
+    summary: int = Field(default=0, ge=0)
+    """After so many decisions each, the model sums up the game so far, in a request of its own; 0 for no summary."""
+    notes: int = Field(default=0, ge=0, le=100)
+    """Notes to itself that an agent may have; the oldest one makes room."""
+    messages_s: float = Field(default=0.0, ge=0)
+    """Seconds of the game for which a message is shown again, unless its reader writes to its sender; 0 for once."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_short(cls, value: Any) -> Any:
+        if isinstance(value, int) and not isinstance(value, bool):
+            return {"steps": value}
+        if not isinstance(value, str):
+            return value
+        pairs = [part.partition("=") for part in value.replace(" ", "").split(",") if part]
+        return {name: number for name, _, number in pairs} if "=" in value else {"steps": value}
+
+
 class Example(Frozen):
     """A made-up observation of an agent, and a reply that follows from it."""
 
@@ -659,6 +715,9 @@ class Briefing(Wire):
     clock: Clock = Clock()
     max_actions: int = Field(default=3, ge=1)
     """Actions that one team may have in one reply; more are rejected."""
+    memory: MemoryRule = MemoryRule()
+    standing_orders: int = Field(default=0, ge=0)
+    """Standing orders that one team may have."""
     example: Example | None = None
 
 
@@ -760,7 +819,9 @@ class ModelCall(Wire):
     side: str
     episode: Count
     step: Count
+    purpose: Purpose = "decision"
     attempt: int = Field(ge=1)
+    """Number of the try, from 1, of this step and purpose."""
     model: str
     endpoint: str
     """Base URL without credentials or query."""

@@ -14,7 +14,7 @@ import khala_protocol.speech
 import khala_protocol.speech.arguments
 import khala_protocol.speech.headings
 from khala_protocol.messages import Call
-from khala_protocol.speech import ListenTo, MessageTo, Speech, parse, render
+from khala_protocol.speech import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing, parse, render
 
 REPLY = """Analysis: the Zealot 0x10ac is weak, so <Attack_Unit(0x10ac)> it.
 Actions:
@@ -35,8 +35,19 @@ def outline(speech: Speech) -> list[str]:
     lines += [(call.start, f"? {render(call)}") for call in speech.mentions]
     lines += [(message.start, f"to {message.recipient}: {message.text}") for message in speech.messages]
     lines += [(listen.start, f"hear {listen.channel}") for listen in speech.listens]
+    lines += [(one.start, _kept(one)) for one in (*speech.notes, *speech.standing)]
     lines += [(fault.start, f"! {fault.text}") for fault in speech.faults]
     return [line for _, line in sorted(lines, key=lambda line: line[0])]
+
+
+def _kept(one: Note | Forget | Standing | Revoke) -> str:
+    match one:
+        case Note():
+            return f"note {one.text}"
+        case Standing():
+            return f"standing {render(one.call)}: {one.until}"
+        case _:
+            return f"{type(one).__name__.lower()} {one.number}"
 
 
 def test_the_sample_of_the_documentation_is_read_in_full() -> None:
@@ -372,6 +383,17 @@ RULES = [
     ("S33", "<MessageTo>A, 'go'</MessageTo>", ["to A: go"]),
     ("S33", '<MessageTo name="A" text="go"/>', ["to A: go"]),
     ("S33", "<MessageTo(A, ‘’‘go’’’)>", ["to A: go"]),
+    ("S34", "<Note('''hold (now) -> x''')>", ["note hold (now) -> x"]),
+    ("S34", "Analysis: <Note(go home)>\nActions:\n- Note('stay')", ["note go home", "note stay"]),
+    ("S34", "<Note>two Roaches</Note>", ["note two Roaches"]),
+    ("S34", '{"action": "Note", "args": ["two Roaches"]}', ["note two Roaches"]),
+    ("S34", "Note: two Roaches", []),
+    ("S34", "<Forget(2)> <Revoke(1, 3)>\nforget(4)", ["forget 2", "revoke 1", "revoke 3", "forget 4"]),
+    ("S35", "<Standing(Train_Probe(), until 22 Probe)>", ["standing <Train_Probe()>: 22 Probe"]),
+    ("S35", "Team A:\n- Standing(<Go([4, 6])>)", ["standing <Go([4, 6])>: "]),
+    ("S35", "<Standing('Stop', \"4:30\")>", ["standing <Stop()>: 4:30"]),
+    ("S35", '{"action": "Standing", "args": ["Stop()", "until attacked"]}', ["standing <Stop()>: attacked"]),
+    ("S35", "Analysis: <Standing(Stop())>?\nActions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
 ]  # fmt: skip
 
 

@@ -25,7 +25,18 @@ from khala_bridge.task.opponent import Opponent, opponent_of
 from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import LOOPS_PER_S, AgentCard, AgentKind, Clock, Frames, Frozen, Point, TeamSpec, Trigger
+from khala_protocol.messages import (
+    LOOPS_PER_S,
+    AgentCard,
+    AgentKind,
+    Clock,
+    Frames,
+    Frozen,
+    MemoryRule,
+    Point,
+    TeamSpec,
+    Trigger,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -34,6 +45,8 @@ T = TypeVar("T")
 
 MOST_ACTIONS = 1000
 """Actions for one team in one reply; 128 teams with 27 each are carried out in one step."""
+MOST_STANDING = 20
+"""Standing orders of one team; each is judged in every step."""
 TeamKind: TypeAlias = Literal["select", "select_all_type", "group", "side"]
 Asking: TypeAlias = Literal["needed", "always"]
 Rhythm: TypeAlias = Literal["own", "paper"]
@@ -187,6 +200,8 @@ class AgentConfig(Frozen):
     and those without teams, are always needed. `always`: without units, too."""
     every_loops: int = Field(default=0, ge=0, le=100_000)
     """Game loops that pass at least between two of its observations."""
+    memory: MemoryRule | None = None
+    """What it knows of the steps before, instead of what the task says."""
     when: tuple[Trigger, ...] = ()
     """What has it asked at once, even before `every_loops` have passed: `attacked` (a unit of its teams lost health or
     died), `idle` (one of them has no order), `message` (somebody wrote to it). Without `every_loops`, nothing else."""
@@ -250,6 +265,8 @@ class SideConfig(Frozen):
     auto: AutoConfig | None = None
     default_reply: str | None = None
     max_actions: int | None = Field(default=None, ge=1)
+    memory: MemoryRule | None = None
+    standing_orders: int | None = Field(default=None, ge=0, le=MOST_STANDING)
 
 
 class AdviserConfig(Frozen):
@@ -312,6 +329,10 @@ class TaskConfig(Frozen):
     """Reply of an agent that did not answer in time; empty: its units continue."""
     max_actions: int = Field(default=3, ge=1, le=MOST_ACTIONS)
     """Limit of actions for one team in one reply."""
+    memory: MemoryRule = MemoryRule()
+    """What agents know of the steps before, see [memory](../how-to/memory.md)."""
+    standing_orders: int = Field(default=0, ge=0, le=MOST_STANDING)
+    """Standing orders that one team may have, see [memory](../how-to/memory.md#standing-orders)."""
     max_steps: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Decisions after which an episode ends without a result; None: the map decides."""
 
@@ -428,6 +449,10 @@ class TaskConfig(Frozen):
     def max_actions_of(self, agent: AgentConfig) -> int:
         """Return the limit of actions for one team of an agent in one reply."""
         return self.max_actions if agent.max_actions is None else agent.max_actions
+
+    def memory_of(self, agent: AgentConfig) -> MemoryRule:
+        """Return what an agent knows of the steps before."""
+        return self.memory if agent.memory is None else agent.memory
 
     def correspondents(self, agent: AgentConfig) -> tuple[AgentConfig, ...]:
         """Return the agents that this one may write to, in the order of the task."""

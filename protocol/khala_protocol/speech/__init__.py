@@ -9,6 +9,9 @@
         <MessageTo(CombatGroup1, '''hold the ramp''')>
         <ListenTo(Channel-2)>
 
+An agent also keeps notes and gives standing orders: `<Note('''text''')>`, `<Forget(2)>`,
+`<Standing(Train_Probe(), until 22 Probe)>`, `<Revoke(1)>`.
+
 `parse` tolerates what models write and is exact in what it reports: text with only one possible meaning is read as
 that, any other text that looks like a call is a `Rejection` with its place and a sentence that the model can act on,
 and affects nothing else. Nothing raises, the time is linear in the length of the text (a reply is read up to
@@ -53,10 +56,24 @@ These are the rules of tolerance, in addition to those of headings (H, `khala_pr
 | S31 | entities of HTML, escaped quotes and line ends, a tag between angle brackets | `&lt;Stop()&gt;` |
 | S32 | reasoning between other marks, or in a channel of its own | `◁think▷` … `◁/think▷` |
 | S33 | a message without angle brackets, as an element, with three quotes and `>` | `MessageTo(A, 'go')` |
+| S34 | a note wherever it stands, quoted like a message; of several numbers, each | `<Note(go)>`, `<Forget(1, 2)>` |
+| S35 | brackets or none around the call of a standing order; no "until" | `<Standing(<Stop()>, 4:30)>` |
 """
 
 from khala_protocol.speech.arguments import render, written
 from khala_protocol.speech.reader import MAX_REPLY_CHARACTERS, parse
-from khala_protocol.speech.said import ListenTo, MessageTo, Speech
+from khala_protocol.speech.said import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 
-__all__ = ["MAX_REPLY_CHARACTERS", "ListenTo", "MessageTo", "Speech", "parse", "render", "written"]
+__all__ = [
+    "MAX_REPLY_CHARACTERS",
+    "Forget",
+    "ListenTo",
+    "MessageTo",
+    "Note",
+    "Revoke",
+    "Speech",
+    "Standing",
+    "parse",
+    "render",
+    "written",
+]

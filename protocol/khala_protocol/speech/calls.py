@@ -30,7 +30,9 @@ _NAKED = re.compile(
     r"(?P<call>(?:(?P<team>[A-Za-z]\w*-[0-9]++)\.)?(?P<name>[^\W\d][\w-]*+)"
     r"\((?P<inside>[^()<>\n]*+(?:\([^()<>\n]*+\)[^()<>\n]*+)*+)\))"
 )
-_NAKED_TALK = re.compile(r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+(?P<call>(?P<name>message_?to)\()", re.IGNORECASE)
+_NAKED_TALK = re.compile(
+    r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+(?P<call>(?P<name>message_?to|note|standing)\((?=[^\s)]))", re.IGNORECASE
+)
 _PLAIN_LINE = re.compile(r"[^<\n]*+(?!<)")
 _IN_WORDS = re.compile(r"\b(?P<name>[A-Z](?=\w*_\w)\w++)[ \t:|=]++(?:0[xX][0-9a-fA-F]++|\[[0-9., \t]++\])")
 _MORE_WORDS = re.compile(r"(?:[ \t]++\w++)++(?=[ \t]*+\()")
@@ -44,6 +46,10 @@ MESSAGE_NAMES = frozenset({"messageto", "message_to"})
 """Names of the call that sends a message, in lower case."""
 LISTEN_NAMES = frozenset({"listento", "listen_to"})
 """Names of the call that listens to a channel, in lower case."""
+NOTE = "note"
+"""Name of the call that keeps a note, in lower case; the others of this kind follow."""
+STANDING = "standing"
+FORGET, REVOKE = "forget", "revoke"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +161,10 @@ def naked_at(text: str, at: int) -> re.Match[str] | None:
         return None
     name, inside = match["name"], match["inside"]
     meant = (
-        is_talk(name) or "_" in name or (name[0].isupper() and (not inside.strip() or "0x" in inside or "[" in inside))
+        is_talk(name)
+        or name.lower() in (FORGET, REVOKE)
+        or "_" in name
+        or (name[0].isupper() and (not inside.strip() or "0x" in inside or "[" in inside))
     )
     return match if meant else None
 

@@ -16,7 +16,7 @@ from functools import cached_property
 from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall
 
 _Q = re.escape(QUOTES)
-_MESSAGE = r"<\s*+message_?to\s*+\("
+_MESSAGE = r"<\s*+(?:message_?to|note)\s*+\("
 _RECIPIENT = re.compile(
     r"\s*+(?:(?:to|name|agent|recipient|receiver|target)\s*+[=:]\s*+)?+"
     rf"(?:[{_Q}]{{1,3}}+(?P<quoted>[^{_Q},<>()\n]{{1,80}}+)[{_Q}]{{1,3}}+(?:\s*+[,:;]|\s++(?=[{_Q}]))"
@@ -30,9 +30,10 @@ _QUOTE = re.compile(rf"{'|'.join(_RUNS)}|{_CURLED}|[{_Q}]")
 _END = r"\s*+\\?+\)\s*+\\?+/?+>"
 _END_OF_THREE = r"\s*+\\?+(?:\)\s*+\\?+/?+>|/?+>|\)[ \t]*+(?=$|<))"
 _END_OF_NAKED = r"\s*+\)(?=[ \t`*.,;\]\"'}]*+$)"
-_NAKED_MESSAGE = r"\bmessage_?to\("
+_NAKED_MESSAGE = r"\b(?:message_?to|note)\("
 _NAKED_LINE_END = re.compile(rf"(?<!\s){_END_OF_NAKED}", re.MULTILINE)
-_ELEMENT_END = re.compile(r"</\s*+message_?to\s*+>", re.IGNORECASE)
+_ELEMENT_END = re.compile(r"</\s*+(?:message_?to|note)\s*+>", re.IGNORECASE)
+_KEYWORD = re.compile(r"\s*+(?:(?:text|note|message|content)\s*+[=:]\s*+)?+", re.IGNORECASE)
 _ATTRIBUTES = re.compile(
     r"\s++(?:to|name|agent|recipient|receiver|target)\s*+=\s*+\"(?P<to>[^\"<>\n]{1,80}+)\""
     r"\s++(?:text|message|content)\s*+=\s*+\"(?P<text>[^\"<>\n]++)\"\s*+/?+>",
@@ -40,6 +41,7 @@ _ATTRIBUTES = re.compile(
 )
 _NESTING = re.compile(r"(?P<open><\s*+\w++\()|\)/?+>|\n")
 _SAMPLE = "write <MessageTo(Name, '''text''')>"
+_SAMPLE_NOTE = "write <Note('''text''')>"
 
 _FAMILIES = ("'´`‘’‚‛‹›", '"“”„‟«»', "「」", "『』")  # noqa: RUF001 - telling these apart is the point
 
@@ -92,15 +94,36 @@ class MessageReader:
         recipient = (to["quoted"] or to["plain"]).strip(" \t*_[]{}\\") if to else ""
         if to is None or not recipient:
             raise MalformedCall(f"a message needs a recipient and a text: {_SAMPLE}")
-        quote = _QUOTE.match(self._text, to.end())
+        start, stop, end = self._words(to.end(), f"the message to {recipient[:SHORT]}", _SAMPLE, naked=naked)
+        return Addressed(recipient, start, stop, end)
+
+    def note(self, at: int, *, naked: bool = False) -> Addressed:
+        """Read the text after `<Note(`, or after `Note(` if it is naked; it has no recipient.
+
+        Raises:
+            MalformedCall: the text is missing, or not closed.
+        """
+        keyword = _KEYWORD.match(self._text, at)
+        assert keyword is not None, "it matches nothing as well"
+        return Addressed("", *self._words(keyword.end(), "the note", _SAMPLE_NOTE, naked=naked))
+
+    def noted_element(self, at: int) -> Addressed | None:
+        """Return the note between `<Note>`, which ends here, and `</Note>`."""
+        end = self._search(_ELEMENT_END, at)
+        words = end and self._text[at : end.start()].strip(QUOTES + " \t\n")
+        return Addressed("", at, end.start(), end.end()) if end and words else None
+
+    def _words(self, at: int, what: str, sample: str, *, naked: bool) -> tuple[int, int, int]:
+        """Return where quoted or other words begin and end, and where the call around them ends."""
+        quote = _QUOTE.match(self._text, at)
         found = quote and self._quoted_end(quote, naked=naked)
-        stop, end = found or self._line_end(to.end(), recipient, naked=naked)
-        start = quote.end() if quote else to.end()
+        stop, end = found or self._line_end(at, what, sample, naked=naked)
+        start = quote.end() if quote else at
         if quote and quote.group() not in _ENDS:
             stop = self._before_quotes(start, stop)
         if stop <= start or not self._text[start:stop].strip(QUOTES + " \t\n"):
-            raise MalformedCall(f"the message has no text: {_SAMPLE}")
-        return Addressed(recipient, start, stop, end)
+            raise MalformedCall(f"{what.partition(' to ')[0]} has no text: {sample}")
+        return start, stop, end
 
     def _before_quotes(self, start: int, stop: int) -> int:
         """Return where the words before the quotes end."""
@@ -122,16 +145,16 @@ class MessageReader:
             self._searched[pattern] = at, found
         return found
 
-    def _line_end(self, at: int, recipient: str, *, naked: bool) -> tuple[int, int]:
+    def _line_end(self, at: int, what: str, sample: str, *, naked: bool) -> tuple[int, int]:
         if naked:
             end = self._search(_NAKED_LINE_END, at)
             if end is None or self._text.find("\n", at, end.end()) >= 0:
-                raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: {_SAMPLE}")
+                raise MalformedCall(f"{what} is not closed: {sample}")
             return end.start(), end.end()
         marks, closes = self._nesting
         closing = closes[bisect_left(marks, at, key=re.Match.start)]
         if closing == len(marks):
-            raise MalformedCall(f"the message to {recipient[:SHORT]} is not closed: end it with ''')>")
+            raise MalformedCall(f"{what} is not closed: end it with ''')>")
         return self._before_quotes(at, marks[closing].start()), marks[closing].end()
 
     @cached_property

@@ -9,13 +9,17 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from khala_protocol.messages import Call, Rejection
 from khala_protocol.speech.arguments import read_arguments
 from khala_protocol.speech.calls import (
+    FORGET,
     LISTEN_NAMES,
     MESSAGE_NAMES,
+    NOTE,
+    REVOKE,
+    STANDING,
     Opening,
     close_bare,
     close_parentheses,
@@ -42,10 +46,11 @@ from khala_protocol.speech.headings import (
     json_heading_at,
     tag_heading_at,
 )
-from khala_protocol.speech.marks import SHORT, MalformedCall, to_ascii, unescaped
+from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescaped
 from khala_protocol.speech.objects import ObjectMessage, object_at
+from khala_protocol.speech.orders import numbers_in, standing_at
 from khala_protocol.speech.quoting import MessageReader
-from khala_protocol.speech.said import Gathering, ListenTo, MessageTo, Speech
+from khala_protocol.speech.said import Forget, Gathering, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
@@ -53,6 +58,8 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import Point
     from khala_protocol.speech.quoting import Addressed
+
+    Said: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke
 
 
 MAX_REPLY_CHARACTERS = 65_536
@@ -116,6 +123,8 @@ _STRUCK = re.compile(r"~~[\s`*]*+$")
 _STRUCK_BEHIND = re.compile(r"[ \t`*]*+~~")
 _NO_HEADING = ("<", "\n", "")
 _LOOKED_BACK = 24
+_OF_WORDS = MESSAGE_NAMES | {NOTE, STANDING}
+"""Names of calls whose words are no list of arguments."""
 _DIRECTLY_ABOVE = 80
 
 
@@ -258,7 +267,10 @@ class _Walk:
         if isinstance(found, ObjectMessage):
             self._add(MessageTo(found.recipient, found.text, start, found.end), ReplySection.COMMUNICATIONS, start)
             return found.end
-        self._add_call(found.name, found.args, start, found.end, team=found.team)
+        try:
+            self._add_call(found.name, found.args, start, found.end, team=found.team)
+        except MalformedCall as error:
+            self._fault(start, found.end, found.name, str(error))
         return found.end
 
     def _naked(self, at: int) -> int | None:
@@ -269,7 +281,7 @@ class _Walk:
         start, name = found.start("call"), found["name"]
         try:
             if talk:
-                return self._message(start, self._messages.read(talk.end(), naked=True))
+                return self._words(name, start, talk.end(), naked=True)
             if not stands_alone(self._plain, found.end()):
                 self._fault(start, found.end(), name, f"a call stands in angle brackets: write <{name[:SHORT]}(...)>")
             elif is_talk(name):
@@ -301,8 +313,8 @@ class _Walk:
         if not opening.has_parenthesis:
             return self._without_parentheses(start, opening)
         name = opening.name
-        if name.lower() in MESSAGE_NAMES:
-            return self._message(start, self._messages.read(opening.end))
+        if name.lower() in _OF_WORDS:
+            return self._words(name, start, opening.end)
         inner_end, end = close_parentheses(self._plain, opening)
         inside = self._plain[opening.end : inner_end]
         if is_talk(name):
@@ -317,6 +329,8 @@ class _Walk:
             reader = self._messages
             if found := reader.attributes(opening.end) if end is None else reader.element(end):
                 return self._message(start, found)
+        if name.lower() == NOTE and end is not None and (noted := self._messages.noted_element(end)):
+            return self._note(start, noted)
         found_at = loose_arguments(self._plain, opening.end) if end is None else element_at(self._plain, end, name)
         if found_at and "_" in name and (args := self._typed(*found_at[:2])):
             self._add_call(name, args, start, found_at[2])
@@ -335,6 +349,25 @@ class _Walk:
         args = read_arguments(self._plain[start:stop])
         return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
 
+    def _words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
+        """Read a message, a note or a standing order, whose words begin at `at`."""
+        if name.lower() in MESSAGE_NAMES:
+            return self._message(start, self._messages.read(at, naked=naked))
+        if name.lower() == NOTE:
+            return self._note(start, self._messages.note(at, naked=naked))
+        found = standing_at(self._plain, at)
+        self._stand(found.name, found.args, found.until, start, found.end)
+        return found.end
+
+    def _note(self, start: int, found: Addressed) -> int:
+        text = unescaped(self._text[found.start : found.stop]).strip(QUOTES + " \t\n")
+        self._add(Note(text, start, found.end), ReplySection.NONE, start)
+        return found.end
+
+    def _stand(self, name: str, args: tuple[str | Point, ...], until: str, start: int, end: int) -> None:
+        call = Call(name=name, args=args, team=self._team, start=start, end=end)
+        self._add(Standing(call, until, start, end), ReplySection.ACTIONS, start)
+
     def _message(self, start: int, found: Addressed) -> int:
         text = unescaped(self._text[found.start : found.stop])
         self._add(MessageTo(found.recipient, text, start, found.end), ReplySection.COMMUNICATIONS, start)
@@ -352,9 +385,19 @@ class _Walk:
     def _add_call(
         self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
     ) -> None:
-        self._add(
-            Call(name=name, args=args, team=team or self._team, start=start, end=end), ReplySection.ACTIONS, start
-        )
+        kind = name.lower()
+        if kind in (FORGET, REVOKE):
+            make = Forget if kind == FORGET else Revoke
+            for number in numbers_in(args, name):
+                self._add(make(number, start, end), ReplySection.NONE, start)
+        elif kind == NOTE and args:
+            self._add(Note(", ".join(map(str, args)), start, end), ReplySection.NONE, start)
+        elif kind == STANDING:
+            found = standing_at(", ".join(map(str, args)) + ")", 0)
+            self._stand(found.name, found.args, found.until, start, end)
+        else:
+            call = Call(name=name, args=args, team=team or self._team, start=start, end=end)
+            self._add(call, ReplySection.ACTIONS, start)
 
     def _fault(self, start: int, end: int, name: str, reason: str) -> None:
         self._count(start)
@@ -363,7 +406,7 @@ class _Walk:
         kind = ReplySection.COMMUNICATIONS if is_talk(name) else ReplySection.ACTIONS
         self.gathering.add(fault, kind, self._section_at(start))
 
-    def _add(self, item: Call | MessageTo | ListenTo, kind: ReplySection, start: int) -> None:
+    def _add(self, item: Said, kind: ReplySection, start: int) -> None:
         self._count(start)
         before = self._plain[max(0, start - _LOOKED_BACK) : start]
         before = before[before.rfind("\n") + 1 :]

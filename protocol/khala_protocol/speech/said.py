@@ -33,6 +33,44 @@ class ListenTo:
 
 
 @dataclass(frozen=True, slots=True)
+class Note:
+    """A note of the agent to itself."""
+
+    text: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Forget:
+    """A request to remove a note of the agent."""
+
+    number: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """An order to give `call` again and again; `reply[start:end]` is all of it."""
+
+    call: Call
+    until: str
+    """Its end as written, `22 Probe`; "" if it has none."""
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Revoke:
+    """A request to end a standing order."""
+
+    number: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
 class Speech:
     """The content of a reply, in the order of the text.
 
@@ -40,6 +78,8 @@ class Speech:
         calls: actions to carry out.
         messages: messages to agents or channels.
         listens: channels to listen to.
+        notes: notes to keep and to forget.
+        standing: standing orders to begin and to end.
         faults: text that looks like one of these, but is not; reason `malformed`.
         mentions: actions that are only mentioned, not ordered (rules S10, S24, S25, S27, H18, H19).
     """
@@ -47,11 +87,13 @@ class Speech:
     calls: tuple[Call, ...] = ()
     messages: tuple[MessageTo, ...] = ()
     listens: tuple[ListenTo, ...] = ()
+    notes: tuple[Note | Forget, ...] = ()
+    standing: tuple[Standing | Revoke, ...] = ()
     faults: tuple[Rejection, ...] = ()
     mentions: tuple[Call, ...] = ()
 
 
-Item: TypeAlias = Call | MessageTo | ListenTo | Rejection
+Item: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke | Rejection
 
 
 @dataclass(slots=True)
@@ -100,8 +142,9 @@ class Gathering:
         """
         found = _Found(item, kind, section, len(self._titles) - 1, taken_back)
         self._found.append(found)
-        if isinstance(item, Call | Rejection) and kind is ReplySection.ACTIONS:
-            self._orders.setdefault(item.team, []).append(found)
+        if isinstance(item, Call | Standing | Rejection) and kind is ReplySection.ACTIONS:
+            team = item.call.team if isinstance(item, Standing) else item.team
+            self._orders.setdefault(team, []).append(found)
             self._gave_orders |= section is ReplySection.ACTIONS
 
     def has_orders(self) -> bool:
@@ -125,10 +168,14 @@ class Gathering:
                 said.append(found.item)
             elif isinstance(found.item, Call):
                 mentioned.append(found.item)
+            elif isinstance(found.item, Standing):
+                mentioned.append(found.item.call)
         return Speech(
             calls=tuple(item for item in said if isinstance(item, Call)),
             messages=tuple(item for item in said if isinstance(item, MessageTo)),
             listens=tuple(item for item in said if isinstance(item, ListenTo)),
+            notes=tuple(item for item in said if isinstance(item, Note | Forget)),
+            standing=tuple(item for item in said if isinstance(item, Standing | Revoke)),
             faults=tuple(item for item in said if isinstance(item, Rejection)),
             mentions=tuple(mentioned),
         )
@@ -158,7 +205,9 @@ def _words(item: Item) -> tuple[object, ...]:
             return item.team, item.name, item.args
         case MessageTo():
             return item.recipient, item.text
-        case ListenTo():
-            return (item.channel,)
+        case ListenTo(what, _, _) | Note(what, _, _) | Forget(what, _, _) | Revoke(what, _, _):
+            return (what,)
+        case Standing():
+            return item.call.team, item.call.name, item.call.args, item.until
         case Rejection():
             return item.team, item.text
