@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from khala_bridge.act import Actor
 from khala_bridge.observe import Feedback, Observer, shortened
 from khala_bridge.observe.triggers import triggers, vitals
+from khala_orchestrator.letters import Letters
 from khala_orchestrator.mailbox import Mailbox, newest
+from khala_orchestrator.notebook import Notebook
+from khala_orchestrator.repeats import Repeats
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.turn import Question
-from khala_protocol.messages import AgentReport, Message, Observation, Received, Rejection, Report
+from khala_protocol.messages import LOOPS_PER_S, AgentReport, Message, Observation, Received, Rejection, Report
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -41,6 +44,8 @@ class Played(NamedTuple):
     decisions: Sequence[Decision]
     joint: JointAction
     post: Post
+    unnoted: Mapping[str, Sequence[Rejection]] = MappingProxyType({})
+    """By agent, why notes were not kept or forgotten."""
 
     @property
     def commands(self) -> Sequence[Command]:
@@ -58,19 +63,27 @@ class Side:
     observer: Observer = field(init=False)
     actor: Actor = field(init=False)
     mailbox: Mailbox = field(init=False)
+    notebook: Notebook = field(init=False)
+    letters: Letters = field(init=False)
+    _repeats: Repeats = field(init=False, default_factory=Repeats)
     _now: SideObservation = field(init=False)
     _seen: dict[str, AgentObservation] = field(init=False, default_factory=dict)
     """By agent, the observation that it decides on."""
     _vitals: dict[str, dict[int, float]] = field(init=False, default_factory=dict)
     """By agent, health of its units at its last observation."""
     _pending: dict[str, Feedback] = field(init=False, default_factory=dict)
-    """By agent, what it finds in its next observation."""
+    """By agent, what has become new since its last observation."""
+    _told: dict[str, Feedback] = field(init=False, default_factory=dict)
+    """By agent, what it finds in its next observation: what is new, and what stays."""
 
     def __post_init__(self) -> None:
         task = self.task
         reach = {self.seat(a.name): [self.seat(other.name) for other in task.correspondents(a)] for a in task.agents}
         self.observer, self.actor = Observer(task), Actor(task)
         advisers = {self.seat(adviser.name): adviser.role for adviser in task.advisers}
+        memory = {agent.name: task.memory_of(agent) for agent in task.agents}
+        self.notebook = Notebook({name: rule.notes for name, rule in memory.items()})
+        self.letters = Letters({name: rule.messages_s for name, rule in memory.items()})
         self.mailbox = Mailbox(reach, task.channels if task.communication else (), advisers)
 
     @property
@@ -94,8 +107,10 @@ class Side:
 
     def begin(self) -> None:
         """Forget the episode before."""
+        for part in (self.mailbox, self.notebook, self.letters, self._repeats):
+            part.clear()
         self.observer.begin()
-        self.mailbox.clear()
+        self.actor.begin()
         self._seen.clear()
         self._vitals.clear()
         self._pending = {agent.name: Feedback() for agent in self.task.agents}
@@ -104,7 +119,14 @@ class Side:
 
     def look(self, snapshot: Snapshot) -> None:
         """Take in the present state of the game."""
-        self._now = self.observer.observe(snapshot, self._pending)
+        self._told = {agent: self._all_for(agent, snapshot.game_loop) for agent in self._pending}
+        self._now = self.observer.observe(snapshot, self._told)
+
+    def _all_for(self, agent: str, loop: int) -> Feedback:
+        new = self._pending[agent]
+        messages = self.letters.of(agent, new.messages, loop)
+        notes, standing = self.notebook.of(agent), self.actor.standing.views(agent)
+        return replace(new, messages=messages, notes=notes, standing=standing)
 
     def happened(self, agent: str) -> Collection[Trigger]:
         """Return what happened to an agent since its last observation."""
@@ -125,8 +147,10 @@ class Side:
 
     def question(self, agent: str, at: StepId) -> Question:
         """Return an agent's observation of the present state, with all that was to be said to it."""
-        seen, heard = self._now.agents[agent], self._pending[agent]
+        seen, heard = self._now.agents[agent], self._told[agent]
         self._seen[agent], self._pending[agent] = seen, Feedback()
+        self.letters.shown(agent)
+        self.actor.standing.seen(agent)
         self._vitals[agent] = vitals(self._now, agent)
         observation = Observation(
             run=self.run,
@@ -169,7 +193,11 @@ class Side:
         for agent, speech in speeches.items():
             for listen in speech.listens:
                 self.mailbox.listen(self.seat(agent), listen.channel)
-        return Played(decisions, joint, self.mailbox.deliver(messages))
+        return Played(decisions, joint, self.mailbox.deliver(messages), self._note(speeches))
+
+    def _note(self, speeches: Mapping[str, Speech]) -> dict[str, Sequence[Rejection]]:
+        time_s = round(self._now.snapshot.game_loop / LOOPS_PER_S, 1)
+        return {agent: tuple(self.notebook.take(agent, said.notes, time_s)) for agent, said in speeches.items()}
 
     def _advised(self, at: StepId, advice: Advice) -> Message:
         return Message(
@@ -213,6 +241,7 @@ class Side:
     ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
         heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
+        self._deliver(played.post)
         for agent, feedback in heard.items():
             self._pending[agent] = _joined(self._pending[agent], feedback)
         return Report(
@@ -232,16 +261,32 @@ class Side:
             timings=timings,
         )
 
+    def _deliver(self, post: Post) -> None:
+        """Close the messages that were answered, and keep the new ones."""
+        for message in post.taken:
+            if not message.human:
+                self.letters.answered(message.agent, [message.recipient])
+        for seat, messages in post.received.items():
+            self.letters.arrive(seat.agent, messages, self._now.snapshot.game_loop)
+
     def _heard(self, seat: Seat, played: Played, result: StepResult) -> Feedback:
         joint = played.joint
         rejections: tuple[Rejection, ...] = (
             *joint.rejections.get(seat.agent, ()),
             *(refusal.rejection for refusal in result.played.refusals if refusal.agent == seat.agent),
             *played.post.rejections.get(seat, ()),
+            *played.unnoted.get(seat.agent, ()),
         )
+        if any(decision.seat == seat for decision in played.decisions):
+            rejections = self._repeats.counted(seat.agent, rejections, self._offers(seat.agent))
         accepted, wrote = joint.accepted.get(seat.agent, ()), any(m.agent == seat.agent for m in played.post.taken)
         received = played.post.received.get(seat, ())
         return Feedback(accepted, shortened(rejections), received, ordered=bool(accepted) or wrote)
+
+    def _offers(self, agent: str) -> dict[str, Sequence[str]]:
+        """Return by team the actions that were valid when an agent decided."""
+        teams = self._seen[agent].view.teams if agent in self._seen else ()
+        return {team.name: [action.name for action in team.actions] for team in teams}
 
     def _agent(self, at: StepId, decision: Decision, played: Played, heard: Feedback) -> AgentReport:
         agent, loop = decision.seat.agent, self._now.snapshot.game_loop

@@ -7,8 +7,9 @@ An agent may have decided on an earlier observation than the present one. Its wo
 units and their screens then. What they do is judged now: who is alive, what is in sight, what can be paid.
 
 All calls of a turn share the same minerals, vespene, supply and workers, in the order of the agents in the task and
-of their words. The host's own orders come last, for units that no agent ordered. An actor keeps nothing between two
-turns. The layer above decides which replies count and when one is too late.
+of their words. Standing orders come after them, and the host's own orders last, for units that no agent ordered. An
+actor keeps the standing orders from turn to turn, and nothing else. The layer above decides which replies count and
+when one is too late.
 """
 
 from __future__ import annotations
@@ -21,19 +22,22 @@ from khala_bridge.act.raw import RawExecutor
 from khala_bridge.act.recognise import recognise
 from khala_bridge.act.rejected import CallRejected, reject
 from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.standing import StandingOrders
 from khala_bridge.act.translate import Translator
+from khala_bridge.act.until import read_until
 from khala_bridge.act.vocabulary import Vocabulary
 from khala_bridge.auto.workers import automatic
-from khala_protocol.messages import Rejection
+from khala_protocol.messages import Call, Rejection
+from khala_protocol.speech import Revoke, Standing, render
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from khala_bridge.act.plan import Executor
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.messages import Call, Fate
+    from khala_protocol.messages import Fate
     from khala_protocol.speech import Speech
 
 
@@ -87,6 +91,11 @@ class Actor:
         """Take the task, which says which actions each agent has."""
         self._task = task
         self._words = {agent.name: Vocabulary(agent) for agent in task.agents}
+        self.standing = StandingOrders(task.standing_orders)
+
+    def begin(self) -> None:
+        """Forget the episode before."""
+        self.standing.clear()
 
     def joint(
         self,
@@ -114,7 +123,10 @@ class Actor:
                 continue
             saw = seen[name] if seen and name in seen else observation.agents[name]
             ordered, said, faults, hindered = self._one(translator, saw, speech)
+            taken, refused = self._stand(translator, observation, saw, speech)
             commands += ordered
+            said += taken
+            faults += refused
             accepted[name] = tuple(said)
             rejections[name] = tuple(sorted((*speech.faults, *faults), key=lambda fault: fault.start))
             fates[name] = fate(
@@ -123,6 +135,7 @@ class Actor:
                 rejected=bool(rejections[name]),
                 hindered=hindered,
             )
+        commands += self.standing.carry_out(observation, translator)
         for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections, fates)
@@ -153,9 +166,52 @@ class Actor:
             faults.append(_unread(speech.calls[most:]))
         return _Outcome(commands, accepted, faults, hindered)
 
+    def _stand(
+        self, translator: Translator, observation: SideObservation, saw: AgentObservation, speech: Speech
+    ) -> tuple[list[str], list[Rejection]]:
+        """Begin and end the standing orders of one agent; return what was accepted, and what was not."""
+        accepted: list[str] = []
+        faults: list[Rejection] = []
+        for item in speech.standing[:MOST_WRONG]:
+            try:
+                if isinstance(item, Revoke):
+                    self.standing.revoke(saw.agent.name, item.number)
+                    accepted.append(render(_call_of(item)))
+                else:
+                    accepted += self._begun(translator, observation, saw, item)
+            except CallRejected as refused:
+                faults.append(reject(_call_of(item), refused))
+        return accepted, faults
+
+    def _begun(
+        self, translator: Translator, observation: SideObservation, saw: AgentObservation, item: Standing
+    ) -> Iterator[str]:
+        """Begin a standing order of each team that it is for, and yield it as it was accepted.
+
+        Raises:
+            CallRejected: it cannot stand.
+        """
+        words = self._words[saw.agent.name]
+        meant, until = recognise(item.call, words, Addressees(saw, words)), read_until(item.until)
+        if isinstance(meant, Rejection):
+            raise CallRejected(meant.reason, meant.message)
+        for said in meant:
+            if not words.has(said.team, said.action):
+                raise CallRejected("not_available", f"Team {said.team.view.name} has no action {said.action.name}.")
+            self.standing.begin(said, until, translator, observation)
+            end = f", until {until.text}" if until.text else ""
+            yield f"{said.team.view.name} <Standing({said.written[1:-1]}{end})>"
+
     def _most_calls(self, saw: AgentObservation) -> int:
         """Return the number of calls of an agent that are read: all that may count, and some that are wrong."""
         return self._task.max_actions_of(saw.agent) * len(saw.teams) + MOST_WRONG
+
+
+def _call_of(item: Standing | Revoke) -> Call:
+    """Return the call in a standing order, or the one that ends it, as its rejection names it."""
+    if isinstance(item, Standing):
+        return item.call
+    return Call(name="Revoke", args=(str(item.number),), start=item.start, end=item.end)
 
 
 def _unread(calls: Sequence[Call]) -> Rejection:

@@ -70,10 +70,13 @@ class Translator:
         self._targets = Targets(observation)
         self._count: dict[tuple[str, str], int] = {}
 
-    def translate(self, said: Recognised) -> list[Command] | Rejection:
-        """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait."""
+    def translate(self, said: Recognised, *, standing: bool = False) -> list[Command] | Rejection:
+        """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait.
+
+        A standing order does not count as one of the actions that its team may have.
+        """
         try:
-            orders = self._orders(said)
+            orders = self._standing(said) if standing else self._orders(said)
         except CallRejected as refused:
             return reject(said.call, refused, said.team.view.name)
         return [command for order in orders for command in self.commands(order, said)]
@@ -109,6 +112,18 @@ class Translator:
         self._count[count] = self._count.get(count, 0) + 1
         if said.action.rule is None:
             self._book(found)
+        return found
+
+    def _standing(self, said: Recognised) -> list[RuleOrder]:
+        """Return the orders of a call that counts as no action of its team.
+
+        Raises:
+            CallRejected: it cannot be carried out.
+        """
+        if said.action.rule is not None:
+            return self._by_rule(said, said.action.rule)
+        found = self._as_said(said)
+        self._book(found)
         return found
 
     def _book(self, orders: Iterable[RuleOrder]) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from khala_protocol.messages import Received, Rejection
+    from khala_protocol.messages import NoteView, Received, Rejection, StandingView
 
 MAX_REJECTIONS = 10
 """Rejections that an observation lists; the others are counted."""
@@ -25,7 +25,7 @@ _LONGEST_TEXT, _LONGEST_MESSAGE, _LONGEST_TEAM = 120, 400, 60
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """The results of an agent's last reply, and the messages of others."""
+    """The results of an agent's last reply, the messages of others, and what stays from step to step."""
 
     accepted: tuple[str, ...] = ()
     """Its calls that were carried out, `Stalker-1 <Attack_Unit(0x1)>`."""
@@ -33,6 +33,10 @@ class Feedback:
     messages: tuple[Received, ...] = ()
     ordered: bool = False
     """Whether it gave an order or wrote a message."""
+    notes: tuple[NoteView, ...] = ()
+    """All of its notes."""
+    standing: tuple[StandingView, ...] = ()
+    """Its standing orders, and those that have ended since it was asked."""
 
 
 def shortened(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:

@@ -119,7 +119,8 @@ class Observer:
     def _view(self, moment: _Moment, agent: AgentConfig, changes: Changes, teams: Sequence[TeamObservation]) -> View:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
         scene, parts = moment.scene, self._parts[agent.name]
-        view = scene.view.but(teams=tuple(team.view for team in teams))
+        heard = moment.feedback.get(agent.name, Feedback())
+        view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=heard.standing)
         more: dict[str, object] = {}
         if "counts" in parts:
             more["counts"] = side.counts(scene, moment.episode.chronicle)

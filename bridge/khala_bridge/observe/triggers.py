@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Container, Iterator, Mapping
 
     from khala_bridge.observe.observation import SideObservation
     from khala_protocol.messages import Trigger
@@ -27,7 +27,12 @@ def vitals(observation: SideObservation, agent: str) -> dict[int, float]:
 def triggers(observation: SideObservation, agent: str, before: Mapping[int, float]) -> Iterator[Trigger]:
     """Yield what happened to an agent's units since they had the vitals `before`."""
     now = vitals(observation, agent)
-    if any(tag in observation.died or now.get(tag, total) <= total - MIN_LOSS for tag, total in before.items()):
+    if were_attacked(before, now, observation.died):
         yield "attacked"
     if any(not observation.snapshot.units[tag].orders for tag in now):
         yield "idle"
+
+
+def were_attacked(before: Mapping[int, float], now: Mapping[int, float], died: Container[int]) -> bool:
+    """Return True if a unit that had the vitals `before` has lost health or died."""
+    return any(tag in died or now.get(tag, total) <= total - MIN_LOSS for tag, total in before.items())

@@ -5,7 +5,7 @@ the view, knowledge about the types in it, and the result of the last reply. It 
 page is a pure function of an observation, its task and the agent's feedback.
 
     page       registers, writes and shortens sections                    tokens, words    counting, small words
-    general, units, known, actions, reply, whole_side, leading            the sections, by topic
+    general, units, known, actions, reply, kept, whole_side, leading            the sections, by topic
 
 `SECTIONS_OF` lists the sections of a page by the agent's kind. A task may name others (`AgentConfig.sections`), and a
 program may register sections of its own.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.observe.text import actions, general, known, leading, reply, units, whole_side
+from khala_bridge.observe.text import actions, general, kept, known, leading, reply, units, whole_side
 from khala_bridge.observe.text.page import SECTIONS, Page, Section, find_sections, render, section, shorter
 from khala_bridge.observe.text.tokens import tokens
 
@@ -31,6 +31,7 @@ __all__ = [
     "actions",
     "find_sections",
     "general",
+    "kept",
     "known",
     "leading",
     "render",
@@ -43,8 +44,8 @@ __all__ = [
     "whole_side",
 ]
 
-_ACTING = ("valid_actions", "impossible", "arguments", "last_actions", "rejections")
-_ENDING = ("task", "messages", "communication", "answer")
+_ACTING = ("valid_actions", "impossible", "arguments", "standing", "last_actions", "rejections")
+_ENDING = ("task", "notes", "messages", "communication", "answer")
 
 SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
     "combat_group": ("game", "teams", "unit_knowledge", *_ACTING, *_ENDING),

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section
-from khala_bridge.observe.text.words import INDENT, one_line
+from khala_bridge.observe.text.words import INDENT, ago, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,4 +63,5 @@ def _message(message: Received, name: str) -> str:
     where = "" if message.recipient == name else f" in {message.recipient}"
     lines = (one_line(line) for line in message.text.splitlines())
     text = _QUOTES.sub('"', " / ".join(line for line in lines if line))
-    return f"Message from {message.sender}{where}: '''{text}'''"
+    age = "" if message.age_s is None else f", {ago(message.age_s)}"
+    return f"Message from {message.sender}{where}{age}: '''{text}'''"

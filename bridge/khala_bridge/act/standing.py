@@ -1,0 +1,208 @@
+"""Standing orders: calls that the host gives again and again, until they are revoked or their end is reached.
+
+A standing order goes the way of every other call, through `khala_bridge.act.translate` and its judgement. It comes
+after what agents say in the same turn, and is given at most once a turn. An order to a team with units is for those
+that are idle; one to the whole side waits while all that could do it are busy, so that no queue ties up minerals.
+
+State of one episode, a function of the words and the snapshots since its beginning. `khala_bridge.act.actor` is above.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from khala_bridge.act.rejected import CallRejected
+from khala_bridge.observe.triggers import were_attacked
+from khala_protocol.messages import Rejection, StandingView
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from khala_bridge.act.recognise import Recognised
+    from khala_bridge.act.translate import Command, Translator
+    from khala_bridge.act.until import Until
+    from khala_bridge.observe.observation import SideObservation
+    from khala_bridge.state import Snapshot
+
+PASSING = frozenset({"not_available", "too_many_actions"})
+"""Reasons of a refusal that may pass; a call that is refused for another one at first does not stand at all."""
+LASTING = frozenset({"dead_target", "unknown_target"})
+"""Reasons that end an order in force: its target is gone."""
+
+
+@dataclass(slots=True)
+class _Order:
+    """One order in force, or one that has ended since its agent was asked."""
+
+    number: int
+    said: Recognised
+    until: Until
+    vitals: dict[int, float]
+    """Health and shield by tag of the units whose fate may end it, in the step before."""
+    times: int = 0
+    waits_for: str = ""
+    ended: str = ""
+
+    @property
+    def text(self) -> str:
+        """The order as its agent reads it, `Developer <Train_Probe()> until 22 Probe`."""
+        return f"{self.said.text} until {self.until.text}" if self.until.text else self.said.text
+
+    @property
+    def view(self) -> StandingView:
+        """The order as its agent sees it."""
+        return StandingView(
+            number=self.number, order=self.text, times=self.times, waits_for=self.waits_for, ended=self.ended
+        )
+
+
+@dataclass(slots=True)
+class StandingOrders:
+    """The standing orders of a side in one episode."""
+
+    most: int
+    """Number of orders of one team."""
+    _orders: dict[str, list[_Order]] = field(default_factory=dict)
+    """By agent, in the order in which they were given."""
+    _given: dict[str, int] = field(default_factory=dict)
+    """By agent, how many it has given in the episode."""
+
+    def clear(self) -> None:
+        """Forget the episode before."""
+        self._orders.clear()
+        self._given.clear()
+
+    def views(self, agent: str) -> tuple[StandingView, ...]:
+        """Return an agent's orders in force, and those that have ended since it was asked."""
+        return tuple(order.view for order in self._orders.get(agent, ()))
+
+    def seen(self, agent: str) -> None:
+        """Forget the orders of an agent that have ended, since it has been told so."""
+        self._orders[agent] = self._in_force(agent)
+
+    def begin(self, said: Recognised, until: Until, translator: Translator, observation: SideObservation) -> None:
+        """Take an order; the same order again only changes its end.
+
+        Raises:
+            CallRejected: it could never be carried out, is over already, or is one too many.
+        """
+        agent, team = said.team.team.agent, said.team.view.name
+        if said.action.named:
+            raise CallRejected("wrong_arguments", f"{said.action.name} names a unit: a standing order is for a team.")
+        if until.is_reached(observation.snapshot, attacked=False):
+            raise CallRejected("not_available", f"The end of this standing order is reached already: {until.text}.")
+        mine = [order for order in self._in_force(agent) if order.said.team.view.name == team]
+        for order in mine:
+            if order.said.text == said.text:
+                order.until = until
+                return
+        if len(mine) >= self.most:
+            raise CallRejected("too_many_actions", self._too_many(team, mine))
+        first = _Trial(translator, said)
+        first.undo()
+        if isinstance(first.outcome, Rejection) and first.outcome.reason not in PASSING:
+            raise CallRejected(first.outcome.reason, first.outcome.message)
+        self._given[agent] = self._given.get(agent, 0) + 1
+        order = _Order(self._given[agent], said, until, _vitals(said, observation))
+        self._orders.setdefault(agent, []).append(order)
+
+    def revoke(self, agent: str, number: int) -> None:
+        """End an order.
+
+        Raises:
+            CallRejected: there is no such order in force.
+        """
+        mine = self._in_force(agent)
+        found = [order for order in mine if order.number == number]
+        if not found:
+            yours = f"yours are {', '.join(str(order.number) for order in mine)}" if mine else "you have none"
+            raise CallRejected("unknown_target", f"You have no standing order {number}; {yours}.")
+        self._orders[agent].remove(found[0])
+
+    def carry_out(self, observation: SideObservation, translator: Translator) -> Iterator[Command]:
+        """Yield the commands of all orders that are possible now, and end those that are over."""
+        for agent in observation.agents:
+            for order in self._in_force(agent):
+                before, order.vitals = order.vitals, _vitals(order.said, observation)
+                attacked = were_attacked(before, order.vitals, observation.died)
+                if order.until.is_reached(observation.snapshot, attacked=attacked):
+                    order.ended, order.waits_for = "its end is reached", ""
+                else:
+                    yield from _given_again(order, observation, translator)
+
+    def _in_force(self, agent: str) -> list[_Order]:
+        return [order for order in self._orders.get(agent, ()) if not order.ended]
+
+    def _too_many(self, team: str, mine: Sequence[_Order]) -> str:
+        if not self.most:
+            return "There are no standing orders in this task: give the order itself, again when it is needed."
+        numbers = ", ".join(str(order.number) for order in mine)
+        return (
+            f"Team {team} has its {self.most} standing orders already: revoke one of {numbers} with <Revoke(number)>."
+        )
+
+
+class _Trial:
+    """The translation of a call, which can be undone."""
+
+    def __init__(self, translator: Translator, said: Recognised) -> None:
+        self._translator = translator
+        self._before = copy.deepcopy(translator.ledger), set(translator.ordered)
+        self.outcome = translator.translate(said, standing=True)
+
+    def undo(self) -> None:
+        """Leave no trace in the accounts of the turn."""
+        self._translator.ledger, self._translator.ordered = self._before
+
+
+def _given_again(order: _Order, observation: SideObservation, translator: Translator) -> Sequence[Command]:
+    """Return the commands of an order, none if it has to wait; note why."""
+    said = _for_the_idle(order.said, observation, translator)
+    if isinstance(said, str):
+        order.waits_for = said
+        return ()
+    trial = _Trial(translator, said)
+    if isinstance(trial.outcome, Rejection):
+        order.waits_for = trial.outcome.message.rpartition(" now: ")[2].rstrip(".")
+        if trial.outcome.reason in LASTING:
+            order.ended, order.waits_for = order.waits_for, ""
+        return ()
+    if any(_is_busy(tag, observation.snapshot) for command in trial.outcome for tag in command.units):
+        trial.undo()
+        order.waits_for = "all that could do it are busy"
+        return ()
+    order.times, order.waits_for = order.times + 1, ""
+    return [replace(command, said=None) for command in trial.outcome]
+
+
+def _for_the_idle(said: Recognised, observation: SideObservation, translator: Translator) -> Recognised | str:
+    """Return the call for the units of its team that have no order; a reason if there are none."""
+    if said.team.team.kind == "side":
+        return said
+    units = observation.snapshot.units
+    teams = observation.teams[said.team.team.agent]
+    team = next((team for team in teams if team.name == said.team.team.name), None)
+    if team is None:
+        return "the team has no units"
+    idle = tuple(tag for tag in team.tags if tag in units and not units[tag].orders and tag not in translator.ordered)
+    if not idle:
+        return "no unit of the team is idle"
+    return replace(said, team=replace(said.team, team=replace(team, tags=idle)))
+
+
+def _is_busy(tag: int, snapshot: Snapshot) -> bool:
+    unit = snapshot.units[tag]
+    return unit.is_structure and bool(unit.orders)
+
+
+def _vitals(said: Recognised, observation: SideObservation) -> dict[int, float]:
+    """Return health and shield of the units of a call's team; of the whole side, if the team is one of it."""
+    units = observation.snapshot.units
+    if said.team.team.kind == "side":
+        tags: Sequence[int] = [unit.tag for unit in observation.snapshot.own]
+    else:
+        teams = observation.teams[said.team.team.agent]
+        tags = [tag for team in teams if team.name == said.team.team.name for tag in team.tags]
+    return {tag: units[tag].health + units[tag].shield for tag in tags if tag in units}
