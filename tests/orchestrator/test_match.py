@@ -311,3 +311,67 @@ async def test_a_match_can_be_played_without_anybody_to_hear_of_it(
     script: dict[tuple[str, int], str | Answer] = {("Stalkers", 0): "<MessageTo(Zealots, 'go')>"}
     match = _match(config(), await start(still_game()), Pool(script), SilentObserver())
     assert [result.steps async for result in match.play()] == [3]
+
+
+# --- what stays from step to step ---------------------------------------------------------------------------------
+
+
+async def test_notes_stay_until_they_are_forgotten_or_there_is_no_room(play: Play) -> None:
+    script: dict[tuple[str, int], str | Answer] = {
+        ("Stalkers", 0): "<Note('''hold the\nramp''')> <Note(two Zealots seen)>",
+        ("Stalkers", 1): "<Note(attack at 2:00)> <Forget(1)>",
+        ("Stalkers", 2): "<Forget(2)>",
+    }
+    played = await play(script, memory={"notes": 2}, max_steps=4)
+    one, two, three, four = played.pool.of("Stalkers")
+    assert "Your notes" not in one.text
+    assert "\nYour notes\n    1: (0:00) hold the ramp\n    2: (0:00) two Zealots seen\n" in two.text
+    assert [(note.number, note.text) for note in three.view.notes] == [(2, "two Zealots seen"), (3, "attack at 2:00")]
+    assert [fault.message for fault in three.rejections] == ["You have no note 1."]
+    assert [note.number for note in four.view.notes] == [3]
+    assert not any(seen.view.notes for seen in played.pool.of("Zealots"))
+
+
+async def test_without_a_notebook_a_note_is_refused(play: Play) -> None:
+    played = await play({("Stalkers", 0): "<Note(go)>"})
+    assert [fault.message for fault in played.pool.of("Stalkers")[1].rejections] == ["No notes are kept in this task."]
+
+
+async def test_a_message_stays_with_its_age_until_it_is_answered_or_too_old(play: Play) -> None:
+    script: dict[tuple[str, int], str | Answer] = {
+        ("Stalkers", 0): "<MessageTo(Zealots, 'go')>",
+        ("Stalkers", 3): "<MessageTo(Zealots, 'stop')>",
+        ("Zealots", 5): "<MessageTo(Stalkers, 'done')>",
+    }
+    played = await play(script, memory={"messages_s": 1.2}, step_loops=11, max_steps=7)
+    ages = [[(one.text, one.age_s) for one in seen.messages] for seen in played.pool.of("Zealots")]
+    assert ages == [[], [("go", 0.5)], [("go", 1.0)], [], [("stop", 0.5)], [("stop", 1.0)], []]
+    assert "    Message from Stalkers, 0:01 ago: '''go'''\n" in played.pool.of("Zealots")[2].text
+
+
+async def test_a_refusal_that_repeats_names_what_is_possible_instead(play: Play) -> None:
+    blink = "Actions:\nTeam Stalker-1:\n<Ability_Blink_Screen([12, 12])>"
+    script: dict[tuple[str, int], str | Answer] = {("Stalkers", step): blink for step in (0, 1, 2, 4)}
+    played = await play(script, max_steps=6)
+    said = [" ".join(fault.message for fault in seen.rejections) for seen in played.pool.of("Stalkers")]
+    again = " Refused 3 times in a row for the same reason; possible now: "
+    assert [again in words for words in said] == [False, False, False, True, False, False]
+    assert "Attack_Unit" in said[3].partition(again)[2]
+    assert said[4] == ""
+    assert "in a row" not in said[5]
+
+
+async def test_a_standing_order_is_carried_out_until_it_is_revoked(play: Play) -> None:
+    script: dict[tuple[str, int], str | Answer] = {
+        ("Stalkers", 0): "Actions:\nTeam Stalker-1:\n<Standing(Attack_Unit(0xb), until 1:00)>",
+        ("Stalkers", 2): "<Revoke(1)> <Revoke(4)>",
+    }
+    played = await play(script, standing_orders=2, max_steps=4)
+    assert [report.functions for report in played.ear.reports] == [("Attack_unit(now, [0x1], 0xb)",)] * 2 + [()] * 2
+    one, two, three, four = played.pool.of("Stalkers")
+    assert two.accepted == ("Stalker-1 <Standing(Attack_Unit(0xb), until 1:00)>",)
+    assert "1: Stalker-1 <Attack_Unit(0xb)> until 1:00: carried out 2 times\n" in three.text
+    assert four.accepted == ("<Revoke(1)>",)
+    assert [fault.message for fault in four.rejections] == ["You have no standing order 4; you have none."]
+    assert not one.view.standing
+    assert not four.view.standing
