@@ -38,6 +38,7 @@ from khala.options import (
     Latency,
     MaxSteps,
     MaxWait,
+    Memory,
     Mind,
     Model,
     ModelName,
@@ -130,6 +131,7 @@ def run(
     speed: Speed = None,
     grace: Grace = None,
     max_steps: MaxSteps = None,
+    memory: Memory = None,
     images: Images = None,
     run: RunName = None,
     assemble: Assemble = 60.0,
@@ -149,7 +151,7 @@ def run(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
         thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
+        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
     )  # fmt: skip
     common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
     named = named_sides(side_model or (), blue=blue, red=red)
@@ -184,6 +186,7 @@ def host(
     speed: Speed = None,
     grace: Grace = None,
     max_steps: MaxSteps = None,
+    memory: Memory = None,
     images: Images = None,
     assemble: Assemble = 60.0,
     out: Out = Path("runs"),
@@ -200,7 +203,7 @@ def host(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
         executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
         thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, images=images, opponent=opponent,
+        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
     )  # fmt: skip
     bus = _bus(config, connect, listen, tls, insecure=insecure)
     _until_interrupted(

@@ -39,6 +39,7 @@ RECORDED = {
     "speed": "--speed",
     "grace_s": "--grace",
     "max_steps": "--max-steps",
+    "memory": "--memory",
     "images": "--images",
     "opponent": "--opponent",
 }

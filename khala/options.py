@@ -77,6 +77,14 @@ Opponent = Annotated[
         metavar="WHO",
     ),
 ]
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        help="What agents know of the steps before: a number of steps, or such as steps=4,summary=20,notes=8.",
+        show_default="as the task says",
+        metavar="RULE",
+    ),
+]
 Assemble = Annotated[float, typer.Option(min=0.1, help="How long to wait for the agents at the start, in seconds.")]
 Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 Model = Annotated[

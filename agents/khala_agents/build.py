@@ -28,7 +28,6 @@ from khala_agents.llm.replay import ReplayClient
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
-from khala_agents.memory import LastSteps
 from khala_agents.policy import Policy, as_policy
 from khala_agents.scripted.players import PLAYERS
 from khala_agents.scripted.policies import Player, Silent
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_agents.llm.client import LLMClient
-    from khala_protocol.messages import ModelCall
+    from khala_protocol.messages import MemoryRule, ModelCall
 
 
 log = logging.getLogger(__name__)
@@ -114,7 +113,7 @@ class Workshop:
         config, limits = self._model(spec.model)
         model = LLMPolicy(
             client_for(config),
-            memory=LastSteps(spec.memory) if spec.memory else None,
+            memory=spec.memory,
             retry=config.retry,
             limits=limits,
             try_timeout_s=config.try_timeout_s,
@@ -150,21 +149,19 @@ def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, 
         raise ConfigError(fault["msg"].removeprefix("Value error, "), source=source, field=field) from None
 
 
-def replay_policies(exchanges: Iterable[ModelCall], *, memory: int = 0) -> dict[str, LLMPolicy]:
+def replay_policies(exchanges: Iterable[ModelCall], *, memory: MemoryRule | None = None) -> dict[str, LLMPolicy]:
     """Return a policy for each agent that made the recorded requests; it gets the recorded answers without waiting.
 
     Args:
         exchanges: of one run, in any order.
-        memory: as the recorded agents had it.
+        memory: as the recorded agents had it of their own; None: as the task said.
     """
     by_agent: dict[str, list[ModelCall]] = {}
     for exchange in exchanges:
         by_agent.setdefault(exchange.agent, []).append(exchange)
     at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
     return {
-        agent: LLMPolicy(
-            ReplayClient(made), memory=LastSteps(memory) if memory else None, retry=at_once, vision=_vision_of(made)
-        )
+        agent: LLMPolicy(ReplayClient(made), memory=memory, retry=at_once, vision=_vision_of(made))
         for agent, made in by_agent.items()
     }
 

@@ -73,7 +73,14 @@ def agent(
     ] = None,
     base_url: Annotated[str | None, typer.Option(help="Use the model at this address instead of its file's.")] = None,
     model_name: Annotated[str | None, typer.Option(help="Use this model instead of its file's.")] = None,
-    memory: Annotated[int, typer.Option(min=0, help="Past steps that the prompt repeats, word for word.")] = 0,
+    memory: Annotated[
+        str | None,
+        typer.Option(
+            help="Past steps in the prompt: a number, or such as steps=4,summary=20 or steps=2,whole=true.",
+            show_default="as the task says",
+            metavar="RULE",
+        ),
+    ] = None,
     budget_usd: Annotated[
         float | None,
         typer.Option(min=0.0, help="Limit of this process in US dollars; beyond it, its agents do nothing."),

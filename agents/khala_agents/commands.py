@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import typer
+from pydantic import ValidationError
 
 from khala_agents.build import Workshop
 from khala_agents.config import AgentsFile, WorkerSpec, load_agents
@@ -24,6 +25,7 @@ from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.configfile import words_of
 from khala_protocol.errors import BusError, ConfigError
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, check_name
@@ -128,7 +130,7 @@ def specs(
     *,
     model: str | None,
     policy: str | None,
-    memory: int,
+    memory: str | None,
     path: Path | None,
     fallback: str | None = None,
 ) -> AgentsFile:
@@ -148,9 +150,17 @@ def specs(
         raise ConfigError("an agent decides with a model or with a policy: give --model or --policy, not both")
     if policy and fallback:
         raise ConfigError("--fallback is for agents with a model: leave it out, or --policy")
-    default = WorkerSpec(model=model or "scripted", memory=memory, fallback=fallback)
+    default = _with_model(model or "scripted", memory, fallback)
     spec = WorkerSpec(policy=policy) if policy else default
     return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
+
+
+def _with_model(model: str, memory: str | None, fallback: str | None) -> WorkerSpec:
+    fields = {"model": model, "fallback": fallback} | ({} if memory is None else {"memory": memory})
+    try:
+        return WorkerSpec.model_validate(fields)
+    except ValidationError as error:
+        raise ConfigError(words_of(error.errors(include_url=False)[0]), source="--memory") from None
 
 
 def _settle_memory() -> None:

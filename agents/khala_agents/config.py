@@ -24,7 +24,7 @@ from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Frozen, Pace
+from khala_protocol.messages import Frozen, MemoryRule, Pace
 
 _VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
 _KEY_LIKE = re.compile(r"key|token$|secret|password|authorization", re.IGNORECASE)
@@ -117,8 +117,18 @@ class WorkerSpec(Frozen):
     fallback: str | None = None
     """A policy, named as in `policy`, that decides where the model has no reply because its endpoint is away, the money
     is used up or the time is over. With a model only."""
-    memory: int = Field(default=0, ge=0)
-    """Number of past steps that the prompt repeats word for word before the observation; with a model only."""
+    memory: MemoryRule | None = None
+    """What its prompt has of the steps before, instead of what the task says: `2`, or `steps`, `whole` and `summary`.
+    With a model only; `notes` and `messages_s` are for the host to keep, and stand in the task file."""
+
+    @field_validator("memory")
+    @classmethod
+    def _of_the_agent(cls, rule: MemoryRule | None) -> MemoryRule | None:
+        if rule is not None and (kept := rule.model_fields_set & {"notes", "messages_s"}):
+            raise ValueError(
+                f"the host keeps {' and '.join(sorted(kept))}: say it in the task file, or to `khala host`"
+            )
+        return rule
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:

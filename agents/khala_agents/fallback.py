@@ -66,6 +66,11 @@ class Fallback(Policy):
         decision = said if isinstance(said, Decision) else Decision(said)
         return dataclasses.replace(decision, status="fallback", detail=f"{why}: {self._name}")
 
+    async def reflect(self, context: Context) -> None:
+        """Have both think on."""
+        await self._other.reflect(context)
+        await self.model.reflect(context)
+
     async def close(self) -> None:
         """Close both."""
         try:

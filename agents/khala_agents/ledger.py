@@ -34,6 +34,7 @@ class UsageLedger:
         self._agent = agent
         self._step: Step | None = None
         self._spent: list[Usage] = []
+        self._beside = Usage()
         self._waiting: asyncio.Queue[ModelCall] = asyncio.Queue()
 
     def open(self, step: Step) -> None:
@@ -41,15 +42,21 @@ class UsageLedger:
         self._step, self._spent = step, []
 
     def note(self, exchange: ModelCall) -> None:
-        """Note an exchange; one of an older step is published, but not counted for this step."""
-        if (exchange.episode, exchange.step) == self._step:
+        """Note an exchange; a decision's of an older step is published, but not counted for this step.
+
+        What was asked beside decisions is counted for the next reply.
+        """
+        if exchange.purpose != "decision":
+            self._beside += exchange.usage
+        elif (exchange.episode, exchange.step) == self._step:
             self._spent.append(exchange.usage)
         self.usage += exchange.usage
         self._waiting.put_nowait(exchange)
 
     def account(self) -> tuple[int, Usage]:
-        """Return the number of requests of the open step, and their usage."""
-        return len(self._spent), sum(self._spent, Usage())
+        """Return the number of requests of the open step, and their usage with that beside it."""
+        beside, self._beside = self._beside, Usage()
+        return len(self._spent), sum(self._spent, beside)
 
     async def publish(self, publisher: Publisher) -> None:
         """Publish exchanges as they arrive, until cancelled."""

@@ -1,12 +1,14 @@
 """The policy that asks a language model: prompt → tries within limits → the model's words.
 
-Above it: the worker, which cancels it at the deadline. Below it: `khala_agents.prompt`, `khala_agents.memory` and
-`khala_agents.llm`. It knows no bus. Each try, even a failed or cancelled one, goes to the trace of its context.
+Above it: the worker, which cancels it at the deadline. Below it: `khala_agents.prompt`, `khala_agents.memory`,
+`khala_agents.summary` and `khala_agents.llm`. It knows no bus. Each try, even a failed or cancelled one, goes to the
+trace of its context.
 """
 
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
 import random
 from typing import TYPE_CHECKING
@@ -24,18 +26,19 @@ from khala_agents.llm.client import (
 )
 from khala_agents.llm.limits import Limits
 from khala_agents.llm.retry import RetryRule, retried
-from khala_agents.memory import Memory, NoMemory
+from khala_agents.memory import Memory, NoMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Policy
 from khala_agents.prompt import Prompt
-from khala_protocol.messages import ModelCall, Usage
+from khala_agents.summary import Summary
+from khala_protocol.messages import MemoryRule, ModelCall, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context
-    from khala_protocol.messages import Briefing, ChatMessage, Pace
+    from khala_protocol.messages import Briefing, ChatMessage, Pace, Purpose
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +52,7 @@ class LLMPolicy(Policy):
 
     Args:
         client: the model; closed with the policy.
-        memory: what is carried from step to step.
+        memory: what is carried from step to step: a rule, or a memory of yours; None: as the briefing says.
         retry: how often a failed try is repeated.
         limits: shared with other agents of the process.
         breaker: shared with the agents of the process that ask the same endpoint.
@@ -63,7 +66,7 @@ class LLMPolicy(Policy):
         self,
         client: LLMClient,
         *,
-        memory: Memory | None = None,
+        memory: Memory | MemoryRule | None = None,
         retry: RetryRule | None = None,
         limits: Limits | None = None,
         breaker: Breaker | None = None,
@@ -79,7 +82,10 @@ class LLMPolicy(Policy):
         self.vision = vision
         self.pace = pace
         self._warned_blind = False
-        self._memory = memory or NoMemory()
+        self._rule = memory if isinstance(memory, MemoryRule) else None
+        self._own_memory = None if isinstance(memory, MemoryRule) else memory
+        self._memory: Memory = self._own_memory or NoMemory()
+        self._summary = Summary(0)
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
         self._prompt: tuple[Briefing, Prompt] | None = None
@@ -94,7 +100,7 @@ class LLMPolicy(Policy):
     async def prepare(self, briefing: Briefing) -> None:
         """Begin an episode: build the prompt, forget the last episode, open a fresh connection."""
         self._prompt_for(briefing)
-        self._memory.clear()
+        self._remember_for(briefing)
         await self.client.refresh()
 
     async def decide(self, context: Context) -> str:
@@ -106,16 +112,45 @@ class LLMPolicy(Policy):
         observation = context.observation
         pictures = await self._look(context)
         wanted = observation.images[: self.vision.max_images] if self.vision else ()
-        prompt = self._prompt_for(context.briefing).messages(
-            observation.text,
-            self._memory.recall(),
+        prompt = self._prompt_for(context.briefing)
+        self._summary.begin_decision(observation)
+        recalled = self._memory.recall(observation)
+        above = [text for text in (self._summary.above, recalled.text) if text]
+        messages = prompt.messages(
+            "\n".join([*above, observation.text]),
+            recalled.messages,
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        tries = _Tries(self, context, prompt, pictures)
-        completion = await retried(tries.once, self._retry, deadline=context.deadline, rng=self._rng)
-        self._memory.remember(observation, completion.text)
-        return completion.text
+        text = await self._completed(_Tries(self, context, messages, pictures))
+        self._memory.remember(observation, text)
+        self._summary.end_decision(observation, text)
+        return text
+
+    async def reflect(self, context: Context) -> None:
+        """Ask for a new summary of the game, if one is due."""
+        if not self._summary.is_due:
+            return
+        summary = self._summary
+
+        def trace(exchange: ModelCall) -> None:
+            summary.note(exchange)
+            context.trace(exchange)
+
+        prompt = self._prompt_for(context.briefing).messages(summary.ask(context.observation))
+        asking = _Tries(self, dataclasses.replace(context, trace=trace), prompt, {}, purpose="summary")
+        try:
+            await self._completed(asking)
+        except LLMError as error:
+            log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
+
+    async def _completed(self, tries: _Tries) -> str:
+        """Return the model's words.
+
+        Raises:
+            LLMError: the last try failed; its error.
+        """
+        return (await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)).text
 
     async def close(self) -> None:
         """Close the client."""
@@ -140,13 +175,21 @@ class LLMPolicy(Policy):
         return await context.pictures.get(observation.images[: self.vision.max_images], patience_s)
 
     def _prompt_for(self, briefing: Briefing) -> Prompt:
-        if self._prompt is None or self._prompt[0] is not briefing:
+        if self._prompt is None or (self._prompt[0] is not briefing and self._prompt[0] != briefing):
             self._prompt = (briefing, Prompt(briefing))
+            self._remember_for(briefing)
         return self._prompt[1]
+
+    def _remember_for(self, briefing: Briefing) -> None:
+        """Begin with an empty memory, as the configuration of the agent says, or else the task."""
+        rule = self._rule or briefing.memory
+        self._memory = self._own_memory or memory_of(rule)
+        self._memory.clear()
+        self._summary = Summary(0 if self._own_memory else rule.summary)
 
 
 class _Tries:
-    """The tries of one decision, counted and traced."""
+    """The tries of one decision or summary, counted and traced."""
 
     def __init__(
         self,
@@ -154,12 +197,16 @@ class _Tries:
         context: Context,
         prompt: tuple[ChatMessage, ...],
         pictures: Mapping[str, bytes],
+        *,
+        purpose: Purpose = "decision",
     ) -> None:
         observation = context.observation
+        self.deadline = context.deadline
+        self._purpose: Purpose = purpose
         self._policy = policy
         self._context = context
         self._prompt = prompt
-        self._origin = Origin(observation.agent, observation.episode, observation.step)
+        self._origin = Origin(observation.agent, observation.episode, observation.step, purpose)
         self._pictures = pictures
         self._tokens = estimated_tokens(prompt, policy.vision)
         self._images = Usage(
@@ -213,7 +260,12 @@ class _Tries:
         if self._context.deadline is not None:
             timeout_s = min(timeout_s, max(self._context.deadline - now, 0.0))
         return Request(
-            self._prompt, timeout_s=timeout_s, origin=self._origin, attempt=self._made, pictures=self._pictures
+            self._prompt,
+            timeout_s=timeout_s,
+            origin=self._origin,
+            attempt=self._made,
+            pictures=self._pictures,
+            stable=Prompt.STABLE,
         )
 
     def _trace(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
@@ -224,6 +276,7 @@ class _Tries:
             side=seen.side,
             episode=seen.episode,
             step=seen.step,
+            purpose=self._purpose,
             attempt=self._made,
             model=self._policy.client.model,
             endpoint=self._policy.client.endpoint,

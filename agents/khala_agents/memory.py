@@ -1,18 +1,40 @@
 """What an agent carries from one step to the next in its prompt.
 
-An observation already reports the results of the last actions and the new messages, so no memory is a
-good default; the memories here add earlier steps word for word. Any object with these three methods works.
+An observation already reports the results of the last actions and the new messages, so no memory is a good default.
+The memories here add earlier steps, in short or word for word. Any object with these methods works. The summary of
+the game is another matter, for a model makes it: `khala_agents.summary`.
 """
 
 from __future__ import annotations
 
+import re
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from khala_protocol.messages import ChatMessage
+from khala_protocol.speech import parse
+from khala_protocol.speech.words import ANALYSIS
 
 if TYPE_CHECKING:
-    from khala_protocol.messages import Observation
+    from collections.abc import Iterator
+
+    from khala_protocol.messages import MemoryRule, Observation, Received, Rejection
+
+MAX_THOUGHT_CHARACTERS = 200
+"""Longest first sentence of an analysis; the rest is cut."""
+_THOUGHTS_END = re.compile(r"</\s*think(?:ing)?\s*>|◁/think▷", re.IGNORECASE)
+_ANALYSIS = re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*:?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
+_SENTENCE = re.compile(r"[^\n]*?[.!?。](?=\s|$)|[^\n]*")
+
+
+class Recalled(NamedTuple):
+    """What a memory adds to a prompt."""
+
+    messages: tuple[ChatMessage, ...] = ()
+    """Between the example and the new observation."""
+    text: str = ""
+    """Above the observation, in its message."""
 
 
 class Memory(Protocol):
@@ -22,8 +44,8 @@ class Memory(Protocol):
         """Note a step that was answered."""
         ...
 
-    def recall(self) -> tuple[ChatMessage, ...]:
-        """Return the messages of the prompt between the example and the new observation."""
+    def recall(self, observation: Observation) -> Recalled:
+        """Return what the prompt for a new observation has of the steps before."""
         ...
 
     def clear(self) -> None:
@@ -37,16 +59,16 @@ class NoMemory:
     def remember(self, observation: Observation, reply: str) -> None:
         """Do nothing."""
 
-    def recall(self) -> tuple[ChatMessage, ...]:
+    def recall(self, observation: Observation) -> Recalled:  # noqa: ARG002  # as in Memory
         """Return nothing."""
-        return ()
+        return Recalled()
 
     def clear(self) -> None:
         """Do nothing."""
 
 
-class LastSteps:
-    """A memory of the last `count` observations and replies, unchanged, without their pictures."""
+class WholeSteps:
+    """A memory of the last `count` observations and replies, word for word, without their pictures."""
 
     def __init__(self, count: int) -> None:
         self._steps: deque[tuple[str, str]] = deque(maxlen=count)
@@ -55,14 +77,109 @@ class LastSteps:
         """Note a step, and forget the oldest if there are too many."""
         self._steps.append((observation.text, reply))
 
-    def recall(self) -> tuple[ChatMessage, ...]:
+    def recall(self, observation: Observation) -> Recalled:  # noqa: ARG002  # as in Memory
         """Return a user and an assistant message per step, the oldest first."""
-        return tuple(
-            message
-            for seen, said in self._steps
-            for message in (ChatMessage(role="user", content=seen), ChatMessage(role="assistant", content=said))
+        return Recalled(
+            tuple(
+                message
+                for seen, said in self._steps
+                for message in (ChatMessage(role="user", content=seen), ChatMessage(role="assistant", content=said))
+            )
         )
 
     def clear(self) -> None:
         """Forget everything."""
         self._steps.clear()
+
+
+@dataclass(slots=True)
+class Step:
+    """One step in short: what was thought, said and heard, and what became of the orders."""
+
+    time_s: float
+    thought: str
+    wrote: tuple[str, ...]
+    messages: tuple[Received, ...]
+    after: Observation | None = None
+    """The next observation, which says what was accepted and refused."""
+
+    @classmethod
+    def of(cls, observation: Observation, reply: str) -> Step:
+        """Return what is kept of a step."""
+        wrote = tuple(f"to {said.recipient}: {_line(said.text)}" for said in parse(reply).messages)
+        return cls(observation.view.time_s, first_sentence(reply), wrote, observation.messages)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the step as a prompt has it."""
+        yield f"    {minutes(self.time_s)} {self.thought}".rstrip()
+        yield from (f"        read from {message.sender}: {_line(message.text)}" for message in self.messages)
+        yield from (f"        wrote {words}" for words in self.wrote)
+        if self.after is not None:
+            yield from (f"        done: {call}" for call in self.after.accepted)
+            yield from (f"        refused: {_refusal(rejection)}" for rejection in self.after.rejections)
+
+
+class ShortSteps:
+    """A memory of the last `count` steps in short form, one block of text above the observation."""
+
+    def __init__(self, count: int) -> None:
+        self._steps: deque[Step] = deque(maxlen=count)
+
+    def remember(self, observation: Observation, reply: str) -> None:
+        """Note a step, and forget the oldest if there are too many."""
+        self._steps.append(Step.of(observation, reply))
+
+    def recall(self, observation: Observation) -> Recalled:
+        """Return the steps, the oldest first; the new observation itself says what became of the last one."""
+        if not self._steps:
+            return Recalled()
+        lines = ["Your last steps", *(line for step in self._steps for line in step.lines())]
+        end_step(self._steps[-1], observation)
+        return Recalled(text="\n".join(lines) + "\n")
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._steps.clear()
+
+
+def memory_of(rule: MemoryRule) -> Memory:
+    """Return the memory that a rule asks for."""
+    if not rule.steps:
+        return NoMemory()
+    return WholeSteps(rule.steps) if rule.whole else ShortSteps(rule.steps)
+
+
+def end_step(step: Step, observation: Observation) -> None:
+    """Note the observation that follows a step; only the first one says what became of it."""
+    if step.after is None:
+        step.after = observation
+
+
+def first_sentence(reply: str) -> str:
+    """Return the first sentence of a reply's analysis; of the reply, if it has no such heading; "" for mere calls."""
+    said = _THOUGHTS_END.split(reply)[-1]
+    heading = _ANALYSIS.search(said)
+    rest = said[heading.end() :] if heading else said.lstrip()
+    found = _SENTENCE.match(rest)
+    sentence = _line(found[0] if found else "")
+    if not heading and (sentence.startswith("<") or sentence.endswith(":")):
+        return ""
+    return _cut(sentence, MAX_THOUGHT_CHARACTERS)
+
+
+def minutes(seconds: float) -> str:
+    """Return a time of the game as `1:05`."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
+
+
+def _refusal(rejection: Rejection) -> str:
+    words = _line(f"{rejection.team} {rejection.text}" if rejection.team else rejection.text)
+    return f"{words} ({_line(rejection.message)})" if words else _line(rejection.message)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 1] + "…"

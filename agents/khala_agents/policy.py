@@ -128,6 +128,12 @@ class Policy(ABC):
         It may be cancelled at any moment: when its time is over or a newer observation arrives.
         """
 
+    async def reflect(self, context: Context) -> None:  # noqa: B027  # a hook
+        """Think on after a reply was sent, beside the next decisions; `context` is of that reply, with new time.
+
+        It may be cancelled at any moment, and is when the worker ends.
+        """
+
     async def close(self) -> None:  # noqa: B027  # a hook
         """Release all resources, when the worker ends."""
 

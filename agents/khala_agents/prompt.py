@@ -3,19 +3,30 @@
 All that stays the same during an episode is put together once and stands at the front, word for word the
 same in each step, so that a provider can cache it: the agent's role, its task, its teams, its actions
 and their form, how to answer, and a worked example: the host's, or one made of the agent's own teams and
-actions. The messages that the memory recalls follow, and the observation as the host wrote it.
+actions. The messages that the memory recalls follow, and the observation as the host wrote it; above it in the same
+message stand the summary of the game, which changes rarely, and the last steps.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from khala_protocol.messages import ActionSpec, AgentKind, Briefing, Clock, Contact, Frames, ImageRef, TeamSpec
+    from khala_protocol.messages import (
+        ActionSpec,
+        AgentKind,
+        Briefing,
+        Clock,
+        Contact,
+        Frames,
+        ImageRef,
+        MemoryRule,
+        TeamSpec,
+    )
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
 """Tags of the example; a game's own tags are longer, so that a copied one is noticed at once."""
@@ -24,6 +35,9 @@ _EXAMPLE_VALUES = {"screen": "[14.5, 9]", "minimap": "[31, 22]"}
 
 class Prompt:
     """The prompts of one episode."""
+
+    STABLE: ClassVar[int] = 3
+    """Number of messages at the front that are the same in all of them."""
 
     def __init__(self, briefing: Briefing) -> None:
         seen, said = _example(briefing)
@@ -69,6 +83,8 @@ def system_text(briefing: Briefing) -> str:
         ("Actions", _actions(briefing.actions)),
         ("Arguments", _arguments(briefing.actions, briefing.frames)),
         ("Communication", _communication(briefing.correspondents, briefing.channels)),
+        ("Memory", _memory(briefing.memory)),
+        ("Standing orders", _standing(briefing)),
         ("How to answer", _format(briefing)),
     )
     return "\n\n".join(f"# {title}\n{text}" for title, text in sections if text)
@@ -174,6 +190,34 @@ def _communication(correspondents: Sequence[Contact], channels: Sequence[str]) -
     if channels:
         lines.append("<ListenTo(channel)> lets you hear a channel from the next observation on.")
     return "\n".join(lines)
+
+
+def _memory(rule: MemoryRule) -> str:
+    lines = []
+    if rule.notes:
+        lines += [
+            "<Note('''text''')> keeps a note for yourself, of at most 200 characters.",
+            f"You have room for {rule.notes} notes; then the oldest one goes. <Forget(2)> removes note 2.",
+        ]
+    if rule.messages_s:
+        lines += [
+            f"A message to you is shown for {rule.messages_s:g} s of game time, or until you write to its sender."
+        ]
+    return "\n".join(lines)
+
+
+_STANDING = """\
+<Standing({call}, until 4:30)> under the heading of a team has the host give this action again and again.
+It is given to idle units of the team; for a team without units, once a step whenever it is possible.
+It ends at 4:30 of the game's clock. Other ends: until 22 Probe (so many, with those in production), until \
+WarpGateResearch (an upgrade), until attacked, until minerals 400. Without an end it goes on until you revoke it.
+<Revoke(1)> ends standing order 1. A team has at most {most}; they do not count as actions of a step."""
+
+
+def _standing(briefing: Briefing) -> str:
+    plain = [action.name for action in briefing.actions if not action.args]
+    call = f"{plain[0]}()" if plain else "Action(arguments)"
+    return _STANDING.format(call=call, most=briefing.standing_orders) if briefing.standing_orders else ""
 
 
 def _format(briefing: Briefing) -> str:

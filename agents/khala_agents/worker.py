@@ -123,6 +123,7 @@ class Worker:
         self._began_again = False
         self._last_reply: Reply | None = None
         self._deciding: asyncio.Task[None] | None = None
+        self._reflecting: set[asyncio.Task[None]] = set()
         self._preparing: asyncio.Task[None] | None = None
 
     async def play(self, stop: asyncio.Event) -> WorkerTally:
@@ -148,7 +149,7 @@ class Worker:
                 group.create_task(self._watch(stop)),
             ]
             await self._ended.wait()
-            for task in (*tasks, self._deciding, self._preparing):
+            for task in (*tasks, self._deciding, self._preparing, *self._reflecting):
                 _cancel(task)
             if self._deciding:
                 await asyncio.wait({self._deciding})
@@ -185,7 +186,8 @@ class Worker:
                 continue
             self._newest, self._began_again = observation, False
             self._supersede()
-            self._deciding = group.create_task(self._answer(observation, links), name=f"answer {self._name} {at}")
+            answering = self._answer(observation, links, group)
+            self._deciding = group.create_task(answering, name=f"answer {self._name} {at}")
         self._end("bus closed")
 
     def _is_new(self, observation: Observation) -> bool:
@@ -209,8 +211,8 @@ class Worker:
 
     # --- answering ----------------------------------------------------------------------------------
 
-    async def _answer(self, observation: Observation, links: Links) -> None:
-        """Play one turn: decide, then send. Only deciding can be cancelled."""
+    async def _answer(self, observation: Observation, links: Links, group: asyncio.TaskGroup) -> None:
+        """Play one turn: decide, send, then let the policy think on. Sending cannot be cancelled."""
         arrived = self._clock()
         self._ledger.open((observation.episode, observation.step))
         time_s = time_to_decide_s(observation.answer_within_s)
@@ -222,6 +224,17 @@ class Worker:
             self._end("bus closed")
         except BusError as error:  # the host will find this step unanswered, and the next may get through
             log.warning("agent %s: the reply to step %d could not be sent: %s", self._name, observation.step, error)
+        else:
+            self._reflect(observation, group)
+
+    def _reflect(self, observation: Observation, group: asyncio.TaskGroup) -> None:
+        briefing = self._briefings.newest
+        if briefing is None or self._ended.is_set():
+            return
+        context = Context(briefing, observation, self._pictures, self._ledger.note, self._clock())
+        task = group.create_task(self._guard.safely("reflecting", self._policy.reflect, context))
+        self._reflecting.add(task)
+        task.add_done_callback(self._reflecting.discard)
 
     async def _decide(self, observation: Observation, arrived: float) -> Said:
         briefing = await self._briefings.of(observation.episode)
@@ -240,7 +253,7 @@ class Worker:
             detail=decision.detail,
             latency_s=latency_s,
             attempts=attempts or decision.attempts,
-            usage=usage if attempts else decision.usage,
+            usage=usage if attempts or usage.requests else decision.usage,
             pace=self._policy.pace,
         )
         self._last_reply = reply

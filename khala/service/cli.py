@@ -26,6 +26,7 @@ from khala.options import (
     Latency,
     MaxSteps,
     MaxWait,
+    Memory,
     Mind,
     Model,
     ModelName,
@@ -224,6 +225,7 @@ def submit(
     speed: Speed = None,
     grace: Grace = None,
     max_steps: MaxSteps = None,
+    memory: Memory = None,
     images: Images = None,
     run: RunName = None,
     assemble: Assemble = 60.0,
@@ -242,7 +244,7 @@ def submit(
     given: dict[str, Any] = {
         "seed": seed, "episodes": episodes, "executor": executor, "rule": clock, "max_wait_s": max_wait,
         "step_loops": step_loops, "thinking_loops": thinking_loops, "speed": speed, "grace_s": grace,
-        "max_steps": max_steps, "images": images,
+        "max_steps": max_steps, "memory": memory, "images": images,
     }  # fmt: skip
     if resume is not None:
         refuse_others(None, task=task, run=None if run == resume else run, **given)

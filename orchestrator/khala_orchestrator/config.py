@@ -22,7 +22,7 @@ from khala_configs import CONFIGS
 from khala_protocol.configfile import load, words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Clock, Frozen
+from khala_protocol.messages import Clock, Frozen, MemoryRule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -85,7 +85,7 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     """Return the task with fields replaced. None changes nothing.
 
     `rule`, `max_wait_s` and other fields of `Clock` are those of its clock, `images` are the images of all agents, of
-    every side, see `images_for`.
+    every side, see `images_for`; what `memory` says holds for all of them, and the rest stays.
 
     Raises:
         ConfigError: a value does not fit.
@@ -96,10 +96,16 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
         if name in given:
             fields["clock"][name] = given.pop(name)
     try:
+        agents = [agent for side in (fields, *fields["sides"]) for agent in side["agents"] or ()]
         if "images" in given:
             asked = given.pop("images")
-            for agent in (agent for side in (fields, *fields["sides"]) for agent in side["agents"] or ()):
+            for agent in agents:
                 agent["images"] = images_for(asked, agent["kind"])
+        if "memory" in given:
+            rule = MemoryRule.model_validate(given.pop("memory")).model_dump(exclude_unset=True)
+            for part in (fields, *fields["sides"], *agents):
+                if part["memory"] is not None:
+                    part["memory"] |= rule
         return TaskConfig.model_validate(fields | given)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]

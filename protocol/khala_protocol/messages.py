@@ -588,6 +588,8 @@ class Usage(Frozen):
     completion_tokens: Count = 0
     cached_tokens: Count = 0
     """The part of `prompt_tokens` that the provider had in its cache."""
+    cache_write_tokens: Count = 0
+    """The part of `prompt_tokens` that the provider put into its cache."""
     reasoning_tokens: Count = 0
     """The part of `completion_tokens` that was reasoning."""
     cost_usd: float | None = Field(default=None, ge=0, le=MOST)
@@ -606,6 +608,7 @@ class Usage(Frozen):
             prompt_tokens=min(self.prompt_tokens + other.prompt_tokens, MOST),
             completion_tokens=min(self.completion_tokens + other.completion_tokens, MOST),
             cached_tokens=min(self.cached_tokens + other.cached_tokens, MOST),
+            cache_write_tokens=min(self.cache_write_tokens + other.cache_write_tokens, MOST),
             reasoning_tokens=min(self.reasoning_tokens + other.reasoning_tokens, MOST),
             cost_usd=min(sum(costs), MOST) if costs else None,
             unknown_requests=min(self.unknown_requests + other.unknown_requests, MOST),

@@ -16,7 +16,7 @@ from khala_agents.llm.pricing import Prices
 from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
-from khala_agents.memory import LastSteps
+from khala_agents.memory import WholeSteps
 from khala_agents.policy import Context
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import ModelCall, Usage
@@ -115,7 +115,7 @@ async def test_memory_is_of_one_episode_and_of_answered_steps_only(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     model = listed_model("one", EndpointUnavailable("x", status="http 500"), "three", "four")
-    policy, _ = traced(model, memory=LastSteps(5), retry=RetryRule(tries=1))
+    policy, _ = traced(model, memory=WholeSteps(5), retry=RetryRule(tries=1))
     await policy.policy.prepare(briefing())
     await policy.decide(briefing(), observation(0))
     with pytest.raises(LLMError):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_agents.memory import LastSteps, NoMemory
+from khala_agents.memory import NoMemory, Recalled, WholeSteps
 from khala_agents.prompt import Prompt, system_text
 from khala_protocol.messages import ActionSpec, ChatMessage, Clock, Contact, TeamSpec
 from khala_protocol.speech import parse
@@ -141,11 +141,11 @@ def test_the_rule_of_the_clock_is_told(briefing: Callable[..., Briefing], rule: 
 def test_a_memory_stands_between_the_example_and_the_observation(
     told: Briefing, observation: Callable[..., Observation]
 ) -> None:
-    memory = LastSteps(2)
+    memory = WholeSteps(2)
     for step in range(3):
         memory.remember(observation(step), f"reply {step}")
-    messages = Prompt(told).messages("now", memory.recall())
+    messages = Prompt(told).messages("now", memory.recall(observation(3)).messages)
     assert [message.role for message in messages] == ["system", *["user", "assistant"] * 3, "user"]
     assert [message.content for message in messages[3:]] == ["step 1", "reply 1", "step 2", "reply 2", "now"]
     memory.clear()
-    assert memory.recall() == NoMemory().recall() == ()
+    assert memory.recall(observation(4)) == NoMemory().recall(observation(4)) == Recalled()

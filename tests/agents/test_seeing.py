@@ -17,7 +17,7 @@ from khala_agents.llm.limits import Limits, Ticket
 from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.vision import ANTHROPIC, Vision
 from khala_agents.llm_policy import LLMPolicy
-from khala_agents.memory import LastSteps
+from khala_agents.memory import WholeSteps
 from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context, Policy
 from khala_agents.worker import run_worker
@@ -236,7 +236,7 @@ async def test_remembered_steps_have_no_pictures(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     model = listed_model("go", "on")
-    policy, _ = policy_of(model, memory=LastSteps(2))
+    policy, _ = policy_of(model, memory=WholeSteps(2))
     await policy.pictures.put(ONE)
     for step in range(2):
         await policy.decide(briefing(), observation(step, images=(ref(ONE),)))

@@ -47,7 +47,7 @@ class Table:
         self._observer, self._actor, self._unit, self._snapshot = Observer(task), Actor(task), unit, snapshot
         self._loop = 0
 
-    def turn(self, reply: str = "", *, minerals: int = 400, **units: dict[str, Any]) -> JointAction:
+    def turn(self, reply: str = "", *, minerals: int = 400, **units: dict[str, Any] | None) -> JointAction:
         """Play a turn; `s1`, `s2`, `nexus` and `foe` are changes of these units, or None for one that is gone."""
         self._loop += 112
         places = {
@@ -56,11 +56,10 @@ class Table:
             "nexus": (NEXUS, "Nexus", 20, 20),
             "foe": (FOE, "Zealot", 14, 10),
         }
-        there = [
-            self._unit(*place, **{"alliance": "enemy" if name == "foe" else "own", **units.get(name, {})})
-            for name, place in places.items()
-            if units.get(name, {}) is not None
-        ]
+        there = []
+        for name, place in places.items():
+            if (changes := units.get(name, {})) is not None:
+                there.append(self._unit(*place, alliance="enemy" if name == "foe" else "own", **changes))
         dead = frozenset(places[name][0] for name, changed in units.items() if changed is None)
         player = {"minerals": minerals, "food_cap": 15, "food_used": 4}
         now = self._snapshot(there, loop=self._loop, player=player, dead=dead)

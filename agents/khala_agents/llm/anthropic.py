@@ -65,10 +65,15 @@ class Anthropic:
     async def complete(self, request: Request) -> Completion:
         """Make one try; see `LLMClient`."""
         system = "\n\n".join(m.content for m in request.messages if m.role == "system")
-        turns = [_turn(message, request.pictures) for message in request.messages if message.role != "system"]
-        body = {**self._fixed, "messages": turns}
+        last = request.stable - 1
+        turns = [
+            _cached(message.content, role=message.role) if place == last else _turn(message, request.pictures)
+            for place, message in enumerate(request.messages)
+            if message.role != "system"
+        ]
+        body: dict[str, Any] = {**self._fixed, "messages": turns}
         if system:
-            body["system"] = system
+            body["system"] = _cached(system)["content"] if request.stable else system
         answer = await self._http.post("/messages", to_json(body), request.timeout_s)
         return self._read(answer)
 
@@ -97,6 +102,12 @@ class Anthropic:
         )
 
 
+def _cached(text: str, role: str = "") -> dict[str, Any]:
+    """Return a message up to whose end a prompt is cached: the same in all requests of an episode."""
+    block = {"type": "text", "text": text, "cache_control": {"type": "ephemeral"}}
+    return {"role": role, "content": [block]}
+
+
 def _turn(message: ChatMessage, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     if not message.images:
         return {"role": message.role, "content": message.content}
@@ -121,14 +132,15 @@ class _Usage(BaseModel):
 
     def priced(self, prices: Prices) -> Usage:
         """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""
-        cached = self.cache_read_input_tokens or 0
-        prompt = self.input_tokens + cached + (self.cache_creation_input_tokens or 0)
+        cached, kept = self.cache_read_input_tokens or 0, self.cache_creation_input_tokens or 0
+        prompt = self.input_tokens + cached + kept
         return Usage(
             requests=1,
             prompt_tokens=prompt,
             completion_tokens=self.output_tokens,
             cached_tokens=cached,
-            cost_usd=prices.cost_usd(prompt=prompt, completion=self.output_tokens, cached=cached),
+            cache_write_tokens=kept,
+            cost_usd=prices.cost_usd(prompt=prompt, completion=self.output_tokens, cached=cached, cache_write=kept),
         )
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from khala_agents.llm.vision import Vision
+    from khala_protocol.messages import Purpose
 
 Scalar = str | int | float | bool | None
 
@@ -40,6 +41,7 @@ class Origin:
     agent: str
     episode: int
     step: int
+    purpose: Purpose = "decision"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,7 @@ class Request:
         origin: the decision it belongs to, if any.
         attempt: number of this try for this decision, from 1.
         pictures: bytes of all images that the messages name, by their hashes.
+        stable: number of messages at the front that other requests of the episode begin with, too, for caches.
     """
 
     messages: tuple[ChatMessage, ...]
@@ -59,6 +62,7 @@ class Request:
     origin: Origin | None = None
     attempt: int = 1
     pictures: Mapping[str, bytes] = field(default_factory=dict)
+    stable: int = 0
 
 
 @dataclass(frozen=True, slots=True)

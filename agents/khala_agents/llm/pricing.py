@@ -16,16 +16,29 @@ class Prices(Frozen):
     completion: float | None = Field(default=None, ge=0)
     cached: float | None = Field(default=None, ge=0)
     """Prompt tokens that the provider had in its cache; the price of `prompt` if not given."""
+    cache_write: float | None = Field(default=None, ge=0)
+    """Prompt tokens that it put into its cache; the price of `prompt` if not given."""
 
     @property
     def known(self) -> bool:
         """Whether a request can be priced."""
         return self.prompt is not None and self.completion is not None
 
-    def cost_usd(self, *, prompt: int, completion: int, cached: int = 0) -> float | None:
-        """Return the price of one request; `cached` tokens are a part of `prompt`. None if a price is not known."""
+    def cost_usd(self, *, prompt: int, completion: int, cached: int = 0, cache_write: int = 0) -> float | None:
+        """Return the price of one request; None if a price is not known.
+
+        Args:
+            prompt: tokens of the prompt.
+            completion: tokens of the answer.
+            cached: those of `prompt` that the provider had in its cache.
+            cache_write: those of `prompt` that it put there.
+        """
         if self.prompt is None or self.completion is None:
             return None
-        cached_price = self.prompt if self.cached is None else self.cached
-        fresh = prompt - cached
-        return (fresh * self.prompt + cached * cached_price + completion * self.completion) * PER_MILLION
+        fresh = prompt - cached - cache_write
+        kept = cached * _or(self.cached, self.prompt) + cache_write * _or(self.cache_write, self.prompt)
+        return (fresh * self.prompt + kept + completion * self.completion) * PER_MILLION
+
+
+def _or(price: float | None, usual: float) -> float:
+    return usual if price is None else price

@@ -1,6 +1,6 @@
 """Recorded completions in place of a model: the same prompts get the same answers, and the same failures.
 
-A request is looked up by its agent, episode, step and attempt, and its prompt must be exactly the recorded one.
+A request is looked up by its agent, episode, step, purpose and attempt; its prompt must be exactly the recorded one.
 Any difference is reported, because an answer to another question proves nothing. Nothing is waited for: a
 request that was cut off by the deadline fails at once, so that the agent falls back as it did then.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import ChatMessage, ModelCall
 
-Key = tuple[str, int, int, int]
+Key = tuple[str, int, int, str, int]
 
 
 class NotRecorded(LLMError):
@@ -42,7 +42,9 @@ class ReplayClient:
     """An `LLMClient` that answers from recorded exchanges, of one agent or of several."""
 
     def __init__(self, exchanges: Iterable[ModelCall]) -> None:
-        self._recorded: dict[Key, ModelCall] = {(e.agent, e.episode, e.step, e.attempt): e for e in exchanges}
+        self._recorded: dict[Key, ModelCall] = {
+            (e.agent, e.episode, e.step, e.purpose, e.attempt): e for e in exchanges
+        }
         first = next(iter(self._recorded.values()), None)
         self.model = first.model if first else "replay"
         self.endpoint = first.endpoint if first else "recording"
@@ -58,8 +60,8 @@ class ReplayClient:
         exchange = self._look_up(request)
         if exchange.completion is not None:
             return Completion(exchange.completion, exchange.usage)
-        agent, episode, step, attempt = _key(request)
-        was_repeated = (agent, episode, step, attempt + 1) in self._recorded
+        *origin, attempt = _key(request)
+        was_repeated = (*origin, attempt + 1) in self._recorded
         raise _passing(exchange) if was_repeated else _Final.of(exchange)
 
     async def check(self) -> None:
@@ -72,10 +74,11 @@ class ReplayClient:
         """Do nothing."""
 
     def _look_up(self, request: Request) -> ModelCall:
-        agent, episode, step, attempt = key = _key(request)
+        agent, episode, step, purpose, attempt = key = _key(request)
         exchange = self._recorded.get(key)
         if exchange is None:
-            raise NotRecorded(f"no request {attempt} of {agent} in episode {episode}, step {step} was recorded")
+            what = "request" if purpose == "decision" else f"request for a {purpose}"
+            raise NotRecorded(f"no {what} {attempt} of {agent} in episode {episode}, step {step} was recorded")
         if prompt_sha256(exchange.prompt) != prompt_sha256(request.messages):
             where = _difference(exchange.prompt, request.messages)
             raise NotRecorded(
@@ -114,7 +117,7 @@ def _key(request: Request) -> Key:
     origin = request.origin
     if origin is None:
         raise NotRecorded("a request without its origin cannot be looked up")
-    return origin.agent, origin.episode, origin.step, request.attempt
+    return origin.agent, origin.episode, origin.step, origin.purpose, request.attempt
 
 
 def _difference(recorded: tuple[ChatMessage, ...], asked: tuple[ChatMessage, ...]) -> str:
