@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_THOUGHT_CHARACTERS = 200
 """Longest first sentence of an analysis; the rest is cut."""
 _THOUGHTS_END = re.compile(r"</\s*think(?:ing)?\s*>|◁/think▷", re.IGNORECASE)
-_ANALYSIS = re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*:?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
+_ANALYSIS = re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*[:\uff1a]?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
 _SENTENCE = re.compile(r"[^\n]*?[.!?。](?=\s|$)|[^\n]*")
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 AFTER = 3
 """Decisions from the request of a summary to the first prompt with it."""
+MOST_AT_ONCE = 3
+"""Summaries whose steps one tells of, if those before it were dropped; of more the earliest steps are lost."""
 MAX_CHARACTERS = 1_500
 """Longest summary; the rest is cut."""
 _ASK = """\
@@ -53,7 +55,7 @@ class Summary:
         self._until_s = 0.0
         self._decided = 0
         self._asked = 0
-        self._steps: deque[Step] = deque(maxlen=every)
+        self._steps: deque[Step] = deque(maxlen=MOST_AT_ONCE * every)
         self._request: _Request | None = None
 
     @property
@@ -61,8 +63,7 @@ class Summary:
         """What stands above the last steps in a prompt; "" without a summary."""
         if not self.text:
             return ""
-        lines = "".join(f"    {line}\n" for line in self.text.splitlines())
-        return f"Your summary of the game until {minutes(self._until_s)}\n{lines}"
+        return f"Your summary of the game until {minutes(self._until_s)}\n{_indented(self.text)}"
 
     def begin_decision(self, observation: Observation) -> None:
         """Take in an observation before it is decided on, and the summary that is due by now."""
@@ -74,6 +75,8 @@ class Summary:
         self._request = None
         if request.answer is not None:
             self.text, self._until_s = request.answer, request.until_s
+            while self._steps and self._steps[0].time_s <= request.until_s:
+                self._steps.popleft()
         elif request.task is not None:
             request.task.cancel()
 
@@ -95,7 +98,7 @@ class Summary:
         self._asked = self._decided
         due = self._decided + AFTER - 1
         self._request = _Request(due, observation.view.time_s, asyncio.current_task())
-        before = f"\nYour summary until now\n    {self.text}\n" if self.text else ""
+        before = f"\nYour summary until now\n{_indented(self.text)}" if self.text else ""
         lines = "\n".join(line for step in self._steps for line in step.lines())
         return f"{_ASK}\n{before}\nYour steps\n{lines}\n"
 
@@ -103,3 +106,7 @@ class Summary:
         """Take the answer from a traced exchange."""
         if self._request is not None and exchange.status == "ok" and exchange.completion:
             self._request.answer = exchange.completion.strip()[:MAX_CHARACTERS]
+
+
+def _indented(text: str) -> str:
+    return "".join(f"    {line}\n" for line in text.splitlines())

@@ -19,7 +19,7 @@ from khala_agents.scripted.policies import Fixed
 from khala_agents.worker import WorkerTally, run_worker, run_workers
 from khala_protocol.errors import BusError
 from khala_protocol.keys import Topic, every_agent
-from khala_protocol.messages import ModelCall, Reply, Usage
+from khala_protocol.messages import MemoryRule, ModelCall, Reply, Usage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
@@ -435,6 +435,24 @@ async def test_exchanges_are_published_and_summed_up_in_the_reply(
         (1, 1, "ok", ATTACK),
     ]
     assert tally.usage.requests == 2
+
+
+async def test_what_a_policy_asks_beside_its_decisions_is_counted_in_its_next_reply(
+    host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
+) -> None:  # fmt: skip
+    await players.start(LLMPolicy(listed_model(ATTACK, "We attack.", ATTACK)))
+    await host.say(briefing(memory=MemoryRule(summary=1)))
+    for step in range(2):
+        await host.say(observation(step=step))
+        await host.replies(step + 1)
+    assert [(reply.attempts, reply.usage.requests) for reply in host.of(Reply)] == [(1, 1), (1, 2)]
+    await players.end()
+    assert [(call.step, call.purpose, call.completion) for call in host.of(ModelCall)] == [
+        (0, "decision", ATTACK),
+        (0, "summary", "We attack."),
+        (1, "decision", ATTACK),
+    ]
 
 
 async def test_a_request_that_the_deadline_cut_off_is_counted_as_unknown_and_not_as_nothing(

@@ -430,6 +430,27 @@ async def test_anthropic_is_spoken_to_in_its_own_words() -> None:
     assert usage.cost_usd == pytest.approx(0.00164)
 
 
+async def test_anthropic_is_told_what_stays_the_same_and_its_cache_is_counted_and_priced() -> None:
+    answer = {
+        "content": [{"type": "text", "text": "go"}],
+        "usage": {"input_tokens": 100, "output_tokens": 0, "cache_creation_input_tokens": 900},
+    }
+    prompt = (*PROMPT, ChatMessage(role="assistant", content="example"), ChatMessage(role="user", content="now"))
+    async with Recorder(answer) as server:
+        prices = Prices(prompt=1.0, completion=10.0, cache_write=1.25)
+        model = Anthropic(model="claude", prices=prices, key=SecretStr("sk-ant-0123"), base_url=server.base_url)
+        usage = (await model.complete(Request(prompt, stable=3))).usage
+        await model.close()
+    ((_, _, body),) = server.requests
+    mark = {"type": "ephemeral"}
+    assert body["system"] == [{"type": "text", "text": "You are an agent.", "cache_control": mark}]
+    _, example, now = body["messages"]
+    assert example["content"] == [{"type": "text", "text": "example", "cache_control": mark}]
+    assert now == {"role": "user", "content": "now"}
+    assert (usage.prompt_tokens, usage.cache_write_tokens) == (1000, 900)
+    assert usage.cost_usd == pytest.approx((100 + 900 * 1.25) * 1e-6)
+
+
 ANTHROPIC_FAULTS = [
     (529, {"type": "error", "error": {"type": "overloaded_error", "message": "Overloaded"}}, EndpointUnavailable),
     (429, {"type": "error", "error": {"type": "enforced_spend_limit_reached", "message": "Spent"}}, OutOfMoney),
