@@ -68,7 +68,6 @@ def test_a_step_in_short_is_its_thought_its_messages_and_what_became_of_its_orde
         "        done: A <Stop()>\n"
         "        refused: A <Attack_Unit(0xc)> (0xc is dead.)\n"
         "    2:01 They come from the left.\n"
-        "        read from B: come here\n"
         "        wrote to B: hold\n"
     )
 
