@@ -10,14 +10,14 @@ from __future__ import annotations
 import re
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from khala_protocol.messages import ChatMessage
 from khala_protocol.speech import parse
 from khala_protocol.speech.words import ANALYSIS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from khala_protocol.messages import MemoryRule, Observation, Received, Rejection
 
@@ -26,10 +26,6 @@ MAX_THOUGHT_CHARACTERS = 200
 _THOUGHTS_END = re.compile(r"</\s*think(?:ing)?\s*>|◁/think▷", re.IGNORECASE)
 _ANALYSIS = re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*[:\uff1a]?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
 _SENTENCE = re.compile(r"[^\n]*?[.!?。](?=\s|$)|[^\n]*")
-
-
-Letter: TypeAlias = tuple[str, str, str]
-"""Sender, recipient and text of a message, by which it is known again."""
 
 
 class Recalled(NamedTuple):
@@ -104,25 +100,21 @@ class Step:
     thought: str
     wrote: tuple[str, ...]
     messages: tuple[Received, ...]
-    """Those that the observation had."""
-    read_before: frozenset[Letter] = frozenset()
-    """Those of them that the observation of the step before had as well."""
+    """Those that no earlier observation had."""
     after: Observation | None = None
     """The next observation, which says what was accepted and refused."""
 
     @classmethod
-    def of(cls, observation: Observation, reply: str, before: Iterable[Step] = ()) -> Step:
-        """Return what is kept of a step that follows others."""
+    def of(cls, observation: Observation, reply: str) -> Step:
+        """Return what is kept of a step."""
         wrote = tuple(f"to {said.recipient}: {_line(said.text)}" for said in parse(reply).messages)
-        *_, last = None, *before
-        old = frozenset(map(_letter, last.messages)) if last else frozenset[Letter]()
-        return cls(observation.view.time_s, first_sentence(reply), wrote, observation.messages, old)
+        new = tuple(message for message in observation.messages if not message.again)
+        return cls(observation.view.time_s, first_sentence(reply), wrote, new)
 
     def lines(self) -> Iterator[str]:
         """Yield the step as a prompt has it."""
         yield f"    {minutes(self.time_s)} {self.thought}".rstrip()
-        new = (message for message in self.messages if _letter(message) not in self.read_before)
-        yield from (f"        read from {message.sender}: {_line(message.text)}" for message in new)
+        yield from (f"        read from {message.sender}: {_line(message.text)}" for message in self.messages)
         yield from (f"        wrote {words}" for words in self.wrote)
         if self.after is not None:
             yield from (f"        done: {call}" for call in self.after.accepted)
@@ -137,7 +129,7 @@ class ShortSteps:
 
     def remember(self, observation: Observation, reply: str) -> None:
         """Note a step, and forget the oldest if there are too many."""
-        self._steps.append(Step.of(observation, reply, self._steps))
+        self._steps.append(Step.of(observation, reply))
 
     def recall(self, observation: Observation) -> Recalled:
         """Return the steps, the oldest first; the new observation itself says what became of the last one."""
@@ -180,10 +172,6 @@ def first_sentence(reply: str) -> str:
 def minutes(seconds: float) -> str:
     """Return a time of the game as `1:05`."""
     return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
-
-
-def _letter(message: Received) -> Letter:
-    return message.sender, message.recipient, message.text
 
 
 def _refusal(rejection: Rejection) -> str:

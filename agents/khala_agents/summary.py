@@ -84,7 +84,7 @@ class Summary:
         """Take in a step that was answered."""
         if self._every:
             self._decided += 1
-            self._steps.append(Step.of(observation, reply, self._steps))
+            self._steps.append(Step.of(observation, reply))
 
     @property
     def is_due(self) -> bool:

@@ -26,6 +26,10 @@ class _Letter:
     """When it was written."""
     shown: bool = False
 
+    def at(self, loop: int) -> Received:
+        """Return the message as its reader finds it at a game loop."""
+        return self.received.but(age_s=round((loop - self.loop) / LOOPS_PER_S, 1), again=self.shown)
+
     def is_answered_by(self, recipient: str) -> bool:
         """Return True if a message to this recipient answers it."""
         return self.shown and recipient.casefold() in {
@@ -62,8 +66,7 @@ class Letters:
         if not self.keep_s[agent]:
             return new
         self._open[agent] = [letter for letter in self._open[agent] if letter.loop >= oldest or not letter.shown]
-        ages = [(letter.received, (loop - letter.loop) / LOOPS_PER_S) for letter in self._open[agent]]
-        return newest([received.but(age_s=round(age_s, 1)) for received, age_s in ages])
+        return newest([letter.at(loop) for letter in self._open[agent]])
 
     def shown(self, agent: str) -> None:
         """Take note that an agent was shown all of its open messages."""

@@ -556,6 +556,8 @@ class Received(Frozen):
     text: str
     age_s: float | None = None
     """Seconds of the game since it was written; None if messages are shown once (`MemoryRule.messages_s`)."""
+    again: bool = False
+    """Whether an earlier observation had it, too."""
 
 
 class Contact(Frozen):

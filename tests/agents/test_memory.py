@@ -52,10 +52,10 @@ def test_a_step_in_short_is_its_thought_its_messages_and_what_became_of_its_orde
 ) -> None:
     memory = ShortSteps(2)
     refusal = Rejection(reason="dead_target", message="0xc is dead.", text="<Attack_Unit(0xc)>", start=0, team="A")
-    heard = (Received(sender="B", recipient="Stalkers", text="come\nhere"),)
+    heard = Received(sender="B", recipient="Stalkers", text="come\nhere", age_s=2)
     for step in range(3):
         seen = observation(
-            step, view=View(time_s=60.5 * step), messages=heard if step else (),
+            step, view=View(time_s=60.5 * step), messages=(heard.but(again=step > 1),) if step else (),
             accepted=("A <Stop()>",) if step == 2 else (), rejections=(refusal,) if step == 2 else (),
         )  # fmt: skip
         memory.recall(seen)

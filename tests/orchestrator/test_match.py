@@ -346,7 +346,9 @@ async def test_a_message_stays_with_its_age_until_it_is_answered_or_too_old(play
     played = await play(script, memory={"messages_s": 1.2}, step_loops=11, max_steps=7)
     ages = [[(one.text, one.age_s) for one in seen.messages] for seen in played.pool.of("Zealots")]
     assert ages == [[], [("go", 0.5)], [("go", 1.0)], [], [("stop", 0.5)], [("stop", 1.0)], []]
-    assert "    Message from Stalkers, 0:01 ago: '''go'''\n" in played.pool.of("Zealots")[2].text
+    one, two = (played.pool.of("Zealots")[step].text for step in (1, 2))
+    assert "    Message from Stalkers, new, 0:00 ago: '''go'''\n" in one
+    assert "    Message from Stalkers, 0:01 ago: '''go'''\n" in two
 
 
 async def test_a_refusal_that_repeats_names_what_is_possible_instead(play: Play) -> None:

@@ -35,7 +35,7 @@ _HEX = re.compile(r"0x[0-9a-f]+", re.ASCII)
 _PROMISED = re.compile(r"\((?:(\d{1,5}) minerals)?(?: and )?(?:(\d{1,5}) vespene)? of it for", re.ASCII)
 _SUPPLY = re.compile(rf"Supply: {_NUMBER} of {_NUMBER}", re.ASCII)
 _UPGRADES = re.compile(r"^    Upgrades: (.*)", re.MULTILINE)
-_MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+?)?(?:, \d{1,4}:\d\d ago)?: '''(.*)'''", re.MULTILINE)
+_MESSAGE = re.compile(r"^    Message from (\S+?)(?: in \S+?)?(?:, new, \d{1,4}:\d\d ago)?: '''(.*)'''", re.MULTILINE)
 _ACCEPTED = re.compile(r"^    accepted: (\S+) <(\w+)\((.*)\)>", re.MULTILINE)
 _COUNTED = re.compile(
     r"^    (Your units|Your structures|Under construction|Going to be built[^:]*|In production): (.*)", re.MULTILINE

@@ -63,5 +63,6 @@ def _message(message: Received, name: str) -> str:
     where = "" if message.recipient == name else f" in {message.recipient}"
     lines = (one_line(line) for line in message.text.splitlines())
     text = _QUOTES.sub('"', " / ".join(line for line in lines if line))
-    age = "" if message.age_s is None else f", {ago(message.age_s)}"
+    new = "" if message.again else ", new"
+    age = "" if message.age_s is None else f"{new}, {ago(message.age_s)}"
     return f"Message from {message.sender}{where}{age}: '''{text}'''"
