@@ -212,7 +212,7 @@ class Worker:
     # --- answering ----------------------------------------------------------------------------------
 
     async def _answer(self, observation: Observation, links: Links, group: asyncio.TaskGroup) -> None:
-        """Play one turn: decide, send, then let the policy think on. Sending cannot be cancelled."""
+        """Play one turn: decide, send, then have the policy think on. Sending cannot be cancelled."""
         arrived = self._clock()
         self._ledger.open((observation.episode, observation.step))
         time_s = time_to_decide_s(observation.answer_within_s)

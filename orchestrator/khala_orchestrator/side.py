@@ -73,7 +73,7 @@ class Side:
     """By agent, health of its units at its last observation."""
     _pending: dict[str, Feedback] = field(init=False, default_factory=dict)
     """By agent, what has become new since its last observation."""
-    _told: dict[str, Feedback] = field(init=False, default_factory=dict)
+    _finds: dict[str, Feedback] = field(init=False, default_factory=dict)
     """By agent, what it finds in its next observation: what is new, and what stays."""
 
     def __post_init__(self) -> None:
@@ -119,8 +119,8 @@ class Side:
 
     def look(self, snapshot: Snapshot) -> None:
         """Take in the present state of the game."""
-        self._told = {agent: self._all_for(agent, snapshot.game_loop) for agent in self._pending}
-        self._now = self.observer.observe(snapshot, self._told)
+        self._finds = {agent: self._all_for(agent, snapshot.game_loop) for agent in self._pending}
+        self._now = self.observer.observe(snapshot, self._finds)
 
     def _all_for(self, agent: str, loop: int) -> Feedback:
         new = self._pending[agent]
@@ -147,7 +147,7 @@ class Side:
 
     def question(self, agent: str, at: StepId) -> Question:
         """Return an agent's observation of the present state, with all that was to be said to it."""
-        seen, heard = self._now.agents[agent], self._told[agent]
+        seen, heard = self._now.agents[agent], self._finds[agent]
         self._seen[agent], self._pending[agent] = seen, Feedback()
         self.letters.shown(agent)
         self.actor.standing.seen(agent)

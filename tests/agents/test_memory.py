@@ -93,8 +93,8 @@ def test_a_prompt_tells_of_notes_and_standing_orders_only_where_there_are_any(
 ) -> None:
     words = ("<Note('''text''')>", "<Forget(2)>", "<Standing(", "<Revoke(1)>", "until you write to its sender")
     assert not any(word in system_text(briefing()) for word in words)
-    told = system_text(briefing(memory=MemoryRule(notes=4, messages_s=60), standing_orders=5))
-    assert all(word in told for word in words)
+    words_of = system_text(briefing(memory=MemoryRule(notes=4, messages_s=60), standing_orders=5))
+    assert all(word in words_of for word in words)
 
 
 # --- the summary --------------------------------------------------------------------------------------------------

@@ -65,8 +65,8 @@ class Table:
         now = self._snapshot(there, loop=self._loop, player=player, dead=dead)
         return self._actor.joint(self._observer.observe(now), {"A": parse(reply)} if reply else {})
 
-    def told(self) -> list[str]:
-        """Return what the agent is told of its orders, when it is asked."""
+    def shown(self) -> list[str]:
+        """Return what the agent is shown of its orders, when it is asked."""
         views = self._actor.standing.views("A")
         self._actor.standing.seen("A")
         return [_words(view) for view in views]
@@ -88,14 +88,14 @@ def orders(joint: JointAction) -> list[tuple[str, tuple[int, ...]]]:
 def test_an_order_to_the_side_waits_for_minerals_and_for_a_free_producer_and_ends_with_the_number(table: Table) -> None:
     said = "Team Base:\n<Standing(Train_Probe(), until 2 Probes)>"
     assert orders(table.turn(said, minerals=40)) == []
-    assert table.told() == ["1 0 it costs 50 minerals and 40 are left"]
+    assert table.shown() == ["1 0 it costs 50 minerals and 40 are left"]
     assert orders(table.turn()) == [("Train_Probe", (NEXUS,))]
-    assert table.told() == ["1 1"]
+    assert table.shown() == ["1 1"]
     assert orders(table.turn(nexus={"orders": (TRAIN_PROBE,)})) == []
-    assert table.told() == ["1 1 all that could do it are busy"]
+    assert table.shown() == ["1 1 all that could do it are busy"]
     assert orders(table.turn(nexus={"orders": (TRAIN_PROBE, TRAIN_PROBE)})) == []
-    assert table.told() == ["1 1 its end is reached"]
-    assert table.told() == []
+    assert table.shown() == ["1 1 its end is reached"]
+    assert table.shown() == []
 
 
 def test_an_order_to_units_is_for_the_idle_ones_and_ends_when_they_are_attacked(table: Table) -> None:
@@ -103,9 +103,9 @@ def test_an_order_to_units_is_for_the_idle_ones_and_ends_when_they_are_attacked(
     assert orders(table.turn(said)) == [("HoldPosition", (S1, S2))]
     assert orders(table.turn(s1={"orders": (MOVE,)})) == [("HoldPosition", (S2,))]
     assert orders(table.turn(s1={"orders": (MOVE,)}, s2={"orders": (MOVE,)})) == []
-    assert table.told() == ["1 2 no unit of the team is idle"]
+    assert table.shown() == ["1 2 no unit of the team is idle"]
     assert orders(table.turn(s1={"health": 40})) == []
-    assert table.told() == ["1 2 its end is reached"]
+    assert table.shown() == ["1 2 its end is reached"]
 
 
 def test_a_call_of_the_same_turn_comes_first_and_the_standing_order_is_no_action_of_its_team(table: Table) -> None:
@@ -117,9 +117,9 @@ def test_a_call_of_the_same_turn_comes_first_and_the_standing_order_is_no_action
 def test_an_order_whose_target_is_gone_ends(table: Table) -> None:
     table.turn("Team Stalker-1:\n<Standing(Attack_Unit(0x100180001))>")
     table.turn(foe=None)
-    (ended,) = table.told()
+    (ended,) = table.shown()
     assert "0x100180001" in ended
-    assert table.told() == []
+    assert table.shown() == []
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_an_order_whose_target_is_gone_ends(table: Table) -> None:
 def test_what_cannot_stand_is_refused(table: Table, said: str, why: str) -> None:
     (fault,) = table.turn(said).rejections["A"]
     assert why in fault.message
-    assert table.told() == []
+    assert table.shown() == []
 
 
 def test_a_team_has_only_so_many_and_the_same_order_again_changes_its_end(table: Table) -> None:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 CLOCK = "jumps"
 
 ATTACK = "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xb)>\n<MessageTo(Zealots, 'step {}')>"
+KEPT = "\n<Note(it is step {})>\nTeam Stalker-1:\n<Standing(Move_Screen([9, 9]), until 0:05)>"
 GAME = "Khala simulator 0.1.0, as"
 EVENTS: dict[int, dict[str, Any]] = {2: {"dead": [0xB]}}
 CLOCKS: list[dict[str, Any]] = [
@@ -46,7 +47,7 @@ CLOCKS: list[dict[str, Any]] = [
 
 
 async def stalkers(peer: Peer, seen: Observation) -> None:
-    await peer.answer(seen, ATTACK.format(seen.step), usage={"requests": 1})
+    await peer.answer(seen, (ATTACK + KEPT).format(seen.step, seen.step), usage={"requests": 1})
 
 
 def killed_after(whole: Path, reports: int, path: Path) -> Recording:
@@ -72,9 +73,13 @@ async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
     hall: Hall, config: MakeConfig, start: Start, tmp_path: Path, clock: dict[str, Any], killed: Iterable[int]
 ) -> None:
     hall.game.after = EVENTS
-    match = config(game=GAME, episodes=2, max_steps=5, step_loops=8, **clock)
+    kept = {"memory": {"notes": 2, "messages_s": 1}, "standing_orders": 1}
+    match = config(game=GAME, episodes=2, max_steps=5, step_loops=8, **kept, **clock)
     whole = tmp_path / "whole.mcap"
     results = await hall.play(match.model_copy(update={"record": whole}), Stalkers=stalkers)
+    views = [seen.view for seen in Recording.open(whole).of(Observation)]
+    assert any(view.notes for view in views)
+    assert any(view.standing for view in views)
     for reports in killed:
         past = unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
         assert (past.episode, past.steps) == divmod(reports, 5)

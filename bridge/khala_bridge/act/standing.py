@@ -79,7 +79,7 @@ class StandingOrders:
         return tuple(order.view for order in self._orders.get(agent, ()))
 
     def seen(self, agent: str) -> None:
-        """Forget the orders of an agent that have ended, since it has been told so."""
+        """Forget the orders of an agent that have ended, since it was shown them."""
         self._orders[agent] = self._in_force(agent)
 
     def begin(self, said: Recognised, until: Until, translator: Translator, observation: SideObservation) -> None:

@@ -430,7 +430,7 @@ async def test_anthropic_is_spoken_to_in_its_own_words() -> None:
     assert usage.cost_usd == pytest.approx(0.00164)
 
 
-async def test_anthropic_is_told_what_stays_the_same_and_its_cache_is_counted_and_priced() -> None:
+async def test_the_front_of_a_prompt_is_marked_for_anthropic_and_its_cache_is_counted_and_priced() -> None:
     answer = {
         "content": [{"type": "text", "text": "go"}],
         "usage": {"input_tokens": 100, "output_tokens": 0, "cache_creation_input_tokens": 900},
