@@ -14,6 +14,7 @@ from khala_bridge.task.maps import known_maps
 from khala_orchestrator.config import MatchConfig, all_tasks, change, load_task, new_run_name, task_files
 from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
+from khala_protocol.messages import MemoryRule
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -127,6 +128,19 @@ def test_images_are_those_of_the_agents_of_every_side() -> None:
         [(agent.name, len(agent.images)) for agent in side.agents] for side in change(task, images="screen").per_side()
     ]
     assert found == [[("Captain", 1)], [("General", 1)]]
+
+
+def test_memory_is_changed_where_it_is_said_and_else_stays() -> None:
+    task = load_task("2s3z_pair")
+    rules = [MemoryRule(notes=4), None]
+    pair = zip(task.agents, rules, strict=True)
+    agents = tuple(agent.model_copy(update={"memory": rule}) for agent, rule in pair)
+    task = task.model_copy(update={"agents": agents, "memory": MemoryRule(steps=1, messages_s=60)})
+    changed = change(task, memory="steps=3, summary=10")
+    assert [changed.memory_of(agent) for agent in changed.agents] == [
+        MemoryRule(steps=3, summary=10, notes=4),
+        MemoryRule(steps=3, summary=10, messages_s=60),
+    ]
 
 
 def test_none_changes_nothing() -> None:
