@@ -196,6 +196,9 @@ def test_a_team_goes_where_its_task_or_a_message_wants_it() -> None:
     assert calls(page(*STALKERS, task="Wait at [20, 21].")) == ["Move_Minimap (20.0, 21.0)"]
     message = "Messages\n    Message from Commander: '''All groups attack at [40.0, 46.0], together.'''\n\n"
     assert calls(page(*STALKERS, task="Wait at [20, 21].", more=message)) == ["Move_Minimap (40.0, 46.0)"]
+    new, old = (message.replace("Commander:", f"Commander, {age} ago:") for age in ("new, 0:02", "0:04"))
+    assert calls(page(*STALKERS, task="Wait at [20, 21].", more=new)) == ["Move_Minimap (40.0, 46.0)"]
+    assert calls(page(*STALKERS, task="Wait at [20, 21].", more=old)) == ["Move_Minimap (20.0, 21.0)"]
     assert calls(page(*STALKERS, task="Wait at [20, 21].", minimap="[20, 22]")) == []
 
 
