@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Make = Callable[..., raw_pb2.Unit]
 
 S1, S2, NEXUS, FOE = 0x100040001, 0x100080001, 0x1000C0001, 0x100180001
-TRAIN_PROBE, MOVE = 1006, 16
+TRAIN_PROBE, MOVE, BUILD_PYLON = 1006, 16, 881
 AGENT = AgentConfig.model_validate(
     {
         "name": "A",
@@ -169,3 +169,15 @@ def test_an_end_is_understood_in_many_forms(words: str, text: str) -> None:
 def test_an_end_that_is_none_names_the_forms() -> None:
     with pytest.raises(CallRejected, match="until attacked or until minerals 400"):
         read_until("the cows come home")
+
+
+@pytest.mark.parametrize(("pylons", "orders", "reached"), [(1, 0, False), (2, 0, True), (1, 1, True)])
+def test_a_structure_counts_from_when_a_worker_goes_to_build_it(
+    unit: Make, snapshot: Callable[..., Snapshot], pylons: int, orders: int, reached: bool
+) -> None:
+    probe = unit(0x1, "Probe", 5, 5)
+    for _ in range(orders):
+        order = probe.orders.add(ability_id=BUILD_PYLON)
+        order.target_world_space_pos.x, order.target_world_space_pos.y = 20, 20
+    own = [unit(0x100 + place, "Pylon", 10 + 3 * place, 10) for place in range(pylons)]
+    assert read_until("2 Pylons").is_reached(snapshot([probe, *own]), attacked=False) is reached

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.vocabulary import squashed
 from khala_bridge.knowledge import abilities, knowledge, stand_ins, upgrades
+from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
@@ -95,10 +96,12 @@ def _named(words: str, known: Iterable[str]) -> str | None:
 
 
 def _number_of(name: str, snapshot: Snapshot) -> int:
-    """Return how many units of a type the side has, with those in production."""
+    """Return how many units of a type the side has, with those in production and those that are about to be built."""
     kinds = {name, *stand_ins(name)}
     there = sum(unit.name in kinds for unit in snapshot.own)
     facts = knowledge()[name]
+    if facts.structure:
+        return there + sum(structure in kinds for structure, _ in land_of(snapshot).plans)
     if facts.worker:  # some are inside a gas structure, where nobody sees them
         there = max(there, snapshot.player.food_workers)
     return there + sum(_coming(name, unit) for unit in snapshot.own)
