@@ -53,7 +53,8 @@ if TYPE_CHECKING:
 TESTS = Path(__file__).parent.parent / "tests"
 TASKS = ("2s3z_pair", "2c_vs_64zg", "pvz_task4_level2", "simple64_eceb")
 LONGEST_S = 0.25
-MOST_GROWTH = 2.0
+MOST_GROWTH = 2.5
+"""The shortest first observation, that of a Commander, has 1 650 characters; what is said about a reply has a limit."""
 MOST_LEFT_MB = 64.0
 TOKENS = (
     *("_", "A", "1", "0x1", "-", ".", ",", ":", ";", " ", "\n", "'", '"', "`", "'''", "“", "‘", "(", ")", "[", "]"),  # noqa: RUF001  # a quote as models write it

@@ -82,7 +82,7 @@ class Figures:
 async def measure(sleeps_s: Sequence[float], game_s: float, directory: Path, *, speed: float = 1.0) -> Figures:
     """Play a match with an agent for each of these sleeps."""
     task = load_task(TASK)
-    few = tuple(agent.model_copy(update={"talks_to": None}) for agent in task.agents[: len(sleeps_s)])
+    few = tuple(agent.model_copy(update={"talks_to": None, "ask": "always"}) for agent in task.agents[: len(sleeps_s)])
     task = change(
         task.model_copy(update={"agents": few}),
         rule="realtime", speed=speed, step_loops=STEP_LOOPS, max_wait_s=60,

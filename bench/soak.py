@@ -108,6 +108,7 @@ class Soak:
         chosen = fields["agents"] = fields["agents"][:agents]
         self.names = [agent["name"] for agent in chosen]
         for agent in chosen:
+            agent["ask"] = "always"
             agent["talks_to"] = [name for name in agent["talks_to"] if name in self.names]
         self._task = processes.directory / f"{RUN}.yaml"
         self._task.write_text(json.dumps(fields))  # JSON is YAML
