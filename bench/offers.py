@@ -2,12 +2,14 @@
 
     python -m bench.offers                                   the full games, 150 decisions of each, three races
     python -m bench.offers --task simple64_ecsb --seeds 1 2  one task, two games
+    python -m bench.offers --after 220                       the same, after `skilled` has built for 220 decisions
     python -m bench.offers --judged                          every offer, along a game of the player `skilled`
     python -m bench.offers --json                            one JSON object on stdout
 
 First `random-legal` plays, from the text alone as a model does: what the host or the game refuses of its calls is
-counted by action and reason. A random player has little after the first minute, so with `--judged` another one plays,
-and each call that a text offers is judged on the same snapshot, with arguments drawn at random, and not carried out.
+counted by action and reason. A random player has little after the first minute, so with `--after` it takes over a
+side that has an army, and with `--judged` another one plays, and each call that a text offers is judged on the same
+snapshot, with arguments drawn at random, and not carried out.
 """
 
 from __future__ import annotations
@@ -36,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from khala_agents.scripted.players import PlayerName
     from khala_bridge.observe import SideObservation
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Rejection
@@ -87,23 +88,24 @@ class Table:
         self._observer, self._actor, self._executor = Observer(task), Actor(task), executor_of(task)
         self._feedback: Mapping[str, Feedback] = {}
 
-    def play(self, player: PlayerName, steps: int, seed: int, tally: Tally, *, judged: bool) -> None:
+    def play(self, steps: int, seed: int, tally: Tally, *, after: int = 0, judged: bool = False) -> None:
         """Play so many decisions, and count either what is refused of them, or of everything that is offered."""
         (snapshot,) = self._game.reset()
-        for _ in range(steps):
+        for step in range(after + steps):
             if snapshot.ended:
                 return
+            counted = step >= after
             seen = self._observer.observe(snapshot, self._feedback)
             texts = {name: agent.text for name, agent in seen.agents.items() if agent.teams}
-            if judged:
+            if judged and counted:
                 self._judge(seen, texts, seed, tally)
-            play = PLAYERS[player]
+            play = PLAYERS["skilled" if judged or not counted else "random-legal"]
             words = {name: parse(play(text, random.Random(f"{seed} {name} {text}"))) for name, text in texts.items()}
             joint = self._actor.joint(seen, words)
             (result,) = self._game.act([self._executor.plan(joint.commands, snapshot, self.task.clock.step_loops)])
             refused = [(refusal.agent, refusal.rejection) for refusal in result.played.refusals]
             refused += [(name, one) for name, found in joint.rejections.items() for one in found]
-            if not judged:
+            if counted and not judged:
                 self._count(words, refused, tally)
                 tally.overtaken += sum(self._is_overtaken(seen, name, one) for name, one in refused)
             self._feedback = {
@@ -136,14 +138,14 @@ class Table:
         self._game.close()
 
 
-def measure(name: str, *, steps: int, seeds: list[int], judged: bool) -> Tally:
+def measure(name: str, *, steps: int, seeds: list[int], after: int = 0, judged: bool = False) -> Tally:
     """Return the tally of a task over some games."""
     sc2path, _ = games.find("simulator")
     tally = Tally()
     for seed in seeds:
         table = Table(load_task(name), sc2path, seed)
         try:
-            table.play("skilled" if judged else "random-legal", steps, seed, tally, judged=judged)
+            table.play(steps, seed, tally, after=after, judged=judged)
         finally:
             table.close()
     return tally
@@ -153,7 +155,8 @@ def report(name: str, tally: Tally, most: int) -> Iterator[str]:
     """Yield the lines of a task: its share, and the most frequent refusals."""
     refused = sum(tally.refused.values())
     apart = f", {tally.overtaken} of them overtaken by another agent" if tally.overtaken else ""
-    yield f"{name:22} {tally.calls:6} calls {refused:5} refused {tally.share:5.1f} %{apart}"
+    shares = f"{tally.share:5.1f} %, {tally.dishonest:.1f} % dishonest"
+    yield f"{name:22} {tally.calls:6} calls {refused:5} refused {shares}{apart}"
     for (kind, action, reason), count in tally.refused.most_common(most):
         yield f"    {count:4} {kind:12} {action:28} {reason[:170]}"
 
@@ -164,6 +167,7 @@ def main() -> int:
     options.add_argument("--task", nargs="+", default=list(TASKS), metavar="TASK", help="names of tasks")
     options.add_argument("--steps", type=int, default=STEPS, help="decisions of each game")
     options.add_argument("--seeds", type=int, nargs="+", default=[1], help="a game for each")
+    options.add_argument("--after", type=int, default=0, help="decisions of `skilled` before those that count")
     options.add_argument("--judged", action="store_true", help="judge every offer along a game of `skilled`")
     options.add_argument("--most", type=int, default=12, help="kinds of refusals to print for each task")
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
@@ -171,7 +175,7 @@ def main() -> int:
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns of every ability that is newer than itself
     found: dict[str, Tally] = {}
     for name in given.task:
-        found[name] = measure(name, steps=given.steps, seeds=given.seeds, judged=given.judged)
+        found[name] = measure(name, steps=given.steps, seeds=given.seeds, after=given.after, judged=given.judged)
         if not given.json:
             print("\n".join(report(name, found[name], given.most)), flush=True)
     if given.json:
@@ -181,6 +185,7 @@ def main() -> int:
                 "refused": sum(one.refused.values()),
                 "percent": round(one.share, 2),
                 "overtaken": one.overtaken,
+                "dishonest_percent": round(one.dishonest, 2),
             }
             for name, one in found.items()
         }

@@ -246,6 +246,12 @@ def test_an_error_of_the_game_becomes_a_rejection_of_the_call(table: Any, joint:
     ]
 
 
+def test_what_units_did_by_themselves_is_no_refusal_of_their_order(table: Any, joint: Any) -> None:
+    heal = functions()["Effect_Heal_screen"].ability_id
+    game = table(errors=(sc_pb.ActionError(unit_tag=S1, ability_id=heal, result=error_pb2.RequiresHealTarget),))
+    assert not game.play(RawExecutor(), joint(game)).refusals
+
+
 # --- screen -------------------------------------------------------------------------------------------------------
 
 BOTH = ("select_point", [[2], [64, 64]])

@@ -178,6 +178,16 @@ TARGETS = [
         "<Ability_Feedback_Unit(0x100180001)>",
         "0x100180001 is an enemy Zealot; Ability_Feedback_Unit needs a unit with energy.",
     ),
+    (
+        Scene("SCV", ("Effect_Repair_screen",), standing=("Barracks",)),
+        "<Effect_Repair_Unit(0x100300001)>",
+        "0x100300001 is your own Barracks; Effect_Repair_Unit needs a unit that is hurt.",
+    ),
+    (
+        Scene("Medivac", ("Load_screen",), standing=("Barracks",)),
+        "<Load_Unit(0x100300001)>",
+        "0x100300001 is your own Barracks; Load_Unit needs a unit that can be carried.",
+    ),
 ]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from khala_bridge.act.recognise import CallRejected, reject
+from khala_bridge.knowledge import abilities
 from khala_bridge.names import order_name
 from khala_bridge.state import Snapshot
 
@@ -76,18 +77,28 @@ def refuse(command: Command, why: str) -> GameRefusal | None:
 
 
 def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameRefusal, ...]:
-    """Return the refusals among the errors that the game reported; one for each command at most."""
+    """Return the refusals among the errors that the game reported; one for each command at most.
+
+    An error says which ability failed, sometimes another one than was ordered. If it is one that units use by
+    themselves, nobody ordered it: two Medivacs choose the same Marine while the army attacks.
+    """
     found: dict[int, GameRefusal | None] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
         same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]
-        for index in (same or suspects)[-1:]:
+        for index in (same or ([] if _by_itself(error.ability_id) else suspects))[-1:]:
             found.setdefault(index, refuse(commands[index], words(error.result)))
     return tuple(refusal for _, refusal in sorted(found.items()) if refusal is not None)
 
 
 def _order(command: Command) -> str:
     return order_name(command.function.ability_id)
+
+
+def _by_itself(ability_id: int) -> bool:
+    """Return True if units use an ability without an order."""
+    facts = abilities().get(ability_id)
+    return facts is not None and facts.autocast is not None
 
 
 def words(result: str) -> str:

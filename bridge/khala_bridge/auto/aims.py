@@ -35,6 +35,8 @@ class Aim(NamedTuple):
     unfinished: bool
     has_energy: bool
     can_have_energy: bool
+    hurt: bool
+    """Whether it lacks health; always False for an enemy, at which nothing aims that mends."""
 
     @property
     def type(self) -> str:
@@ -53,6 +55,7 @@ def aim_of(unit: Unit) -> Aim:
         unit.build_progress < 1.0,
         unit.energy > 0,
         unit.energy_max > 0,
+        unit.alliance != Alliance.ENEMY and unit.health < unit.health_max,
     )
 
 
@@ -90,6 +93,14 @@ _BARRED = {
     "buried": "a unit that is not burrowed",
     "underconstruction": "a unit that is finished",
 }
+_HURT = "a unit that is hurt", lambda aim, _: aim.hurt
+_WANTS: dict[str, tuple[str, Callable[[Aim, UnitFacts], bool]]] = {
+    **dict.fromkeys(("repair", "mule_repair", "medivac_heal", "transfusion"), _HURT),
+    "load": ("a unit that can be carried", lambda aim, known: known.cargo_size > 0 and not aim.burrowed),
+    "spawn_larva": ("a Hatchery, Lair or Hive", lambda _, known: known.name in {"Hatchery", "Lair", "Hive"}),
+    "supply_drop": ("a Supply Depot", lambda _, known: known.name in {"SupplyDepot", "SupplyDepotLowered"}),
+}
+"""By kind of ability: what the game wants of a target that no filter says."""
 
 
 def unfit(action: Action, aim: Aim) -> str | None:
@@ -114,7 +125,7 @@ def _unfit(target: str | None, function: str | None, aim: Aim) -> str | None:
     for word in facts.must_not:
         if word in _BARRED and _is(word, aim, known):
             return _BARRED[word]
-    return None
+    return _lacking(facts, aim, known)
 
 
 @functools.lru_cache(8192)
@@ -140,6 +151,15 @@ def _is(word: str, aim: Aim, known: UnitFacts | None) -> bool | None:
     if known is None:
         return None
     return known.structure if word == "structure" else word in (_ATTRIBUTES & {a.casefold() for a in known.attributes})
+
+
+def _lacking(facts: AbilityFacts, aim: Aim, known: UnitFacts | None) -> str | None:
+    """Return what the game wants of a target beyond the filters of an ability, or of the cases of a general one."""
+    for does in (facts.does, *(abilities()[case].does for case in facts.special)):
+        if does in _WANTS:
+            needed, fits = _WANTS[does]
+            return None if known is None or fits(aim, known) else needed
+    return None
 
 
 @functools.cache
