@@ -36,9 +36,14 @@ from khala_protocol.keys import Topic, agent_key, alive_key
 from khala_protocol.messages import Observation, Reply
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+    from typing import TypeAlias
 
     from khala_protocol.bus.memory import MemoryBus
+    from khala_protocol.messages import Result
+
+    Hear: TypeAlias = Callable[[str, Observation, str], None]
+    """Gets the name of an agent, an observation, and the reply to it."""
 
 RUN = "ladder"
 TASKS = tuple(f"simple64_{mode}{race}" for mode in ("eceb", "sceb") for race in ("", "_terran", "_zerg"))
@@ -72,29 +77,37 @@ class Game:
 
 def play(pairing: Pairing) -> Game:
     """Play one game in this process."""
+    result = witnessed(pairing)
+    rejected = sum(result.rejections.values())
+    return Game(pairing, result.outcome, result.steps, result.game_s, result.wall_s, result.accepted, rejected)
+
+
+def witnessed(pairing: Pairing, hear: Hear = lambda *_: None, *, steps: int | None = None) -> Result:
+    """Play one game in this process, of so many decisions at most; `hear` gets every observation with its reply."""
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns of abilities that it does not know
-    return asyncio.run(_play(pairing))
+    return asyncio.run(_play(pairing, hear, steps))
 
 
-async def _play(pairing: Pairing) -> Game:
+async def _play(pairing: Pairing, hear: Hear, steps: int | None) -> Result:
     opponent = Opponent(race=pairing.against or load_task(pairing.task).opponent.race, difficulty=pairing.level)
-    task = load_task(pairing.task).model_copy(update={"opponent": opponent})
+    task = load_task(pairing.task)
+    task = task.model_copy(update={"opponent": opponent, "max_steps": steps or task.max_steps})
     config = MatchConfig(task=task, run=RUN, seed=pairing.seed)
     sc2path, _ = games.find("simulator")
     broker = MemoryBroker()
     agents = [
-        asyncio.create_task(_answer(broker.session(), task.side, agent.name, pairing.player)) for agent in task.agents
+        asyncio.create_task(_answer(broker.session(), task.side, agent.name, pairing.player, hear))
+        for agent in task.agents
     ]
     try:
         (result,) = await hosted(config, sc2path, broker.session())
     finally:
         for agent in agents:
             agent.cancel()
-    rejected = sum(result.rejections.values())
-    return Game(pairing, result.outcome, result.steps, result.game_s, result.wall_s, result.accepted, rejected)
+    return result
 
 
-async def _answer(bus: MemoryBus, side: str, name: str, player: PlayerName) -> None:
+async def _answer(bus: MemoryBus, side: str, name: str, player: PlayerName, hear: Hear) -> None:
     """Answer each observation of an agent, until cancelled."""
     observations = await bus.subscribe(agent_key(RUN, side, name, Topic.OBSERVATION), Delivery.STATE)
     replies = await bus.publisher(agent_key(RUN, side, name, Topic.REPLY), Delivery.SPEECH)
@@ -102,6 +115,7 @@ async def _answer(bus: MemoryBus, side: str, name: str, player: PlayerName) -> N
     async for sample in observations:
         seen = decode_as(Observation, sample.payload)
         text = PLAYERS[player](seen.text, random.Random(seen.text))
+        hear(name, seen, text)
         reply = Reply(run=RUN, side=side, agent=name, episode=seen.episode, step=seen.step, text=text)
         await replies.put(encode(reply))
 

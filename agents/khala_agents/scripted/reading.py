@@ -45,6 +45,7 @@ _MADE = re.compile(r"(?:^|, )(\w+) \(([^()]*)\)")
 _POWER = re.compile(rf"^ +(\w+) (0x[0-9a-f]+) at minimap {_POINT}(.*)", re.MULTILINE | re.ASCII)
 _SEEN_AT = re.compile(rf"^ +\d+ (\w+) .*?at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _SEEN = re.compile(r"^ +(\d{1,4}) (\w+)(?: in sight|, \d+ of them| out of sight)", re.MULTILINE | re.ASCII)
+_ARMY_PART = re.compile(rf"^        \S[^\[\]\n]*{_POINT}: ([^:\n]*): (.*)", re.MULTILINE | re.ASCII)
 _WARPGATES = re.compile(r"^    WarpGates: .*?(\d{1,4}) ready now", re.MULTILINE | re.ASCII)
 _MAP_PLACE = re.compile(rf"^ +([^\[\]\n]+?) at {_POINT}(?:, (.*))?$", re.MULTILINE | re.ASCII)
 _PLAYABLE = re.compile(rf"the playable map is x {_NUMBER} to {_NUMBER}, y {_NUMBER} to {_NUMBER}", re.ASCII)
@@ -112,6 +113,19 @@ class Group(NamedTuple):
     """Types in it."""
     at: Point
     """On the minimap."""
+
+
+class ArmyPart(NamedTuple):
+    """Own units of the army that are together."""
+
+    units: dict[str, int]
+    """By type, how many."""
+    at: Point
+    """On the minimap."""
+    idle: bool
+    """Whether most of them have no order."""
+    goal: Point | None
+    """Where most of them go; None if they are idle, or have an order without a place."""
 
 
 class Place(NamedTuple):
@@ -217,6 +231,8 @@ class Situation:
     """Enemies that were seen and are not known to be dead, by type."""
     groups: list[Group] = field(default_factory=list)
     """The teams of other agents."""
+    army: list[ArmyPart] = field(default_factory=list)
+    """The own army, by place."""
     places: list[Place] = field(default_factory=list)
     """Places of the map, in the order of the text."""
     playable: tuple[float, float, float, float] = (0.0, 0.0, 64.0, 64.0)
@@ -388,6 +404,14 @@ def _read_map(situation: Situation, body: str) -> None:
     situation.places = [Place(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
 
 
+def _read_armies(situation: Situation, body: str) -> None:
+    own = body.partition("The enemy's")[0]
+    for x, y, units, doing in _ARMY_PART.findall(own):
+        counts = {kind: int(number) for number, kind in _COUNT.findall(units)}
+        goal = next(iter(points(doing)), None)
+        situation.army.append(ArmyPart(counts, (float(x), float(y)), doing == "idle", goal))
+
+
 def _read_warping(situation: Situation, body: str) -> None:
     if found := _WARPGATES.search(body):
         situation.warpgates = int(found[1])
@@ -424,6 +448,7 @@ _READERS: dict[str, Callable[[Situation, str], None]] = {
     "Unit counts": _read_counts,
     "Alerts": _read_alerts,
     "Map": _read_map,
+    "Armies": _read_armies,
     "Warping in": _read_warping,
     "Teams of other agents": _read_others,
     "Places to build at": _read_sites,

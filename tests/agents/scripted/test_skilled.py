@@ -282,6 +282,29 @@ def test_a_commander_orders_places_that_its_text_names_to_groups_that_fight(
     assert [(message.recipient, message.text) for message in said] == [("CombatGroup0", order)]
 
 
+ORDERED = [
+    ("at Base 2, [27, 26]: 20 Marine: idle", False),
+    ("at Base 1, [20, 20]: 20 Marine: Move to [27, 27]", False),
+    ("at Base 1, [20, 20]: 20 Marine: Attack_Unit", False),
+    ("at Base 1, [20, 20]: 20 Marine: idle", True),
+    ("at Base 1, [20, 20]: 20 Marine: Attack to [48, 46]", True),
+]
+
+
+@pytest.mark.parametrize(("doing", "is_told"), ORDERED, ids=[doing for doing, _ in ORDERED])
+def test_a_commander_writes_to_those_that_do_something_else(doing: str, is_told: bool) -> None:
+    armies = f"Armies\n    Yours, worth 1000 minerals and vespene:\n        {doing}\n    The enemy's: none\n\n"
+    text = leader("20 Marine", at="[20, 20]", more=armies)
+    assert bool(parse(skilled(text, random.Random(1))).messages) == is_told
+
+
+def test_a_leader_without_units_speaks_of_its_side() -> None:
+    reply = skilled(
+        leader("20 Marine", at="[20, 20]", seen="\n        3 Roach in sight at minimap [40, 40]"), random.Random(1)
+    )
+    assert "We have 40 workers and an army of 20 supply; of the enemy's we know 6." in reply
+
+
 def test_an_army_that_knows_of_a_stronger_one_waits() -> None:
     seen = "\n        40 Roach in sight at minimap [40, 40]"
     (message,) = parse(skilled(leader("45 Marine", at="[20, 20]", seen=seen), random.Random(1))).messages

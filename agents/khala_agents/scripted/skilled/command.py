@@ -16,7 +16,7 @@ from khala_agents.scripted.writing import point
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_agents.scripted.reading import Point, Situation
+    from khala_agents.scripted.reading import ArmyPart, Point, Situation
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 40.0
@@ -30,7 +30,13 @@ FULL = 185.0
 GATHER_EVERY_S = 10
 """How often an army at home is ordered to wait at the foremost base."""
 ORDERS_EVERY_S = 6
-"""How often marching orders are written: new units hear of them, and groups that have arrived get the next place."""
+"""How often marching orders are written to groups that mostly do something else."""
+REMIND_EVERY_S = 30
+"""How often they are written for a few stragglers, such as new units: a group is shown an order for 60 s."""
+AROUND = 4.0
+"""Cells of the minimap within which a group is at a place: a large one stands around it."""
+ROUNDED = 1.5
+"""Cells by which the goal of an order, which a text gives in whole cells, may differ from that of the message."""
 IN_FRONT = 4.0
 """Cells of the minimap from the foremost base to where the army gathers."""
 HUNT_S = 30
@@ -38,7 +44,8 @@ HUNT_S = 30
 LIKELY = ("the enemy's", "the enemy began", "may have begun", "never seen")
 """Words in the line of a base where enemies are, the surest first."""
 MAP_MIDDLE = (32.0, 32.0)
-MOST_MESSAGES = 8
+MOST_MESSAGES = 5
+"""As many of a reply are delivered; the others are due the next time."""
 
 
 def command(plan: ReplyPlan) -> None:
@@ -68,15 +75,39 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
     target, home = _target(situation, army), _gathering(situation, army)
     out = math.dist(army, target or MAP_MIDDLE) < math.dist(army, home)
     names = list(dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents))
-    if not attacks(situation, out=out):
-        text = f"Gather at {point(home)} and defend it."
-        if situation.alarms and not out:
-            text = f"Defend {point(min(situation.alarms, key=lambda at: math.dist(at, home)))}."
-        return [(name, text) for name in names[:MOST_MESSAGES]]
-    hidden = _unwatched(situation) or [MAP_MIDDLE]
-    first = int(situation.time_s / HUNT_S)
-    goals = [target or hidden[(first + number) % len(hidden)] for number in range(len(names))]
-    return [(name, f"Attack {point(goal)}.") for name, goal in zip(names[:MOST_MESSAGES], goals, strict=False)]
+    if attacks(situation, out=out):
+        hidden = _unwatched(situation) or [MAP_MIDDLE]
+        first = int(situation.time_s / HUNT_S)
+        goals = [target or hidden[(first + number) % len(hidden)] for number in range(len(names))]
+        form = "Attack {}."
+    elif situation.alarms and not out:
+        goals = [min(situation.alarms, key=lambda at: math.dist(at, home))] * len(names)
+        form = "Defend {}."
+    else:
+        goals, form = [home] * len(names), "Gather at {} and defend it."
+    due = [(name, goal) for name, goal in zip(names, goals, strict=True) if _is_due(situation, name, goal)]
+    return [(name, form.format(point(goal))) for name, goal in due[:MOST_MESSAGES]]
+
+
+def _is_due(situation: Situation, agent: str, goal: Point) -> bool:
+    """Return whether an agent needs to hear of an order: its units are not at the place, and not on their way to it."""
+    kinds = {kind for group in situation.groups if group.agent == agent for kind in group.units}
+    obey = astray = 0
+    for part in situation.army:
+        number = sum(count for kind, count in part.units.items() if kind in kinds)
+        if _obeys(part, goal):
+            obey += number
+        else:
+            astray += number
+    often = ORDERS_EVERY_S if astray >= obey else REMIND_EVERY_S
+    return (astray > 0 or not obey) and situation.time_s % often < 2
+
+
+def _obeys(part: ArmyPart, goal: Point) -> bool:
+    """Return whether a part of the army is at a place, on its way there, or fights what is in its way."""
+    if math.dist(part.at, goal) <= AROUND:
+        return True
+    return not part.idle and (part.goal is None or math.dist(part.goal, goal) <= ROUNDED)
 
 
 def marches(kind: str) -> bool:

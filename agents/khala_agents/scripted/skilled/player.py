@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from khala_agents.scripted.reading import points, read
 from khala_agents.scripted.skilled import brood, builder, combat, command, economy, journey, skills
-from khala_agents.scripted.skilled.kinds import kind_of
+from khala_agents.scripted.skilled.kinds import KINDS, kind_of, strength
 from khala_agents.scripted.skilled.plan import ReplyPlan
 from khala_agents.scripted.skilled.space import middle
 from khala_agents.scripted.writing import point, reply
@@ -118,11 +118,22 @@ _LEADERS: dict[str, Callable[[ReplyPlan], None]] = {
 
 
 def _analysis(situation: Situation) -> str:
+    """Return what an agent sees: around its teams, or, for one without units, of the whole side."""
     own = sum(len(team.own) for team in situation.teams.values())
+    if not own:
+        return _survey(situation)
     enemies = {unit.tag: unit for team in situation.teams.values() for unit in team.enemies}
     weakest = min(enemies.values(), key=lambda unit: (unit.share, unit.tag), default=None)
     seen = f"{len(enemies)} enemy unit(s) in sight" + (f", {weakest.tag} is hurt most" if weakest else "")
     return f"{own} unit(s) of mine in {len(situation.teams)} team(s), {seen}."
+
+
+def _survey(situation: Situation) -> str:
+    """Return the strength of the side and of what it knows of the enemy, in supply, and where it is attacked."""
+    workers = sum(count for kind, count in situation.counts.items() if kind in KINDS and KINDS[kind].role == "worker")
+    mine, theirs = strength(situation.counts), strength(situation.seen)
+    attacked = f" We are under attack at {point(situation.alarms[0])}." if situation.alarms else ""
+    return f"We have {workers} workers and an army of {mine:g} supply; of the enemy's we know {theirs:g}.{attacked}"
 
 
 def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
