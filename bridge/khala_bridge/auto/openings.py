@@ -16,7 +16,8 @@ from khala_bridge.auto.build import NEAR, free_geysers, is_gas, structure_of
 from khala_bridge.auto.chrono import boostable, working
 from khala_bridge.auto.places import is_held
 from khala_bridge.auto.rule import NotAvailable, RuleRequest
-from khala_bridge.auto.sites import NO_ORDERS, footprint_need, legal, on_corner
+from khala_bridge.auto.sites import NO_ORDERS, footprint_need, legal, near, on_corner
+from khala_bridge.auto.spread import TUMOR_REACH
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, WorldPoint
 from khala_bridge.state.ground import land_of, sites
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from khala_bridge.rules import Ledger
     from khala_bridge.state import Snapshot, Unit
     from khala_bridge.state.ground import Land
+    from khala_bridge.state.ground.footprints import Footprint
     from khala_bridge.state.ground.terrain import Bools
 
 HALF: Final = CAMERA_WIDTH / 2
@@ -164,18 +166,31 @@ def openings(action: Action, snapshot: Snapshot, camera: Camera, world: MapFrame
         return [at for at in free if _shows(camera, world, at)][:most]
     key = "openings", site.ground, site.seen, footprint.rows, camera, most
     if key not in land.answers:
-        land.answers[key] = _spread(land, structure, camera, world, most)
+        land.answers[key] = _spread(land, legal_now(land, structure), footprint, camera, world, most)
     found: list[WorldPoint] = land.answers[key]
     return found
 
 
-def _spread(land: Land, structure: str, camera: Camera, world: MapFrame, most: int) -> list[WorldPoint]:
+def tumor_places(
+    tumors: list[WorldPoint], snapshot: Snapshot, camera: Camera, world: MapFrame, most: int
+) -> list[WorldPoint]:
+    """Return places on a screen for a creep tumor, the nearest to its middle first; within reach of all `tumors`."""
+    land = land_of(snapshot)
+    free = land.free & land.creep & (land.sight >= SEEN_NOW)
+    for tumor in tumors:
+        free &= near(land, [tumor], reach=TUMOR_REACH) < np.inf
+    return _spread(land, free, footprint_need("CreepTumor"), camera, world, most)
+
+
+def _spread(
+    land: Land, fit: Bools, footprint: Footprint, camera: Camera, world: MapFrame, most: int
+) -> list[WorldPoint]:
     """Return free places that do not overlap, out of the workers' ways if there are any."""
-    footprint, reach = footprint_need(structure), HALF - EDGE
+    reach = HALF - EDGE
     left, bottom, right, top = world.playable
     x0, y0 = max(math.ceil(max(camera.x - reach, left)), 0), max(math.ceil(max(camera.y - reach, bottom)), 0)
     part = np.s_[x0 : math.floor(min(camera.x + reach, right)), y0 : math.floor(min(camera.y + reach, top))]
-    allowed = legal_now(land, structure)[part]
+    allowed = fit[part]
     aside = allowed & ~land.kept[part]
     cells = np.argwhere(aside if aside.any() else allowed)
     away = np.hypot(cells[:, 0] + x0 + 0.5 - camera.x, cells[:, 1] + y0 + 0.5 - camera.y)

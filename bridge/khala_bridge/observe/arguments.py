@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.auto.aims import needs_sight, reaches, unfit
-from khala_bridge.auto.openings import openings, seen_points, tags_for
+from khala_bridge.auto.openings import openings, seen_points, tags_for, tumor_places
+from khala_bridge.auto.spread import TUMORS
 from khala_bridge.rules import asked_by, is_attack, why_not
+from khala_bridge.state.side import place
 from khala_protocol.messages import ValidArguments
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ MOST_TAGS = 12
 """Tags that are listed for an action at most; the first ones."""
 MOST_POINTS = 5
 """Places that are listed for an action at most; the nearest ones."""
+TUMOR = "Build_CreepTumor_screen"
+"""The function of units that plant a tumor themselves, at a place that no rule chooses."""
 
 
 class Lack(NamedTuple):
@@ -80,7 +84,7 @@ class Asker(NamedTuple):
                 tags = self._tags(action, doers)
                 return tags if isinstance(tags, Lack) else _written(action, units, tags)
             case "screen":
-                points = self._points(action)
+                points = self._points(action, doers)
                 if isinstance(points, Lack):
                     return points
                 return _written(action, units, None, points and [self._on_screen(point) for point in points])
@@ -138,7 +142,7 @@ class Asker(NamedTuple):
 
     # --- places -----------------------------------------------------------------------------------------------
 
-    def _points(self, action: Action) -> list[WorldPoint] | Lack | None:
+    def _points(self, action: Action, doers: Sequence[UnitState]) -> list[WorldPoint] | Lack | None:
         """Return some places on the screen that will do; None if every place on the map does."""
         camera = self.around.camera
         if camera is None:
@@ -146,6 +150,10 @@ class Asker(NamedTuple):
         if action.rule == "build_at":
             found = openings(action, self.snapshot, camera, self.around.world, MOST_POINTS)
             return found or Lack("no place on the screen")
+        if action.function == TUMOR:
+            tumors = [place(self.snapshot.units[unit.tag]) for unit in doers if unit.type in TUMORS]
+            spots = tumor_places(tumors, self.snapshot, camera, self.around.world, MOST_POINTS)
+            return spots or Lack("no free creep on the screen within reach")
         if action.rule is None and needs_sight(action):
             seen = seen_points(self.snapshot, camera, self.around.world, MOST_POINTS)
             return Lack("nothing in sight on the screen") if seen == [] else seen

@@ -9,8 +9,10 @@ import pytest
 from s2clientprotocol import debug_pb2
 
 from khala_bridge.auto import RULES, NotAvailable, RuleRequest
+from khala_bridge.auto.openings import tumor_places
+from khala_bridge.auto.spread import TUMOR_REACH
 from khala_bridge.catalogue.action import Action
-from khala_bridge.frames import WorldPoint
+from khala_bridge.frames import Camera, MapFrame, WorldPoint
 from khala_bridge.state.ground import land_of
 
 if TYPE_CHECKING:
@@ -140,6 +142,18 @@ def test_a_queen_plants_a_tumor_on_creep_away_from_what_makes_it(make_game: Call
     assert game.do([order]) == ["Success"]
     game.play(160)
     assert len(game.own("CreepTumorQueen")) + len(game.own("CreepTumorBurrowed")) == 1
+
+
+def test_places_for_a_tumor_are_those_that_the_game_takes(make_game: Callable[..., Game]) -> None:
+    game = make_game("Flat64", "zerg")
+    game.put("Queen", 46, 20)
+    game.play(20)
+    view = game.snapshot, Camera(46, 20), MapFrame(64, 64, (0, 0, 64, 64)), 5
+    spots = tumor_places([], *view)
+    assert [game.may_stand("Build_CreepTumor_Queen_screen", spot) for spot in spots] == ["Success"] * 5
+    tumor = spots[0]
+    assert all(math.dist(spot, tumor) <= TUMOR_REACH for spot in tumor_places([tumor], *view))
+    assert tumor_places([WorldPoint(20, 50)], *view) == []
 
 
 def test_what_is_trained_is_called_off(protoss: Game) -> None:
