@@ -73,4 +73,4 @@ def test_messages_of_a_full_game_are_true_and_seldom_said_again() -> None:
     found = measure("simple64_sceb", steps=200, seed=1)
     assert sum(found.said.values()) > 20
     assert found.share >= GOAL
-    assert found.again < 0.25 * sum(found.said.values())
+    assert found.again < 0.4 * sum(found.said.values())
