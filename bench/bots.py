@@ -3,9 +3,12 @@
     python -m bench.bots ~/python-sc2                       four rushes, ten levels, one game each
     python -m bench.bots ~/python-sc2 --bots worker_rush --levels 4 5 --games 3
     python -m bench.bots ~/python-sc2 --log won.jsonl       games in the file are not played again
+    python -m bench.bots ~/python-sc2 --maps ~/Maps --map Simple128
 
 The path is a checkout of https://github.com/BurnySc2/python-sc2, whose examples are not in its package; the package
-itself comes with `make install`. The computer plays the race that the example's own `main` asks for.
+itself comes with `make install`. The computer plays the race that the example's own `main` asks for. The examples name
+ladder maps, whose bases are twice as far apart as those of Simple64: there "25 from the middle" is in front of the
+enemy's base, here it is inside.
 """
 
 from __future__ import annotations
@@ -15,13 +18,14 @@ import importlib.util
 import inspect
 import json
 import os
+import random
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from khala_simulator.process.install import install
+from khala_simulator.process.install import install, link_maps
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,23 +42,23 @@ LEVELS: Final = (
     "Harder", "VeryHard", "CheatVision", "CheatMoney", "CheatInsane",
 )  # fmt: skip
 """As python-sc2 names them, from 1 to 10."""
-MAP: Final = "Simple64"
 PATIENCE_S: Final = 900.0
 """Wall time of a game."""
 
 
-def play(path: Path, bot: str, level: int, seed: int, minutes: float) -> None:
+def play(options: argparse.Namespace) -> None:
     """Play one game in this process, and print its result as JSON."""
     from sc2 import maps  # noqa: PLC0415  # a package that only this measurement needs
     from sc2.data import Difficulty, Race  # noqa: PLC0415
     from sc2.main import run_game  # noqa: PLC0415
     from sc2.player import Bot, Computer  # noqa: PLC0415
 
-    file, own, other = BOTS[bot]
-    ai = _bot(path / "examples" / file)
-    players: Any = [Bot(Race[own], ai), Computer(Race[other], Difficulty[LEVELS[level - 1]])]
-    limit_s = round(60 * minutes)
-    result: Any = run_game(maps.get(MAP), players, realtime=False, game_time_limit=limit_s, random_seed=seed)
+    file, own, other = BOTS[options.bots[0]]
+    random.seed(options.seed)  # the bots draw where they build, and what they attack
+    ai = _bot(options.path / "examples" / file)
+    players: Any = [Bot(Race[own], ai), Computer(Race[other], Difficulty[LEVELS[options.levels[0] - 1]])]
+    limit_s, arena = round(60 * options.minutes), maps.get(options.map)
+    result: Any = run_game(arena, players, realtime=False, game_time_limit=limit_s, random_seed=options.seed)
     found = {"result": result.name, "minutes": round(ai.time / 60, 1)}
     sys.stdout.write("\n" + json.dumps(found) + "\n")
 
@@ -73,11 +77,11 @@ def _bot(file: Path) -> Any:
     return next(kind for kind in bots if kind.__module__ == file.stem)()
 
 
-def play_apart(path: Path, sc2path: Path, game: tuple[str, int, int], minutes: float) -> dict[str, Any]:
+def play_apart(options: argparse.Namespace, sc2path: Path, game: tuple[str, int, int]) -> dict[str, Any]:
     """Play one game in a process of its own; return its result, or what was wrong."""
     bot, level, seed = game
-    command = [sys.executable, "-m", "bench.bots", str(path), "--one", "--bots", bot, "--levels", str(level)]
-    command += ["--seed", str(seed), "--minutes", str(minutes)]
+    command = [sys.executable, "-m", "bench.bots", str(options.path), "--one", "--bots", bot, "--levels", str(level)]
+    command += ["--seed", str(seed), "--minutes", str(options.minutes), "--map", options.map]
     try:
         done = subprocess.run(
             command, env={**os.environ, "SC2PATH": str(sc2path)}, capture_output=True, text=True, timeout=PATIENCE_S,
@@ -120,13 +124,15 @@ def main() -> None:
     parser.add_argument("--games", type=int, default=1)
     parser.add_argument("--seed", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=15.0, help="of game time; then it is a tie")
+    parser.add_argument("--map", default="Simple64", help="by default %(default)s; each map needs a log of its own")
+    parser.add_argument("--maps", type=Path, help="a directory with maps of the game, to be played too")
     parser.add_argument("--log", type=Path, help="a file with a line for each game")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not (options.path / "examples").is_dir():
         raise SystemExit(f"{options.path} has no examples: clone https://github.com/BurnySc2/python-sc2, give its path")
     if options.one:
-        play(options.path, options.bots[0], options.levels[0], options.seed, options.minutes)
+        play(options)
         return
     won: dict[tuple[str, int, int], dict[str, Any]] = {}
     if options.log and options.log.exists():
@@ -135,9 +141,11 @@ def main() -> None:
             won[known["bot"], known["level"], known["seed"]] = known
     with tempfile.TemporaryDirectory() as directory:
         sc2path = install(Path(directory) / "sc2")
+        if options.maps:
+            link_maps(sc2path, options.maps)
         for game in games(options):
             if game not in won:
-                won[game] = play_apart(options.path.absolute(), sc2path, game, options.minutes)
+                won[game] = play_apart(options, sc2path, game)
                 line = json.dumps({"bot": game[0], "level": game[1], "seed": game[2], **won[game]})
                 sys.stderr.write(line + "\n")
                 if options.log:

@@ -221,6 +221,18 @@ def test_what_stands_in_the_way_when_the_builder_comes_ends_the_order(field: Fie
     assert field.world.mishaps[0].refusal is ActionResult.CANT_BUILD_ON_THAT
 
 
+def test_of_two_builders_with_the_price_of_one_structure_the_later_one_stands_idle(field: Field) -> None:
+    field.world.players[1].minerals = 150.0
+    early, late = field.put("Probe", 1, 20.0, 20.0), field.put("Probe", 1, 20.0, 30.0)
+    assert order(field, early, BUILD["Pylon"], point=(26.0, 20.0)) == [early]
+    assert order(field, late, BUILD["Pylon"], point=(30.0, 30.0)) == [late]  # nothing is paid yet
+    field.play(100)
+    assert find(field, "Pylon")
+    assert field.world.players[1].minerals == 50.0
+    assert field.world.mishaps[0].refusal is ActionResult.NOT_ENOUGH_MINERALS
+    assert not field.world.orders_of(late)
+
+
 @pytest.mark.parametrize(("name", "hidden"), [("ZerglingBurrowed", True), ("DarkTemplar", True), ("Zergling", False)])
 def test_a_builder_finds_out_on_the_site_what_its_player_does_not_see(field: Field, name: str, *, hidden: bool) -> None:
     probe = field.put("Probe", 1, 20.0, 20.0)
