@@ -128,7 +128,13 @@ class Workshop:
             config = _changed(_located(load_model(name)), self._overrides, source="command line")
             if self._budget.limit_usd is not None and not config.prices.known:
                 raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
-            limits = Limits(config.limits, prices=config.prices, budget=self._budget, source=f"model file {name}")
+            limits = Limits(
+                config.limits,
+                prices=config.prices,
+                budget=self._budget,
+                max_tokens=config.max_tokens,
+                source=f"model file {name}",
+            )
             self._models[name] = config, limits
         return self._models[name]
 

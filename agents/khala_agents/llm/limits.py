@@ -12,7 +12,7 @@ handles a provider's own limits; these keep an experiment below them, and within
 from __future__ import annotations
 
 import asyncio
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -22,10 +22,13 @@ from khala_agents.llm.client import LLMError
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+    from collections.abc import AsyncIterator, Iterator
 
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import Usage
+
+LONGEST_ANSWER = 4_000
+"""Tokens of an answer that a budget holds money for where the model file has no `max_tokens`."""
 
 LimitType = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
 
@@ -57,17 +60,35 @@ class LimitExceeded(LLMError):
 
 
 class Budget:
-    """Money that may be spent, in US dollars. Requests in flight when it is used up are still paid for."""
+    """Money that may be spent, in US dollars. A request holds the most that it may cost until its cost is known."""
 
     def __init__(self, limit_usd: float | None, *, source: str = "budget") -> None:
         self.limit_usd = limit_usd
         self.spent_usd = 0.0
+        self.held_usd = 0.0
         self.source = source
 
-    def check(self) -> None:
-        """Raise `LimitExceeded` if nothing is left."""
-        if self.limit_usd is not None and self.spent_usd >= self.limit_usd:
-            raise LimitExceeded("budget_usd", value=self.spent_usd, limit=self.limit_usd, source=self.source)
+    def check(self, most_usd: float = 0.0) -> None:
+        """Raise `LimitExceeded` if nothing is left, or less than a request may cost."""
+        if self.limit_usd is None:
+            return
+        value = self.spent_usd + self.held_usd
+        if self.spent_usd >= self.limit_usd or value + most_usd > self.limit_usd:
+            raise LimitExceeded("budget_usd", value=value, limit=self.limit_usd, source=self.source)
+
+    @contextmanager
+    def holding(self, most_usd: float) -> Iterator[None]:
+        """Hold the most that a request may cost while it is made.
+
+        Raises:
+            LimitExceeded: there is not so much left.
+        """
+        self.check(most_usd)
+        self.held_usd += most_usd
+        try:
+            yield
+        finally:
+            self.held_usd -= most_usd
 
     def spend(self, usd: float) -> None:
         """Add the cost of a request."""
@@ -146,11 +167,14 @@ class Limits:
         *,
         prices: Prices | None = None,
         budget: Budget | None = None,
+        max_tokens: int | None = None,
         source: str = "the model file",
     ) -> None:
+        """Take the rules of the endpoint, and what a request may cost; `max_tokens` is the limit of an answer."""
         rules = rules or LimitRules()
         self.budget = budget or Budget(None)
         self._prices = prices
+        self._longest = LONGEST_ANSWER if max_tokens is None else max_tokens
         self._in_flight = asyncio.Semaphore(rules.in_flight) if rules.in_flight else None
         self._requests = _bucket("requests_per_minute", rules.requests_per_minute, source)
         self._tokens = _bucket("tokens_per_minute", rules.tokens_per_minute, source)
@@ -172,15 +196,19 @@ class Limits:
             await self._in_flight.acquire()
         try:
             await self._take_turn(tokens, deadline)
-            self.budget.check()  # it may have been spent during the wait
             ticket = Ticket(waited_s=clock() - arrived)
-            try:
-                yield ticket
-            finally:
-                self._settle(ticket.usage, tokens)
+            with self.budget.holding(self._most_usd(tokens)):  # it may have been spent during the wait
+                try:
+                    yield ticket
+                finally:
+                    self._settle(ticket.usage, tokens)
         finally:
             if self._in_flight:
                 self._in_flight.release()
+
+    def _most_usd(self, tokens: int) -> float:
+        """Return the price of a prompt of about `tokens` and of the longest answer; 0 if it is not known."""
+        return (self._prices and self._prices.cost_usd(prompt=tokens, completion=self._longest)) or 0.0
 
     async def _take_turn(self, tokens: int, deadline: float | None) -> None:
         if self._requests:

@@ -61,7 +61,7 @@ async def test_tokens_are_counted_as_estimated_and_corrected_by_what_was_used() 
 
 
 async def test_a_request_that_nobody_settled_counts_with_its_prompt() -> None:
-    limits = Limits(LimitRules(tokens_per_minute=600), prices=PRICES, budget=(budget := Budget(1.0)))
+    limits = Limits(LimitRules(tokens_per_minute=600), prices=PRICES, max_tokens=100, budget=(budget := Budget(10.0)))
     await use(limits, tokens=300, usage=None)
     assert budget.spent_usd == pytest.approx(0.3)
     assert await use(limits, tokens=600) == 30
@@ -98,24 +98,32 @@ async def test_the_request_is_given_back_when_there_are_no_tokens_for_it() -> No
 
 
 async def test_nothing_is_asked_when_the_money_is_used_up() -> None:
-    budget = Budget(0.5, source="the budget of this process")
-    limits = Limits(prices=PRICES, budget=budget)
+    budget = Budget(0.65, source="the budget of this process")
+    limits = Limits(prices=PRICES, max_tokens=100, budget=budget)
     await use(limits)
     await use(limits)
     with pytest.raises(LimitExceeded) as caught:
         await use(limits)
     error = caught.value
-    assert (error.type, error.limit, error.source) == ("budget_usd", 0.5, "the budget of this process")
+    assert (error.type, error.limit, error.source) == ("budget_usd", 0.65, "the budget of this process")
     assert error.value == pytest.approx(0.6)
     assert (error.status, error.retryable) == ("budget", False)
-    assert str(error) == "the limit budget_usd = 0.5 of the budget of this process is reached (0.6)"
+    assert str(error) == "the limit budget_usd = 0.65 of the budget of this process is reached (0.6)"
 
 
 async def test_who_waited_while_the_money_went_is_refused_too() -> None:
-    limits = Limits(LimitRules(in_flight=1), prices=PRICES, budget=Budget(0.3))
+    limits = Limits(LimitRules(in_flight=1), prices=PRICES, max_tokens=100, budget=Budget(0.3))
     outcomes = await asyncio.gather(use(limits, takes_s=1), use(limits), return_exceptions=True)
     assert outcomes[0] == 0
     assert isinstance(outcomes[1], LimitExceeded)
+
+
+async def test_requests_in_flight_hold_the_most_that_they_may_cost() -> None:
+    budget = Budget(1.0)
+    limits = Limits(prices=PRICES, max_tokens=100, budget=budget)
+    outcomes = await asyncio.gather(*(use(limits, takes_s=1) for _ in range(9)), return_exceptions=True)
+    assert [isinstance(outcome, LimitExceeded) for outcome in outcomes] == [False] * 3 + [True] * 6
+    assert (budget.spent_usd, budget.held_usd) == (pytest.approx(0.9), pytest.approx(0.0))
 
 
 async def test_a_budget_is_shared_by_endpoints_and_a_rate_is_not() -> None:
