@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install check format types test pysc2 slow cover test-all demo bench scenarios docs golden picture clean
+.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -27,15 +27,21 @@ help: ## List the targets
 
 .venv/.ready: pyproject.toml uv.lock $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	$(UV) sync --quiet --frozen --python $(PYTHON)
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON)
 	@touch $@
 
-install: .venv/.ready ## Install everything into .venv
+.venv/.tests: .venv/.ready
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments
+	@touch $@
+
+install: .venv/.ready ## Install what is needed to play into .venv
+
+install-tests: .venv/.tests ## Install what the tests need as well
 
 demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
 	$(RUN)khala run 2s3z_pair
 
-test: install ## Lint, types, contracts and every short test
+test: install-tests ## Lint, types, contracts and every short test
 	@said=$$(mktemp) && trap 'rm -f $$said' EXIT; \
 	$(MAKE) --no-print-directory check >$$said 2>&1 & checks=$$!; \
 	$(RUN)pytest $(PARALLEL); tests=$$?; \
@@ -47,15 +53,15 @@ test: install ## Lint, types, contracts and every short test
 pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the others
 	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
 
-slow: install ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
+slow: install-tests ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
-cover: install ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
+cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
 	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
-check: install ## Lint, format, types and import contracts
+check: install-tests ## Lint, format, types and import contracts
 	$(RUN)ruff check .
 	$(RUN)ruff format --check .
 	$(RUN)mypy
@@ -71,7 +77,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
 	  echo "== Python $$version"; \
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
-	  $(UV) sync --quiet --frozen --python $$python && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
+	  $(UV) sync --quiet --frozen --python $$python --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
 bench: install ## Measure what docs/measurements.md claims
@@ -82,7 +88,7 @@ scenarios: install ## Play all 33 maps of the paper with the scripted players, a
 
 docs: install ## Write the generated pages of docs/reference, and build the site with search into site/
 	$(RUN)python -m docs.generate
-	$(UV) sync --quiet --frozen --group docs
+	$(UV) sync --quiet --frozen --inexact --group docs
 	NO_MKDOCS_2_WARNING=1 $(RUN)mkdocs build --strict --quiet
 
 golden: install ## Record the tests' battle again, after an intended change

@@ -222,10 +222,10 @@ class _Tries:
         async with self._policy.limits.admit(tokens=self._tokens, deadline=self._context.deadline) as ticket:
             self._made += 1
             began = self._clock()
-            status, text, usage = "cancelled", None, UNKNOWN + self._images
+            status, completion, usage = "cancelled", None, UNKNOWN + self._images
             try:
                 completion = await self._completed(began)
-                status, text, usage = "ok", completion.text, self._with_images(completion.usage)
+                status, usage = "ok", self._with_images(completion.usage)
                 ticket.settle(usage)
             except LLMError as error:
                 status = error.status
@@ -234,7 +234,7 @@ class _Tries:
                     ticket.settle(usage)
                 raise
             finally:
-                self._trace(began, ticket.waited_s, status, text, usage)
+                self._trace(began, ticket.waited_s, status, completion, usage)
             return completion
 
     async def _completed(self, began: float) -> Completion:
@@ -268,7 +268,7 @@ class _Tries:
             stable=Prompt.STABLE,
         )
 
-    def _trace(self, began: float, waited_s: float, status: str, text: str | None, usage: Usage) -> None:
+    def _trace(self, began: float, waited_s: float, status: str, completion: Completion | None, usage: Usage) -> None:
         seen = self._context.observation
         exchange = ModelCall(
             run=seen.run,
@@ -282,7 +282,8 @@ class _Tries:
             endpoint=self._policy.client.endpoint,
             prompt=self._prompt,
             params=dict(self._policy.client.params),
-            completion=text,
+            answered_by=completion.model if completion else "",
+            completion=completion.text if completion else None,
             status=status,
             started_s=began - self._context.arrived,
             latency_s=self._clock() - began,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.observe.text.example import example
+from khala_orchestrator.provenance import code_sha256, hardware
 from khala_protocol.messages import Briefing, Contact, Run
 
 if TYPE_CHECKING:
@@ -61,5 +62,8 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         advisers=tuple(dict.fromkeys(adviser.name for side in task.per_side() for adviser in side.advisers)),
         catalogue_sha256=catalogue_sha256(),
         versions={"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES},
+        code_sha256=code_sha256(),
+        hardware=hardware(),
+        labels=config.labels,
         config=task.model_dump(mode="json"),
     )

@@ -43,6 +43,8 @@ class MatchConfig(Frozen):
     """How long the host waits for its agents at the start."""
     record: Path | None = None
     """The MCAP file that every topic is written to; None for no recording."""
+    labels: dict[str, str] = Field(default_factory=dict)
+    """For the run card: what an experiment calls this match."""
 
     @model_validator(mode="after")
     def _once_over_lan(self) -> Self:

@@ -49,7 +49,7 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
     try:
         task = TaskConfig.model_validate(run.config)
         game, _, _version = run.game.rpartition(" ")
-        config = MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes)
+        config = MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes, labels=run.labels)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))

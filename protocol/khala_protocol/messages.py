@@ -828,6 +828,9 @@ class ModelCall(Wire):
     attempt: int = Field(ge=1)
     """Number of the try, from 1, of this step and purpose."""
     model: str
+    """As it was asked for."""
+    answered_by: str = ""
+    """As the endpoint called it in its answer, with its version; "" if it did not say."""
     endpoint: str
     """Base URL without credentials or query."""
     prompt: tuple[ChatMessage, ...]
@@ -877,6 +880,12 @@ class Run(Wire):
     catalogue_sha256: str
     versions: dict[str, str]
     """Of Khala, Python, PySC2, zenoh."""
+    code_sha256: str = ""
+    """Of the Python code of Khala, because a version says little of a checkout."""
+    hardware: dict[str, str | int] = {}
+    """Of the host: its processor, number of cores, memory."""
+    labels: dict[str, str] = {}
+    """What an experiment calls this match: its name, its hash, and its place in the grid."""
     config: dict[str, object] = {}
     """The task file with all its defaults."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import to_json
 
-from khala_agents.llm.client import Completion, MalformedCompletion, Request, Scalar
+from khala_agents.llm.client import Completion, MalformedCompletion, Request, Scalar, model_name
 from khala_agents.llm.http import HttpEndpoint
 from khala_agents.secret import excerpt, scrub
 from khala_protocol.messages import Usage
@@ -99,6 +99,7 @@ class Anthropic:
             text=scrub("".join(block.text for block in body.content if block.type == "text")),
             usage=body.usage.priced(self._prices) if body.usage else Usage(requests=1, unknown_requests=1),
             finish=body.stop_reason or "end_turn",
+            model=model_name(body.model),
         )
 
 
@@ -145,6 +146,7 @@ class _Usage(BaseModel):
 
 
 class _Body(BaseModel):
+    model: Any = None
     content: list[_Block]
     stop_reason: str | None = None
     usage: _Usage | None = None

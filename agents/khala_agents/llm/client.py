@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 Scalar = str | int | float | bool | None
 
+LONGEST_NAME = 100
+"""Characters that are kept of the name by which an endpoint calls its model."""
+
 
 @dataclass(frozen=True, slots=True)
 class Origin:
@@ -73,11 +76,18 @@ class Completion:
         text: its words, without its reasoning.
         usage: tokens and price; `unknown_requests=1` if the endpoint did not say.
         finish: why it stopped, in the endpoint's words: `stop`, `length`, …
+        model: which model answered, in the endpoint's words; "" if it did not say.
     """
 
     text: str
     usage: Usage = field(default_factory=lambda: Usage(requests=1, unknown_requests=1))
     finish: str = "stop"
+    model: str = ""
+
+
+def model_name(said: object) -> str:
+    """Return what an endpoint calls its model, cut to a name's length; "" for anything but text."""
+    return said[:LONGEST_NAME] if isinstance(said, str) else ""
 
 
 class LLMClient(Protocol):

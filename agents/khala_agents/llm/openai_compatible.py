@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import to_json
 
-from khala_agents.llm.client import Completion, LLMError, MalformedCompletion, Request, Scalar
+from khala_agents.llm.client import Completion, LLMError, MalformedCompletion, Request, Scalar, model_name
 from khala_agents.llm.http import HttpEndpoint, error_for
 from khala_agents.secret import excerpt, scrub
 from khala_protocol.messages import MOST, Usage
@@ -114,6 +114,7 @@ class OpenAICompatible:
             text=scrub(choice.message.words()),
             usage=self._usage(body.usage),
             finish=choice.finish_reason or "stop",
+            model=model_name(body.model),
         )
 
     def _no_completion(self, answer: bytes) -> LLMError:
@@ -160,6 +161,7 @@ class _Choice(BaseModel):
 
 
 class _Body(BaseModel):
+    model: Any = None
     choices: Annotated[list[_Choice], Field(min_length=1)]
     usage: dict[str, Any] | None = None
 

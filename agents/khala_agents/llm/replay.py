@@ -59,7 +59,7 @@ class ReplayClient:
         """
         exchange = self._look_up(request)
         if exchange.completion is not None:
-            return Completion(exchange.completion, exchange.usage)
+            return Completion(exchange.completion, exchange.usage, model=exchange.answered_by)
         *origin, attempt = _key(request)
         was_repeated = (*origin, attempt + 1) in self._recorded
         raise _passing(exchange) if was_repeated else _Final.of(exchange)

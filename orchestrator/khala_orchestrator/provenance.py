@@ -1,0 +1,49 @@
+"""Where numbers come from: which code, on which machine. For the run card."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import os
+import platform
+from pathlib import Path
+
+import psutil
+
+PACKAGES = (
+    "khala", "khala_agents", "khala_bridge", "khala_configs", "khala_orchestrator", "khala_protocol", "khala_simulator",
+)  # fmt: skip
+
+
+@functools.cache
+def code_sha256() -> str:
+    """Return a hash of all Python code of Khala that is installed here; 0.15 s for 700 files."""
+    total = hashlib.sha256()
+    for package in PACKAGES:
+        spec = importlib.util.find_spec(package)
+        for root in map(Path, spec.submodule_search_locations or () if spec else ()):
+            for path in sorted(root.rglob("*.py")):
+                total.update(f"{package}/{path.relative_to(root)}\0".encode())
+                total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+@functools.cache
+def hardware() -> dict[str, str | int]:
+    """Return the processor, the number of cores that this process may use, and the memory in megabytes."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        "memory_mb": int(psutil.virtual_memory().total) // 2**20,
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return platform.processor()
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor())
