@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -17,7 +18,7 @@ from khala import games
 from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
-from khala.minds import spent_usd
+from khala.minds import groups_of, spent_usd
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -79,7 +80,7 @@ async def play(
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
-    for mind in minds.values():
+    for _, mind, _ in groups_of(config.task, minds):
         mind.check()
     supplies = supplies or Supplies()
     config, sc2path = _prepared(config, directory, game)
@@ -134,6 +135,7 @@ class _Share:
     side: str
     names: list[str]
     options: list[str]
+    environ: dict[str, str]
     left_usd: float | None
 
     @property
@@ -151,19 +153,15 @@ class _Share:
 async def _start_agents(
     children: Children, config: MatchConfig, minds: Mapping[str, Minds], bus: ZenohBus, spent: Mapping[Seat, float]
 ) -> list[_Share]:
-    scripted = [mind.latency_s for mind in minds.values() if mind.needs_endpoint]
+    groups = list(groups_of(config.task, minds))
+    scripted = [mind.latency_s for _, mind, _ in groups if mind.needs_endpoint]
     base_url = await start_endpoint(children, scripted[0]) if scripted else None
     joined = ["--run", config.run, "--connect", bus.endpoints[0]]
-    sides = config.task.per_side()
-    started: list[_Share] = []
-    for task in sides:
-        names, mind = [agent.name for agent in task.agents], minds[task.side]
-        options = [*joined, *mind.options(base_url)]
-        started += _shares_of(task.side, names, options, mind.budget_usd, sides=len(sides))
+    started = list(_shares_of(groups, joined, base_url))
     if any(spent.values()):
         log.warning("%s", _taken_off(started, spent))
     for share in started:
-        await children.start(share.process, *share.arguments, environ=minds[share.side].environ)
+        await children.start(share.process, *share.arguments, environ=share.environ)
     return started
 
 
@@ -181,13 +179,17 @@ def _taken_off(started: Sequence[_Share], spent: Mapping[Seat, float]) -> str:
 
 
 def _shares_of(
-    side: str, names: Sequence[str], options: list[str], budget_usd: float | None, *, sides: int
+    groups: Sequence[tuple[str, Minds, list[str]]], joined: list[str], base_url: str | None
 ) -> Iterator[_Share]:
-    groups = shares(names, MAX_PROCESSES // sides)
-    each_usd = None if budget_usd is None else budget_usd / len(groups)
-    for number, group in enumerate(groups):
-        process = f"agents-{number}" if sides == 1 else f"agents-{side}-{number}"
-        yield _Share(process, side, group, options, each_usd)
+    """Yield the processes: agents that decide alike share some, and all of a side may spend the same part."""
+    sides = Counter(side for side, _, _ in groups)
+    for side, count in sides.items():
+        each = max(1, MAX_PROCESSES // len(sides) // count)
+        parts = [(mind, part) for of, mind, names in groups if of == side for part in shares(names, each)]
+        for number, (mind, names) in enumerate(parts):
+            process = f"agents-{number}" if len(sides) == 1 else f"agents-{side}-{number}"
+            each_usd = None if mind.budget_usd is None else mind.budget_usd / len(parts)
+            yield _Share(process, side, names, [*joined, *mind.options(base_url)], mind.environ, each_usd)
 
 
 async def start_endpoint(children: Children, latency_s: float) -> str:

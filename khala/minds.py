@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from collections.abc import Mapping  # noqa: TC003  # pydantic evaluates it, in `khala.service`
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from khala import environment
@@ -19,8 +20,9 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
+    from khala_bridge.task.config import TaskConfig
     from khala_protocol.recording import Recording
 
 SCRIPTED = "scripted"
@@ -41,6 +43,23 @@ class Minds:
     """Latency of the scripted endpoint, if it is started."""
     fallback: str | None = None
     """Policy that decides where the model has no reply."""
+    agents: Mapping[str, str] = field(default_factory=dict)
+    """Agents that decide in another way, by name, as `named` takes it."""
+
+    def groups(self, names: Sequence[str]) -> list[tuple[Minds, list[str]]]:
+        """Return the agents in groups that decide alike, in the order of their names.
+
+        Raises:
+            ConfigError: one that decides in another way is not among them.
+        """
+        if unknown := sorted(self.agents.keys() - set(names)):
+            raise ConfigError(f"there is no agent {unknown[0]!r}: the agents are {', '.join(names)}")
+        said = {name: self.agents.get(name) for name in names}
+        alone = replace(self, agents={})
+        return [
+            (alone if text is None else alone.named(text), [name for name in names if said[name] == text])
+            for text in dict.fromkeys(said.values())
+        ]
 
     def named(self, text: str) -> Minds:
         """Return minds with the model or the policy of this name; budget, latency and fallback stay.
@@ -84,6 +103,17 @@ class Minds:
         more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
         given = [part for option, value in more.items() if value for part in (option, value)]
         return ["--model", self.model, *given]
+
+
+def groups_of(task: TaskConfig, minds: Mapping[str, Minds]) -> Iterator[tuple[str, Minds, list[str]]]:
+    """Yield the agents of a match in groups that decide alike, each with its side.
+
+    Raises:
+        ConfigError: minds name an agent that is not in the task.
+    """
+    for side in task.per_side():
+        for mind, names in minds[side.side].groups([agent.name for agent in side.agents]):
+            yield side.side, mind, names
 
 
 def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> dict[str, Minds]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter, ValidationError
 
 from khala.matches import free_recording, resumed
-from khala.minds import Minds, minds_of
+from khala.minds import Minds, groups_of, minds_of
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.replay import modules_of
@@ -47,11 +47,12 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     if unknown := sorted(order.minds.keys() - {field.name for field in dataclasses.fields(Minds)}):
         raise ConfigError(f"there is no option {unknown[0]!r}; is the service of the same version?", source="match")
     minds = minds_of([side.side for side in config.task.per_side()], common, order.sides)
-    needs = (what for mind in minds.values() for what in _needs_trust(config, mind))
+    alike = [mind for _, mind, _ in groups_of(config.task, minds)]
+    needs = (what for mind in alike for what in _needs_trust(config, mind))
     if not trusts and (asked := next(needs, None)):
         raise ConfigError(f"{asked} is for a service that was started with --trust: this machine would run or call it")
     Observer(config.task)
-    for mind in minds.values():
+    for mind in alike:
         mind.check()
     return config.model_copy(update={"record": free_recording(out / order.run)}), minds
 

@@ -48,7 +48,8 @@ class Job(Frozen):
     config: MatchConfig
     minds: dict[str, Minds]
     """By side."""
-    bus: BusConfig
+    bus: BusConfig | None = None
+    """How to join a router; None for one of its own."""
     resume: bool = False
     """Whether to go on with the newest recording of its directory."""
 

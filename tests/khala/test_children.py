@@ -186,7 +186,7 @@ async def test_the_scripted_endpoint_comes_back_at_its_address(tmp_path: Path, m
 
 
 def test_a_process_that_is_started_again_may_spend_what_its_agents_left() -> None:
-    share = _Share("agents-0", "blue", ["A", "B"], ["--run", "r"], 0.5)
+    share = _Share("agents-0", "blue", ["A", "B"], ["--run", "r"], {}, 0.5)
     usages = {"A": 0.125, "B": None, "C": 9.0}
     agents = [SimpleNamespace(agent=name, usage=Usage(cost_usd=cost)) for name, cost in usages.items()]
     for side in ("blue", "red"):  # an agent of the same name spends what its own side has

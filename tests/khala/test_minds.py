@@ -52,12 +52,22 @@ def test_a_policy_of_all_is_not_the_one_of_a_side_with_a_model() -> None:
 def test_both_sides_may_spend_the_same() -> None:
     minds = minds_of(["blue", "red"], COMMON, {"red": "openai"})
     assert [mind.budget_usd for mind in minds.values()] == [1.5, 1.5]
-    shares = list(_shares_of("red", ["A", "B", "C"], [], 1.5, sides=2))
+    groups = [(side, mind, ["A", "B", "C"]) for side, mind in minds.items()]
+    shares = [share for share in _shares_of(groups, [], None) if share.side == "red"]
     assert [(share.process, share.names, share.left_usd) for share in shares] == [
         ("agents-red-0", ["A", "C"], 0.75),
         ("agents-red-1", ["B"], 0.75),
     ]
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
+
+
+def test_an_agent_may_have_a_model_of_its_own_and_a_process_for_it() -> None:
+    mixed = Minds(policy="silent", agents={"B": "scripted/skilled", "D": "scripted/skilled"})
+    shares = list(_shares_of([("blue", *group) for group in mixed.groups(["A", "B", "C", "D"])], [], "http://here"))
+    assert [share.names for share in shares] == [["A"], ["C"], ["B"], ["D"]]
+    assert [share.options[1] for share in shares] == ["silent", "silent", "scripted", "scripted"]
+    with pytest.raises(ConfigError, match="there is no agent 'E': the agents are A, B"):
+        Minds(agents={"E": "openai"}).groups(["A", "B"])
 
 
 def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(tmp_path: Path) -> None:
@@ -85,13 +95,14 @@ def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(
 
 def test_a_resumed_match_may_spend_what_is_left_and_says_how_much_that_is() -> None:
     spent = {Seat("blue", "A"): 0.75, Seat("blue", "C"): 0.25, Seat("blue", "B"): 0.25, Seat("red", "B"): 1.5}
-    shares = [share for side in ("blue", "red") for share in _shares_of(side, ["A", "B", "C"], [], 2.0, sides=2)]
+    rich = Minds(policy="silent", budget_usd=2.0)
+    shares = list(_shares_of([(side, rich, ["A", "B", "C"]) for side in ("blue", "red")], [], None))
     assert _taken_off(shares, spent) == (
         "2.7500 USD were spent before, 1.7500 of the budget are left; nothing for A, C, B, "
         "so each of their steps is a fallback"
     )
     assert [share.arguments[-1] for share in shares] == ["0.0", "0.75", "1.0", "0.0"]
-    (free,) = _shares_of("blue", ["A"], [], None, sides=1)
+    (free,) = _shares_of([("blue", Minds(policy="silent"), ["A"])], [], None)
     assert "--budget-usd does" in _taken_off([free], spent)
     assert "--budget-usd" not in free.arguments
 

@@ -1,0 +1,13 @@
+"""Experiments: from a file that names a grid of matches to tables with intervals.
+
+cli         the commands `khala experiment …`
+spec        the file: factors, fixed settings, seeds, budget
+plan        the matches of a grid, each under the hash of what it plays
+runner      plays what is missing: pilot, budget, retries
+engine      where a match is played: this machine, or (`ray_engine`) a Ray cluster
+store       the directory of an experiment: recordings, and an index of them
+measures    one recording → numbers, by episode and side
+statistics  intervals and tests on numbers
+compare     two selections of matches, if they are alike
+report      tables and figures
+"""

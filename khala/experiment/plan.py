@@ -1,0 +1,205 @@
+"""The matches of an experiment: each cell of its grid with each seed, under the hash of what is played.
+
+The hash is of the task with all its fields, the seed, the models with their files, the game and the catalogue of
+actions. A match that was played is found again by it, also in a grid that has grown. It is not of the code: runs of
+another version stay, and `khala experiment compare` says so.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from khala import games
+from khala.experiment.spec import MOST_MATCHES, Level, Settings, level_of
+from khala.minds import Minds, groups_of, minds_of
+from khala_agents.config import load_model
+from khala_bridge.catalogue.catalogue import catalogue_sha256
+from khala_bridge.observe import Observer
+from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from khala.experiment.spec import Experiment
+    from khala_bridge.task.config import TaskConfig
+
+KEY_CHARACTERS = 16
+SWAPPED = "swapped"
+"""Name of the factor that says whether the sides' models are swapped."""
+_TASK_FIELDS = {
+    "clock": "rule", "max_wait_s": "max_wait_s", "step_loops": "step_loops", "thinking_loops": "thinking_loops",
+    "speed": "speed", "rhythm": "rhythm", "executor": "executor", "images": "images", "memory": "memory",
+    "communication": "communication", "max_steps": "max_steps",
+}  # fmt: skip
+"""Settings by the names that `khala_orchestrator.config.change` has for them."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMatch:
+    """One match of an experiment."""
+
+    key: str
+    """Hash of what is played."""
+    cell: dict[str, str]
+    """Names of the factors' values."""
+    seed: int
+    repetition: int
+    config: MatchConfig
+    minds: dict[str, Minds] = field(default_factory=dict)
+    """By side, without a budget."""
+
+    @property
+    def title(self) -> str:
+        """What it is, for people."""
+        again = f", repetition {self.repetition}" if self.repetition else ""
+        return f"{' · '.join(self.cell.values())}, seed {self.seed}{again}"
+
+
+def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatch]:
+    """Return the matches in the order in which they are played: every cell once, then all with the next seed.
+
+    Raises:
+        ConfigError: a cell cannot be played; the text says which and why.
+    """
+    grid = list(cells(experiment))
+    count = len(grid) * len(experiment.seeds) * experiment.repetitions
+    if count > MOST_MATCHES:
+        raise ConfigError(f"the grid has {count} matches, more than {MOST_MATCHES}: split the experiment")
+    _, game_name = games.find(game)
+    prepared = [_prepared(cell, settings) for cell, settings in grid]
+    planned = [
+        _match(experiment, cell, task, minds, seed, repetition, game_name)
+        for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
+        for cell, task, minds in prepared
+    ]
+    return list({match.key: match for match in planned}.values())
+
+
+def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
+    """Yield each cell of the grid: the names of its values, and its settings."""
+    for levels in itertools.product(*experiment.factors.values()):
+        cell = dict(zip(experiment.factors, (level.name for level in levels), strict=True))
+        if not any(excluded.items() <= cell.items() for excluded in experiment.exclude):
+            yield from _both_ways(experiment, cell, levels)
+    for number, included in enumerate(experiment.include, 1):
+        chosen = [_included(experiment, factor, value, number) for factor, value in included.items()]
+        names = [level.name for level in chosen]
+        yield from _both_ways(experiment, dict(zip(included, names, strict=True)), chosen)
+
+
+def _included(experiment: Experiment, factor: str, value: object, number: int) -> Level:
+    known = {level.name: level for level in experiment.factors[factor]}
+    if isinstance(value, str) and value in known:
+        return known[value]
+    try:
+        return Level.model_validate(level_of(factor, value))
+    except ValueError as error:
+        raise ConfigError(str(error), source=f"cell {number} of include", field=factor) from None
+
+
+def _both_ways(
+    experiment: Experiment, cell: dict[str, str], levels: Iterable[Level]
+) -> Iterator[tuple[dict[str, str], Settings]]:
+    settings = experiment.fixed
+    for level in levels:
+        settings = level.settings.over(settings)
+    if not experiment.swap_sides:
+        yield cell, settings
+        return
+    if not settings.sides or len(settings.sides) != 2:
+        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_words(cell)} has none")
+    (blue, red), (first, second) = settings.sides, settings.sides.values()
+    yield cell | {SWAPPED: "no"}, settings
+    yield cell | {SWAPPED: "yes"}, settings.model_copy(update={"sides": {blue: second, red: first}})
+
+
+def _prepared(cell: dict[str, str], settings: Settings) -> tuple[dict[str, str], TaskConfig, dict[str, Minds]]:
+    try:
+        task = task_of(settings)
+        minds = minds_for(task, settings)
+        Observer(task)
+        for _, mind, _ in groups_of(task, minds):
+            mind.check()
+    except ConfigError as error:
+        raise ConfigError(f"{_words(cell)}: {error}") from None
+    return cell, task, minds
+
+
+def task_of(settings: Settings) -> TaskConfig:
+    """Return the task with these settings.
+
+    Raises:
+        ConfigError: there is no such task, or a setting does not fit it.
+    """
+    if settings.task is None:
+        raise ConfigError("no task is named: give the factor task, or fixed.task")
+    task = load_task(settings.task)
+    changes = {name: getattr(settings, ours) for ours, name in _TASK_FIELDS.items()}
+    if settings.memory is not None:
+        changes["memory"] = settings.memory.model_dump(exclude_unset=True)
+    if settings.level or settings.against:
+        asked = {"difficulty": settings.level, "race": settings.against}
+        opponent = task.opponent.model_dump() | {name: value for name, value in asked.items() if value}
+        changes["opponent"] = opponent
+    return change(task, **changes, **(settings.fields or {}))
+
+
+def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
+    """Return how the agents of each side decide.
+
+    Raises:
+        ConfigError: there is no such side.
+    """
+    common = Minds(base_url=settings.base_url, latency_s=settings.latency_s or 0.0, fallback=settings.fallback)
+    if settings.model is not None:
+        common = replace(common.named(settings.model), base_url=settings.base_url)
+    if settings.agents:
+        common = replace(common, agents=settings.agents)
+    return minds_of([side.side for side in task.per_side()], common, settings.sides or {})
+
+
+def _match(
+    experiment: Experiment,
+    cell: dict[str, str],
+    task: TaskConfig,
+    minds: dict[str, Minds],
+    seed: int,
+    repetition: int,
+    game: str,
+) -> PlannedMatch:
+    played = {
+        "task": task.model_dump(mode="json"),
+        "seed": seed,
+        "repetition": repetition,
+        "game": game,
+        "catalogue": catalogue_sha256(),
+        "minds": {side: _identity(mind) for side, mind in minds.items()},
+    }
+    text = json.dumps(played, sort_keys=True, separators=(",", ":"))
+    key = hashlib.sha256(text.encode()).hexdigest()[:KEY_CHARACTERS]
+    labels = {"experiment": experiment.name, "match": key, "repetition": str(repetition)}
+    labels |= {f"factor.{name}": value for name, value in cell.items()}
+    config = MatchConfig(task=task, run=f"match-{key}", seed=seed, labels=labels)
+    return PlannedMatch(key, cell, seed, repetition, config, minds)
+
+
+def _identity(mind: Minds) -> dict[str, Any]:
+    """Return what makes a difference to what a side's agents say: not an address, not a budget."""
+    said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
+    named = [mind, *(replace(mind, agents={}).named(text) for text in mind.agents.values())]
+    return said | {"files": [_model_file(one.model) for one in named if one.policy is None]}
+
+
+def _model_file(name: str) -> Mapping[str, Any]:
+    """Return what a model file says of the answers; how it is reached and limited is no part of that."""
+    fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
+    return load_model(name).model_dump(mode="json", include=fields)
+
+
+def _words(cell: Mapping[str, str]) -> str:
+    return ", ".join(f"{factor} {value}" for factor, value in cell.items())

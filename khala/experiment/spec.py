@@ -1,0 +1,217 @@
+"""The file of an experiment: which settings vary, which stay, how often each match is played, and what it may cost.
+
+    name: pair
+    fixed: {clock: frozen, rhythm: paper}
+    factors:
+      task: [2s3z_pair, 3s5z]
+      player:
+        - {name: skilled, model: scripted/skilled}
+        - {name: focus, model: scripted/focus-fire}
+    seeds: 20
+
+A factor is a setting with several values, or a name of its own whose values are settings with a `name`.
+`khala.experiment.plan` makes the matches of it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, JsonValue, field_validator, model_validator
+
+from khala_bridge.task.maps import Difficulty, Race  # noqa: TC001  # pydantic evaluates them
+from khala_protocol.errors import WrongKey
+from khala_protocol.keys import check_name
+from khala_protocol.messages import ClockRule, Frozen, MemoryRule
+
+MOST_MATCHES = 100_000
+MOST_SEEDS = 10_000
+
+
+def _named(value: str) -> str:
+    try:
+        return check_name(value, "experiment")
+    except WrongKey as error:
+        raise ValueError(str(error)) from None
+
+
+def _seeds(value: object) -> object:
+    """Return a list for `20` (1 to 20) and for `1-20`."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= MOST_SEEDS:
+            raise ValueError(f"give a number from 1 to {MOST_SEEDS}, a list, or a range such as 1-20")
+        return list(range(1, value + 1))
+    if isinstance(value, str):
+        first, dash, last = value.partition("-")
+        if not (dash and first.strip().isdecimal() and last.strip().isdecimal() and int(first) <= int(last)):
+            raise ValueError(f"{value!r} is no range of seeds: write it as 1-20")
+        if int(last) - int(first) >= MOST_SEEDS:
+            raise ValueError(f"there are at most {MOST_SEEDS} seeds")
+        return list(range(int(first), int(last) + 1))
+    return value
+
+
+class Settings(Frozen):
+    """What a match is played with; None for what its task says, and for agents what `khala run` would do."""
+
+    task: str | None = None
+    """Name of a task, or path of its file."""
+    model: str | None = None
+    """Of all agents: a model, a model and its name at the endpoint (`scripted/skilled`), or a policy
+    (`my_agent:decide`)."""
+    agents: dict[str, str] | None = None
+    """Models of single agents, by name."""
+    sides: dict[str, str] | None = None
+    """Models of the sides of a duel, by name."""
+    base_url: str | None = None
+    fallback: str | None = None
+    latency_s: float | None = Field(default=None, ge=0)
+    """Of the scripted model's endpoint."""
+    clock: ClockRule | None = None
+    max_wait_s: float | None = Field(default=None, gt=0)
+    step_loops: int | None = Field(default=None, ge=1)
+    thinking_loops: int | None = Field(default=None, ge=0)
+    speed: float | None = Field(default=None, gt=0)
+    rhythm: str | None = None
+    executor: str | None = None
+    images: str | None = None
+    memory: MemoryRule | None = None
+    communication: bool | None = None
+    max_steps: int | None = Field(default=None, ge=1)
+    level: Difficulty | None = None
+    """Of the computer that the agents play against."""
+    against: Race | None = None
+    """Its race."""
+    fields: dict[str, JsonValue] | None = None
+    """Further fields of the task file, such as `max_actions` or `agents`; they replace those of the task."""
+
+    def over(self, other: Settings) -> Settings:
+        """Return these settings, with those of another where these say nothing."""
+        return other.model_copy(update={name: getattr(self, name) for name in self.model_fields_set})
+
+
+class Level(Frozen):
+    """One value of a factor: its name in tables, and what it sets."""
+
+    name: str
+    settings: Settings
+
+
+class Budget(Frozen):
+    """What the whole experiment may take. Matches that would need more are not begun."""
+
+    usd: float | None = Field(default=None, gt=0)
+    tokens: int | None = Field(default=None, gt=0)
+    """Prompt and answer."""
+    hours: float | None = Field(default=None, gt=0)
+
+
+class Published(Frozen):
+    """A number from elsewhere to print beside ours, such as one of a paper's tables."""
+
+    where: dict[str, str]
+    """The names of the factors' values that it belongs to; `model` may name one that was not played here."""
+    win_rate: float | None = Field(default=None, ge=0, le=1)
+    kd: float | None = Field(default=None, ge=0)
+    source: str
+
+
+class Experiment(Frozen):
+    """One experiment."""
+
+    name: Annotated[str, BeforeValidator(lambda value: _named(value) if isinstance(value, str) else value)]
+    description: str = ""
+    fixed: Settings = Settings()
+    factors: dict[str, tuple[Level, ...]] = Field(min_length=1)
+    include: tuple[dict[str, JsonValue], ...] = ()
+    """Further cells, each with a value for every factor."""
+    exclude: tuple[dict[str, str], ...] = ()
+    """Cells that are left out: those that have all of these values."""
+    seeds: Annotated[tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], BeforeValidator(_seeds)] = Field(
+        default=(1,), min_length=1, max_length=MOST_SEEDS
+    )
+    """Of the game: `20` for 1 to 20, `1-20`, or a list. All cells have the same, so that they can be paired."""
+    repetitions: int = Field(default=1, ge=1, le=1000)
+    """Matches of the same cell and seed; more than one says something only if the model is not deterministic."""
+    swap_sides: bool = False
+    """In duels: play each match again with the sides' models swapped."""
+    budget: Budget = Budget()
+    retries: int = Field(default=2, ge=0, le=20)
+    """How often a match that crashed is played again; a lost match is a result and is not."""
+    match_hours: float = Field(default=6.0, gt=0)
+    """A match that takes longer is ended, and counts as crashed."""
+    differs: str = ""
+    """For the report: what in this experiment differs from the one that `published` is of."""
+    published: tuple[Published, ...] = ()
+
+    @field_validator("factors", mode="before")
+    @classmethod
+    def _levels(cls, factors: object) -> object:
+        if not isinstance(factors, dict):
+            return factors
+        return {name: _levels_of(str(name), values) for name, values in factors.items()}
+
+    @model_validator(mode="after")
+    def _known_levels(self) -> Self:
+        for factor, levels in self.factors.items():
+            names = [level.name for level in levels]
+            if not names:
+                raise ValueError(f"the factor {factor} has no values")
+            if double := next((name for name in names if names.count(name) > 1), None):
+                raise ValueError(f"the factor {factor} has the value {double} twice")
+        return self
+
+    @model_validator(mode="after")
+    def _known_cells(self) -> Self:
+        for cell in self.exclude:
+            for factor, name in cell.items():
+                if factor not in self.factors:
+                    raise ValueError(f"exclude names the factor {factor!r}; the factors are {', '.join(self.factors)}")
+                if name not in (names := [level.name for level in self.factors[factor]]):
+                    raise ValueError(f"exclude names {factor} {name!r}; its values are {', '.join(names)}")
+        for included in self.include:
+            if set(included) != set(self.factors):
+                raise ValueError(f"a cell of include needs a value for each of {', '.join(self.factors)}, and no other")
+        return self
+
+    @model_validator(mode="after")
+    def _some_task(self) -> Self:
+        if not (self.fixed.task or "task" in self.factors or self._all_have_a_task()):
+            raise ValueError("no task is named: give the factor task, or fixed.task")
+        return self
+
+    def _all_have_a_task(self) -> bool:
+        return any(all(level.settings.task for level in levels) for levels in self.factors.values())
+
+
+def level_of(factor: str, value: object) -> dict[str, Any]:
+    """Return the name and the settings of a factor's value as fields of a `Level`.
+
+    Raises:
+        ValueError: the factor is no setting, and its value has no name.
+    """
+    if isinstance(value, dict) and "name" in value:
+        return {"name": str(value["name"]), "settings": {k: v for k, v in value.items() if k != "name"}}
+    if factor in Settings.model_fields:
+        return {"name": _word(value), "settings": {factor: value}}
+    close = difflib.get_close_matches(factor, Settings.model_fields, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    raise ValueError(
+        f"there is no setting {factor!r}: {hint}the values of a factor with a name of its own are settings with a "
+        f"`name`, such as {{name: fast, clock: frozen}}"
+    )
+
+
+def _levels_of(factor: str, values: object) -> object:
+    if not isinstance(values, list | tuple):
+        raise ValueError(f"the factor {factor} needs a list of values")  # noqa: TRY004  # pydantic wants a ValueError
+    return [value if isinstance(value, Level) else level_of(factor, value) for value in values]
+
+
+def _word(value: object) -> str:
+    if isinstance(value, dict):
+        return ",".join(f"{key}={_word(inner)}" for key, inner in value.items())
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "none" if value is None else str(value)
