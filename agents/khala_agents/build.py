@@ -90,13 +90,18 @@ class Workshop:
 
     Args:
         budget_usd: what all agents of the process may spend together.
+        budget: shared with other workshops, instead of one for `budget_usd`.
         overrides: fields given on the command line; they replace those of every model file.
     """
 
     def __init__(
-        self, *, budget_usd: float | None = None, overrides: Mapping[str, str | float | None] | None = None
+        self,
+        *,
+        budget_usd: float | None = None,
+        overrides: Mapping[str, str | float | None] | None = None,
+        budget: Budget | None = None,
     ) -> None:
-        self._budget = Budget(budget_usd, source="the budget of this process")
+        self._budget = budget or Budget(budget_usd, source="the budget of this process")
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
         self._breakers: dict[str, Breaker] = {}

@@ -1,0 +1,77 @@
+"""The process that plays matches of an experiment, one after the other.
+
+A job is a line of JSON on stdin, the answer a line of JSON on stdout; stdin's end ends the process. The agents decide
+in this process (`khala.one_process`), unless the job wants processes for them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import gc
+import logging
+import sys
+
+from khala import one_process
+from khala.experiment.job import Done, Job
+from khala.local import play as play_with_processes
+from khala_protocol.errors import KhalaError
+from khala_protocol.parent_watch import end_with_parent
+from khala_protocol.signals import cancelled_by_signal
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Play matches until stdin ends."""
+    options = argparse.ArgumentParser(prog="khala.experiment.worker")
+    options.add_argument("--game", default="simulator")
+    given = options.parse_args(arguments)
+    end_with_parent()
+    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
+    asyncio.run(cancelled_by_signal(_work(given.game)))
+
+
+async def _work(game: str) -> None:
+    lines = await _stdin()
+    while line := await lines.readline():
+        done = await played(Job.model_validate_json(line), game)
+        sys.stdout.write(done.model_dump_json() + "\n")
+        sys.stdout.flush()
+        gc.unfreeze()  # the host freezes what it finds; a process of many matches would keep all of them
+        gc.collect()
+
+
+async def played(job: Job, game: str) -> Done:
+    """Play a match, and return how it ended."""
+    try:
+        async with asyncio.timeout(job.timeout_s):
+            if job.processes:
+                results = await play_with_processes(job.config, job.minds, job.directory, game=game)
+            else:
+                results = await one_process.play(job.config, job.minds, game=game)
+    except TimeoutError:
+        return Done(state="timeout", words=f"it took longer than {job.timeout_s / 3600:g} hours")
+    except (KhalaError, ExceptionGroup) as error:
+        return Done(state="error", words=str(_cause(error)))
+    invalid = dict.fromkeys(result.invalid_because for result in results if not result.valid)
+    return Done(state="done", words="; ".join(invalid))
+
+
+async def _stdin() -> asyncio.StreamReader:
+    reader = asyncio.StreamReader(limit=2**24)
+    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+    return reader
+
+
+def _cause(error: Exception) -> Exception:
+    """Return the first error of nested groups; raise a group that holds a fault of ours."""
+    if not isinstance(error, ExceptionGroup):
+        return error
+    _, others = error.split(KhalaError)
+    if others is not None:
+        raise error
+    return _cause(error.exceptions[0])
+
+
+if __name__ == "__main__":
+    main()

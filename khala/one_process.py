@@ -1,0 +1,98 @@
+"""A match whose agents decide in this process: no bus to another one, and no process but the game's.
+
+It is played, judged and recorded by the same host as any other, and agents answer with the same workers, over the
+bus in memory. Experiments play so, several matches at a time, each in a process. A policy that blocks blocks the
+host, too; `khala.local` gives agents processes of their own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import TYPE_CHECKING
+
+from khala import games
+from khala.hosting import hosted
+from khala.minds import groups_of
+from khala_agents.llm.limits import Budget
+from khala_agents.scripted.endpoint import Behaviour, Endpoint
+from khala_agents.worker import run_workers
+from khala_protocol.bus.memory import MemoryBroker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from khala.minds import Minds
+    from khala_agents.policy import Policy
+    from khala_bridge.game.env import Launched
+    from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.resume import Unfinished
+    from khala_protocol.messages import Result, Wire
+
+
+async def play(
+    config: MatchConfig,
+    minds: Mapping[str, Minds],
+    *,
+    game: str,
+    watch: Callable[[Wire], None] = lambda _: None,
+    past: Unfinished | None = None,
+    launched: Launched | None = None,
+) -> list[Result]:
+    """Play a match with its agents in this process.
+
+    Args:
+        config: the match to play.
+        minds: by side, how its agents decide.
+        game: `simulator`, `starcraft2`, or a directory.
+        watch: is called with the run card, every report and every result.
+        past: what was played of this match before.
+        launched: a process of the game.
+
+    Raises:
+        KhalaError: the user can fix something; the text says what.
+    """
+    sc2path, name = games.find(game)
+    config = config.model_copy(update={"game": name})
+    broker, stop = MemoryBroker(), asyncio.Event()
+    async with contextlib.AsyncExitStack() as stack:
+        agents = [
+            asyncio.create_task(run_workers(broker.session(), config.run, side, policies, stop=stop))
+            for side, policies in (await _policies(config, minds, stack)).items()
+        ]
+        try:
+            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, launched=launched)
+            return await _unless_one_fails(asyncio.create_task(match), agents)
+        finally:
+            stop.set()
+            await asyncio.gather(*agents, return_exceptions=True)
+
+
+async def _policies(
+    config: MatchConfig, minds: Mapping[str, Minds], stack: contextlib.AsyncExitStack
+) -> dict[str, dict[str, Policy]]:
+    """Return the policies of all agents, by side; start the scripted endpoint if one asks it."""
+    groups = list(groups_of(config.task, minds))
+    scripted = [mind.latency_s for _, mind, _ in groups if mind.needs_endpoint]
+    base_url = None
+    if scripted:
+        base_url = (await stack.enter_async_context(Endpoint(Behaviour(latency_s=scripted[0])))).base_url
+    budgets = {side: Budget(mind.budget_usd, source="the budget of the match") for side, mind in minds.items()}
+    made: dict[str, dict[str, Policy]] = {side: {} for side in minds}
+    for side, mind, names in groups:
+        made[side] |= mind.policies(names, base_url, budgets[side])
+    return made
+
+
+async def _unless_one_fails(match: asyncio.Task[list[Result]], agents: list[asyncio.Task[object]]) -> list[Result]:
+    """Return the results; raise what an agent raised, which nobody else would see."""
+    watched: set[asyncio.Task[object]] = {match, *agents}  # type: ignore[arg-type]  # tasks are invariant
+    try:
+        while not match.done():
+            done, watched = await asyncio.wait(watched, return_when=asyncio.FIRST_COMPLETED)
+            for task in done - {match}:
+                task.result()
+        return match.result()
+    finally:
+        match.cancel()
+        await asyncio.gather(match, return_exceptions=True)
