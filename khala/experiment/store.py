@@ -243,7 +243,7 @@ def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, cras
 def _state(rows: list[Measures], crash: str) -> tuple[State, str]:
     if crash or not rows or any(row.outcome == "unfinished" for row in rows):
         return "crashed", crash or "interrupted"
-    if any(row.out_of_money for row in rows):
+    if any("budget: " in row.fallback_reasons for row in rows):
         return "invalid", "budget"
     if invalid := next((row.invalid_because for row in rows if not row.valid), ""):
         return "invalid", "model away" if invalid.startswith("no model ever answered") else invalid

@@ -1,0 +1,61 @@
+"""What became of decisions, and of the calls in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Actions:
+    """Decisions and actions."""
+
+    decisions: int
+    """How often agents were asked and the answer, or its absence, was reported."""
+    unasked: int
+    """How often an agent could have been asked and was not, because it had no units or was not due."""
+    fresh: int
+    """Decisions carried out at the game loop that the agent had seen."""
+    stale: int
+    """Decisions carried out later, as they were meant."""
+    adapted: int
+    """Decisions carried out later, as far as the game still allowed it."""
+    refused: int
+    """Decisions that held orders of which none was carried out."""
+    dropped: int
+    """Decisions that the end of the episode overtook."""
+    accepted: int
+    """Actions that were carried out; one for several teams counts once for each."""
+    rejected: int
+    """Calls that were not carried out, for any reason; calls that one rejection stands for count once."""
+    rejected_malformed: int
+    """Of these: looks like a call, but is not one."""
+    rejected_unknown_action: int
+    """Of these: the agent's catalogue has no action of this name."""
+    rejected_wrong_arguments: int
+    """Of these: wrong number or form of the arguments."""
+    rejected_unknown_team: int
+    """Of these: a team that the agent does not have, or that has no units left."""
+    rejected_unknown_target: int
+    """Of these: a tag that names no unit in sight."""
+    rejected_dead_target: int
+    """Of these: a tag of a unit that has died."""
+    rejected_not_yours: int
+    """Of these: a tag of a unit that does not obey this team."""
+    rejected_invalid_target: int
+    """Of these: a unit or a point that the action cannot be used on."""
+    rejected_wrong_frame: int
+    """Of these: a point that only makes sense in the other frame."""
+    rejected_out_of_bounds: int
+    """Of these: a point outside of its frame or of the map."""
+    rejected_not_available: int
+    """Of these: known, but not possible now, for cost, cooldown or a requirement."""
+    rejected_too_many_actions: int
+    """Of these: over the number of actions that a team may have in one reply."""
+    rejected_unknown_recipient: int
+    """Of these: a message to nobody."""
+    rejected_too_late: int
+    """Of these: the reply took effect too long after its observation."""
+    rejected_too_many_messages: int
+    """Of these: over the number of messages that an agent may send in one reply."""
+    rejected_refused_by_game: int
+    """Of these: PySC2 or the game answered with an error."""

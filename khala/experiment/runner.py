@@ -1,0 +1,223 @@
+"""Plays the matches of an experiment that are missing: pilot, budget, retries.
+
+Each match may spend at most a part of what is left, so that all together never spend more than the budget: what a
+match that runs may still spend is held back from the others. A match that ends because its part is used up counts as
+invalid, with the cause `budget`. Below it an engine plays, and the store keeps what was played.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import statistics
+import time
+from collections import Counter, deque
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
+
+from khala.experiment.job import Job
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from khala.experiment.engine import Engine
+    from khala.experiment.job import Done
+    from khala.experiment.plan import PlannedMatch
+    from khala.experiment.spec import Budget, Experiment
+    from khala.experiment.store import Played, Store
+
+ROOM = 2.0
+"""A match may spend this many times what the dearest one of its cell has cost."""
+_CRASHES = {"lost": "crash", "error": "crash", "timeout": "timeout"}
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What happens with one match."""
+
+    what: Literal["begins", "ends", "again"]
+    """`again`: it crashed, and is played once more."""
+    match: PlannedMatch
+    played: Played | None = None
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What the matches that are missing will take, from those that were played."""
+
+    matches: int
+    usd: float | None
+    """None if no price is known."""
+    tokens: float
+    hours: float
+    """Of wall time, with all slots at work."""
+
+
+@dataclass(slots=True)
+class Spent:
+    """What was spent, and what matches that run may still spend."""
+
+    usd: float = 0.0
+    tokens: int = 0
+    held_usd: float = 0.0
+
+
+@dataclass(slots=True)
+class Runner:
+    """Plays the matches of one experiment."""
+
+    experiment: Experiment
+    store: Store
+    engine: Engine
+    budget: Budget
+    see: Callable[[Event], None] = lambda _: None
+    processes: bool = False
+    """Whether agents get processes of their own."""
+    spent: Spent = field(default_factory=Spent)
+    stopped: str = ""
+    """Why matches were not begun; "" if all were."""
+    _began_s: float = 0.0
+    _played: dict[str, Played] = field(default_factory=dict)
+    _waiting: deque[PlannedMatch] = field(default_factory=deque)
+    _tries: Counter[str] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        """Count what was spent before."""
+        self._played = self.store.played()
+        for played in self._played.values():
+            self._count(played)
+
+    async def play(self, matches: Sequence[PlannedMatch]) -> None:
+        """Play those of the matches that are missing, several at a time."""
+        self._began_s = self._began_s or time.monotonic()
+        self._waiting = deque(missing(matches, self._played))
+        async with asyncio.TaskGroup() as group:
+            for _ in range(min(self.engine.slots, len(self._waiting))):
+                group.create_task(self._slot())
+
+    async def _slot(self) -> None:
+        while self._waiting:
+            match = self._waiting.popleft()
+            if why := self._too_much(match):
+                self.stopped = why
+                return
+            await self._one(match)
+
+    async def _one(self, match: PlannedMatch) -> None:
+        part_usd = self._part_usd(match)
+        self.spent.held_usd += part_usd or 0.0
+        self._tries[match.key] += 1
+        record = self.store.recording_for(match.key)
+        record.parent.mkdir(parents=True, exist_ok=True)
+        self.see(Event("begins", match))
+        minds = {
+            side: replace(mind, budget_usd=None if part_usd is None else part_usd / len(match.minds))
+            for side, mind in match.minds.items()
+        }
+        job = Job(
+            config=match.config.model_copy(update={"record": record}),
+            minds=minds,
+            timeout_s=3600 * self.experiment.match_hours,
+            processes=self.processes,
+        )
+        try:
+            done = await self.engine.play(job)
+        finally:
+            self.spent.held_usd -= part_usd or 0.0
+        played = await asyncio.to_thread(self._take, job, done)
+        self._end(match, done, played)
+
+    def _take(self, job: Job, done: Done) -> Played | None:
+        assert job.config.record is not None
+        tries = self._tries[job.config.labels["match"]]
+        return self.store.take(job.config.record, attempts=tries, crash=_CRASHES.get(done.state, ""))
+
+    def _end(self, match: PlannedMatch, done: Done, played: Played | None) -> None:
+        if played is None:
+            self.store.crashed(match, self._tries[match.key], "crash")
+            played = self.store.played()[match.key]
+        self._count(played)
+        self._played[match.key] = played
+        if played.state == "crashed" and self._tries[match.key] <= self.experiment.retries:
+            self._waiting.append(match)
+            self.see(Event("again", match, played, done.words))
+        else:
+            self.see(Event("ends", match, played, done.words))
+
+    def _count(self, played: Played) -> None:
+        self.spent.usd += played.cost_usd or 0.0
+        self.spent.tokens += played.tokens or 0
+
+    # --- what it takes --------------------------------------------------------------------------------
+
+    def _too_much(self, match: PlannedMatch) -> str:
+        """Return why a match is not begun; "" if it is."""
+        hours = (time.monotonic() - self._began_s) / 3600
+        if self.budget.hours is not None and hours >= self.budget.hours:
+            return f"the budget of {self.budget.hours:g} hours is used up"
+        tokens = _mean(self._numbers(match, "tokens")) or 0.0
+        if self.budget.tokens is not None and self.spent.tokens + tokens > self.budget.tokens:
+            return f"the budget of {self.budget.tokens} tokens is used up ({self.spent.tokens} were read and written)"
+        usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
+        left = self._left_usd()
+        if left is not None and (left <= 0 or left < usual_usd):
+            return f"the budget of {self.budget.usd:g} USD is used up ({self.spent.usd:.4f} were spent)"
+        return ""
+
+    def _left_usd(self) -> float | None:
+        if self.budget.usd is None:
+            return None
+        return self.budget.usd - self.spent.usd - self.spent.held_usd
+
+    def _part_usd(self, match: PlannedMatch) -> float | None:
+        """Return what a match may spend: what is usual with some room, or a fair part while nothing is known."""
+        left = self._left_usd()
+        if left is None or not any(mind.policy is None for mind in match.minds.values()):
+            return None
+        costs = self._numbers(match, "cost_usd")
+        if costs:
+            return min(left, ROOM * max(costs)) if max(costs) else left / self.engine.slots
+        return left / self.engine.slots
+
+    def _numbers(self, match: PlannedMatch, name: str) -> list[float]:
+        """Return what matches of the same cell have taken; of all if none of them was played."""
+        return numbers_of(self._played.values(), match.cell, name)
+
+    def estimate(self, matches: Sequence[PlannedMatch]) -> Estimate:
+        """Return what those of the matches that are missing will take."""
+        left = list(missing(matches, self._played))
+        sums = {name: 0.0 for name in ("cost_usd", "tokens", "wall_s")}
+        for match in left:
+            for name in sums:
+                sums[name] += _mean(self._numbers(match, name)) or 0.0
+        priced = any(played.cost_usd is not None for played in self._played.values())
+        hours = sums["wall_s"] / 3600 / max(1, min(self.engine.slots, len(left)))
+        return Estimate(len(left), sums["cost_usd"] if priced else None, sums["tokens"], hours)
+
+
+def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> list[float]:
+    """Return a number of the matches of a cell, of all if none of them was played."""
+    known = [one for one in played if one.state == "done" and getattr(one, name) is not None]
+    same = [one for one in known if one.cell == cell]
+    return [getattr(one, name) for one in same or known]
+
+
+def missing(matches: Iterable[PlannedMatch], played: dict[str, Played]) -> Iterable[PlannedMatch]:
+    """Yield the matches that were not played, or say nothing."""
+    return (match for match in matches if match.key not in played or played[match.key].state != "done")
+
+
+def pilot_of(matches: Sequence[PlannedMatch], count: int) -> list[PlannedMatch]:
+    """Return the first matches of each cell."""
+    seen: Counter[str] = Counter()
+    chosen = []
+    for match in matches:
+        place = str(match.cell)
+        seen[place] += 1
+        if seen[place] <= count:
+            chosen.append(match)
+    return chosen
+
+
+def _mean(numbers: list[float]) -> float | None:
+    return statistics.fmean(numbers) if numbers else None
