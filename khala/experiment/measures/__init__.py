@@ -1,8 +1,16 @@
 """One recording → a row of numbers for each episode and side.
 
-Each module is a group of numbers: what they mean, and how they are found. `row` puts them together.
+    rows = measure(Recording.open("runs/a/recording.mcap"))
+
+reading          the walk over a recording
+evidence         what the measures are found from
+row              the row, put together from its groups
+identity … economy   a group each: what its numbers mean, and how they are found
+
+Above it: the store, the statistics and the reports of experiments. Nothing here compares runs.
 """
 
+from khala.experiment.measures.reading import measure
 from khala.experiment.measures.row import GROUPS, Measures
 
-__all__ = ["GROUPS", "Measures"]
+__all__ = ["GROUPS", "Measures", "measure"]

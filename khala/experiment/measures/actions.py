@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, get_args
+
+from khala_protocol.messages import Fate, RejectionReason
+
+if TYPE_CHECKING:
+    from khala.experiment.measures.evidence import Step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,3 +66,32 @@ class Actions:
     """Of these: over the number of messages that an agent may send in one reply."""
     rejected_refused_by_game: int
     """Of these: PySC2 or the game answered with an error."""
+
+
+class ActionTally:
+    """The running account of an episode."""
+
+    def __init__(self) -> None:
+        self._decisions = self._unasked = self._accepted = 0
+        self._fates: Counter[Fate | None] = Counter()
+        self._reasons: Counter[RejectionReason] = Counter()
+
+    def add(self, step: Step) -> None:
+        """Take in a step."""
+        self._unasked += len(step.report.unasked)
+        for agent in step.report.agents:
+            self._decisions += 1
+            self._accepted += len(agent.accepted)
+            self._fates[agent.fate] += 1
+            self._reasons.update(rejection.reason for rejection in agent.rejections)
+
+    def total(self) -> Actions:
+        """Return the group."""
+        return Actions(
+            decisions=self._decisions,
+            unasked=self._unasked,
+            accepted=self._accepted,
+            rejected=self._reasons.total(),
+            **{fate: self._fates[fate] for fate in get_args(Fate)},
+            **{f"rejected_{reason}": self._reasons[reason] for reason in get_args(RejectionReason)},
+        )

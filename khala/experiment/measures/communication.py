@@ -1,26 +1,151 @@
-"""Whether messages between agents arrived, and whether their readers did anything about them."""
+"""Whether messages between agents arrived, and whether their readers did anything about them.
+
+A message names tags (`0x1002c0001`), points of the minimap (`[41.4, 25]`), places (`Base 2`) and types of units
+(`Photon Cannons`). An order names the tag that it takes and the type of that unit, the point of the minimap that it
+takes, and the type that it makes. Points on a screen are not compared: each reader has its own.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+from khala_bridge.knowledge import knowledge
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from khala.experiment.measures.evidence import Decision, Step
+    from khala_protocol.messages import Observation, Point, Received, UnitView
+
+NEAR_MINIMAP = 4.0
+"""Cells of the minimap, 1/16 of its width, within which two points are the same place."""
+_TAG = re.compile(r"0x[0-9a-f]+", re.IGNORECASE)
+_POINT = re.compile(r"[\[(]\s*(\d+(?:\.\d+)?)\s*,\s*(\d+(?:\.\d+)?)\s*[\])]")
+_ORDER = re.compile(r"<(?:Standing\()?(\w+)(.*)>", re.DOTALL)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Communication:
-    """Communication between the agents of the side. Advice from outside is not among it."""
+    """Communication between the agents of a side. Advice from outside is not among it.
+
+    Whether a message was true is not measured: only a person or a known script could say what it meant.
+    """
 
     messages_sent: int
     """Messages that agents wrote, undeliverable ones among them."""
     messages_undeliverable: int
-    """Of these: for nobody that the sender can write to."""
+    """Of these: to nobody that the sender can write to."""
     messages_read: int
-    """Pairs of a message and a reader: it stood in an observation that the reader's policy answered."""
+    """Pairs of a message and a reader, where the message stood in an observation that the reader's policy answered.
+    What an observation shows again does not count again."""
     messages_answered: int
     """Of `messages_read`: in that answer the reader wrote to the sender, or to the channel of the message."""
     messages_acted_on: int
-    """Of `messages_read`: in that answer the reader gave an order about something that the message names, and that
-    its answer before had not given."""
+    """Of `messages_read`: in that answer the reader gave an order that was carried out, that it had not given in its
+    answer before, and that names a unit, a place within 4 cells of the minimap, or a type that the message names."""
     messages_heeded: int
     """Of `messages_read`: answered, acted on, or both."""
     heeded_share: float | None
     """`messages_heeded` / `messages_read`, 0 to 1; null if nothing was read."""
+
+
+class CommunicationTally:
+    """The running account of an episode."""
+
+    def __init__(self) -> None:
+        self._sent = self._undeliverable = self._read = self._answered = self._acted = self._heeded = 0
+        self._orders: dict[str, frozenset[str]] = {}
+        """By agent, the orders of its last answer."""
+
+    def add(self, step: Step) -> None:
+        """Take in a step."""
+        self._sent += len(step.messages)
+        reasons = [rejection.reason for agent in step.report.agents for rejection in agent.rejections]
+        self._undeliverable += reasons.count("unknown_recipient")
+        for decision in step.decisions:
+            if decision.is_of_policy:
+                self._answer(decision, step)
+
+    def _answer(self, decision: Decision, step: Step) -> None:
+        agent, given = decision.report.agent, frozenset(decision.report.accepted)
+        new = given - self._orders.get(agent, frozenset())
+        self._orders[agent] = given
+        wrote_to = {message.recipient.casefold() for message in step.messages if message.sender == agent}
+        for message in _read(decision):
+            answers = not wrote_to.isdisjoint({message.sender.casefold(), message.recipient.casefold()})
+            acts = is_acted_on(message.text, new, decision.question.whole if decision.question else None)
+            self._read += 1
+            self._answered += answers
+            self._acted += acts
+            self._heeded += answers or acts
+
+    def total(self) -> Communication:
+        """Return the group."""
+        return Communication(
+            messages_sent=self._sent,
+            messages_undeliverable=self._undeliverable,
+            messages_read=self._read,
+            messages_answered=self._answered,
+            messages_acted_on=self._acted,
+            messages_heeded=self._heeded,
+            heeded_share=self._heeded / self._read if self._read else None,
+        )
+
+
+def _read(decision: Decision) -> Iterator[Received]:
+    """Yield the messages of other agents that an answer is the first to; an adviser's name has its role in brackets."""
+    for message in decision.question.glance.messages if decision.question else ():
+        if not message.again and not message.sender.endswith(")"):
+            yield message
+
+
+def is_acted_on(text: str, orders: Collection[str], seen: Observation | None) -> bool:
+    """Return True if any of these orders names what a message names.
+
+    Args:
+        text: of the message.
+        orders: as they were accepted, `Stalker-1 <Attack_Unit(0x1)>`.
+        seen: the observation in which the reader found the message.
+    """
+    tags, points = {tag.casefold() for tag in _TAG.findall(text)}, [*_points(text), *_places(text, seen)]
+    types = {unit.tag.casefold(): unit.type for unit in _units(seen)} if orders else {}
+    for name, arguments in (found.groups() for order in orders if (found := _ORDER.search(order))):
+        targets = {tag.casefold() for tag in _TAG.findall(arguments)}
+        if not tags.isdisjoint(targets):
+            return True
+        if any(_names_type(text, type_) for type_ in (*name.split("_"), *(types.get(tag, "") for tag in targets))):
+            return True
+        goals = _points(arguments) if name.endswith("_Minimap") else ()
+        if any(math.dist(goal, point) <= NEAR_MINIMAP for goal in goals for point in points):
+            return True
+    return False
+
+
+def _points(text: str) -> list[Point]:
+    return [(float(x), float(y)) for x, y in _POINT.findall(text)]
+
+
+def _places(text: str, seen: Observation | None) -> Iterator[Point]:
+    """Yield the points of the named places in a text."""
+    for place in seen.view.places if seen else ():
+        if re.search(rf"\b{re.escape(place.name)}\b", text, re.IGNORECASE):
+            yield place.minimap
+
+
+def _units(seen: Observation | None) -> Iterator[UnitView]:
+    for team in seen.view.teams if seen else ():
+        yield from (*team.units, *team.allies, *team.enemies, *team.resources)
+
+
+def _names_type(text: str, word: str) -> bool:
+    """Return True if a word is a type of unit, and the text names it, in one word or several, one or many."""
+    return word in knowledge() and _called(word).search(text) is not None
+
+
+@cache
+def _called(type_: str) -> re.Pattern[str]:
+    return re.compile(rf"\b{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ?', type_)}e?s?\b", re.IGNORECASE)

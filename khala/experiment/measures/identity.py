@@ -3,6 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from khala_protocol.messages import LOOPS_PER_S
+
+if TYPE_CHECKING:
+    from khala.experiment.measures.evidence import Step
+    from khala_protocol.messages import Result, Run
+
+UNFINISHED = "unfinished"
+"""Outcome of an episode of which the recording has no result."""
+NO_RESULT = "the recording ends before the episode does"
+"""Why such an episode says nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,3 +65,48 @@ class Identity:
     """Value killed / value lost; null if nothing was lost."""
     score: float | None
     """The game's score at the end."""
+
+
+class Progress:
+    """How far an episode was played; for one without a result there is nothing else."""
+
+    def __init__(self) -> None:
+        self._steps = self._loop = 0
+
+    def add(self, step: Step) -> None:
+        """Take in a step."""
+        self._steps += 1
+        self._loop = step.report.game_loop
+
+    def total(self, run: Run, side: str, episode: int, result: Result | None) -> Identity:
+        """Return the group."""
+        return Identity(
+            run=run.run,
+            task=run.task,
+            side=side,
+            episode=episode,
+            seed=run.seed + episode,
+            map=run.map_name,
+            game=run.game,
+            clock=run.clock.rule,
+            opponent=result.opponent if result else _opponent(run, side),
+            outcome=result.outcome if result else UNFINISHED,
+            cause=result.cause if result else "",
+            valid=result is not None and result.valid,
+            invalid_because=result.invalid_because if result else NO_RESULT,
+            steps=self._steps,
+            game_s=result.game_s if result else self._loop / LOOPS_PER_S,
+            wall_s=result.wall_s if result else None,
+            killed_value=result.killed.value if result else None,
+            killed_units=result.killed.units if result else None,
+            lost_value=result.lost.value if result else None,
+            lost_units=result.lost.units if result else None,
+            kd=result.kd if result else None,
+            score=result.score if result else None,
+        )
+
+
+def _opponent(run: Run, side: str) -> str:
+    """Return who a side plays against, as a result would say it."""
+    others = sorted({agent.side for agent in run.agents} - {side})
+    return run.opponent or ", ".join(f"side {other}" for other in others)

@@ -1,0 +1,101 @@
+"""Read a recording once, and give each episode and side its row."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala.experiment.measures.actions import ActionTally
+from khala.experiment.measures.communication import CommunicationTally
+from khala.experiment.measures.economy import EconomyTally
+from khala.experiment.measures.evidence import CallGlance, Decision, ObservationGlance, Question, Step, evidence
+from khala.experiment.measures.faults import FaultTally
+from khala.experiment.measures.hallucinations import HallucinationTally
+from khala.experiment.measures.identity import Progress
+from khala.experiment.measures.row import Measures
+from khala.experiment.measures.spending import SpendingTally
+from khala.experiment.measures.timing import Timing
+from khala_protocol.errors import RecordingError
+from khala_protocol.messages import Report
+
+if TYPE_CHECKING:
+    from khala_protocol.messages import AgentReport, Result, Run
+    from khala_protocol.recording import Recording
+
+
+def measure(recording: Recording) -> list[Measures]:
+    """Return a row for each episode and side that was begun, in their order.
+
+    An episode without a result has a row too, whose outcome is `unfinished`: what it cost was spent.
+
+    Raises:
+        RecordingError: the recording has no run card.
+    """
+    run = recording.run
+    if run is None:
+        raise RecordingError(f"{recording.path} has no run card, so nobody can say what was played: play it again")
+    accounts: dict[tuple[int, str], _Account] = {}
+    for sample in recording:
+        match evidence(sample):
+            case ObservationGlance() as seen:
+                _of(accounts, seen).see(Question(seen, sample.payload))
+            case CallGlance() as call:
+                _of(accounts, call).spending.call(call)
+            case Report() as report:
+                _of(accounts, report).add(report)
+    results = {(result.episode, result.side): result for result in recording.results}
+    places = sorted({*accounts, *results})
+    return [accounts.get(place, _Account()).row(run, *place, results.get(place)) for place in places]
+
+
+class _Account:
+    """The running account of one side in one episode."""
+
+    def __init__(self) -> None:
+        self._asked: dict[str, Question] = {}
+        """By agent, the last observation that it was sent."""
+        self._progress, self._faults, self._actions = Progress(), FaultTally(), ActionTally()
+        self._hallucinations, self._communication = HallucinationTally(), CommunicationTally()
+        self._economy = EconomyTally()
+        self.spending = SpendingTally()
+
+    def see(self, question: Question) -> None:
+        """Take in an observation."""
+        self._asked[question.glance.agent] = question
+        self._economy.see(question.glance.view)
+
+    def add(self, report: Report) -> None:
+        """Take in the report of a step."""
+        step = Step(report, [Decision(agent, self._question(report, agent)) for agent in report.agents])
+        for tally in (
+            self._progress,
+            self._faults,
+            self._actions,
+            self._hallucinations,
+            self._communication,
+            self.spending,
+        ):
+            tally.add(step)
+
+    def _question(self, report: Report, agent: AgentReport) -> Question | None:
+        """Return the observation that a decision answers."""
+        question = self._asked.get(agent.agent)
+        asked = report.step if agent.asked_step is None else agent.asked_step
+        return question if question is not None and question.glance.step == asked else None
+
+    def row(self, run: Run, episode: int, side: str, result: Result | None) -> Measures:
+        """Return the row."""
+        identity = self._progress.total(run, side, episode, result)
+        return Measures(
+            **vars(identity),
+            **vars(self._faults.total()),
+            **vars(self._actions.total()),
+            **vars(self._hallucinations.total()),
+            **vars(self._communication.total()),
+            **vars(Timing.of(result)),
+            **vars(self.spending.total()),
+            **vars(self._economy.total(identity.game_s)),
+        )
+
+
+def _of(accounts: dict[tuple[int, str], _Account], message: ObservationGlance | CallGlance | Report) -> _Account:
+    return accounts.setdefault((message.episode, message.side), _Account())
