@@ -23,6 +23,7 @@ from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
 from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
+from khala.experiment.cli import app as experiment
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.options import (
@@ -301,6 +302,7 @@ for command, epilog in (
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
+app.add_typer(experiment, name="experiment")
 app.add_typer(keys, name="keys")
 app.add_typer(khala_simulator.cli.app, name="sc2")
 app.add_typer(knowledge, name="knowledge")

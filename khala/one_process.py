@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from khala import games
 from khala.hosting import hosted
@@ -20,7 +20,7 @@ from khala_agents.worker import run_workers
 from khala_protocol.bus.memory import MemoryBroker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from khala.minds import Minds
     from khala_agents.policy import Policy
@@ -84,9 +84,9 @@ async def _policies(
     return made
 
 
-async def _unless_one_fails(match: asyncio.Task[list[Result]], agents: list[asyncio.Task[object]]) -> list[Result]:
+async def _unless_one_fails(match: asyncio.Task[list[Result]], agents: Sequence[asyncio.Task[Any]]) -> list[Result]:
     """Return the results; raise what an agent raised, which nobody else would see."""
-    watched: set[asyncio.Task[object]] = {match, *agents}  # type: ignore[arg-type]  # tasks are invariant
+    watched: set[asyncio.Task[Any]] = {match, *agents}
     try:
         while not match.done():
             done, watched = await asyncio.wait(watched, return_when=asyncio.FIRST_COMPLETED)

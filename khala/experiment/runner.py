@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
+from khala.experiment.store import unread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -82,7 +83,8 @@ class Runner:
     _tries: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
-        """Count what was spent before."""
+        """Count what was spent before, also by a runner that was killed."""
+        self.store.adopt()
         self._played = self.store.played()
         for played in self._played.values():
             self._count(played)
@@ -124,18 +126,16 @@ class Runner:
             done = await self.engine.play(job)
         finally:
             self.spent.held_usd -= part_usd or 0.0
-        played = await asyncio.to_thread(self._take, job, done)
-        self._end(match, done, played)
+        tries, crash = self._tries[match.key], _CRASHES.get(done.state, "")
+        found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
+        if found is None:
+            found = unread(match, tries, crash or "crash"), []
+        self.store.add(*found)
+        self._end(match, done, found[0])
 
-    def _take(self, job: Job, done: Done) -> Played | None:
-        assert job.config.record is not None
-        tries = self._tries[job.config.labels["match"]]
-        return self.store.take(job.config.record, attempts=tries, crash=_CRASHES.get(done.state, ""))
-
-    def _end(self, match: PlannedMatch, done: Done, played: Played | None) -> None:
-        if played is None:
-            self.store.crashed(match, self._tries[match.key], "crash")
-            played = self.store.played()[match.key]
+    def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:
+        if before := self._played.get(match.key):
+            self._count(before, -1)  # what its tries have cost together is in the new account
         self._count(played)
         self._played[match.key] = played
         if played.state == "crashed" and self._tries[match.key] <= self.experiment.retries:
@@ -144,9 +144,9 @@ class Runner:
         else:
             self.see(Event("ends", match, played, done.words))
 
-    def _count(self, played: Played) -> None:
-        self.spent.usd += played.cost_usd or 0.0
-        self.spent.tokens += played.tokens or 0
+    def _count(self, played: Played, sign: int = 1) -> None:
+        self.spent.usd += sign * (played.cost_usd or 0.0)
+        self.spent.tokens += sign * (played.tokens or 0)
 
     # --- what it takes --------------------------------------------------------------------------------
 
@@ -186,7 +186,7 @@ class Runner:
     def estimate(self, matches: Sequence[PlannedMatch]) -> Estimate:
         """Return what those of the matches that are missing will take."""
         left = list(missing(matches, self._played))
-        sums = {name: 0.0 for name in ("cost_usd", "tokens", "wall_s")}
+        sums = dict.fromkeys(("cost_usd", "tokens", "wall_s"), 0.0)
         for match in left:
             for name in sums:
                 sums[name] += _mean(self._numbers(match, name)) or 0.0

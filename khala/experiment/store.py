@@ -15,20 +15,21 @@ import fcntl
 import json
 import shutil
 import sqlite3
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from khala.experiment.measures import Measures, measure
 from khala.experiment.spec import Experiment
 from khala.matches import free_recording
+from khala.minds import spent_usd
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from khala.experiment.plan import PlannedMatch
     from khala_protocol.messages import Run
@@ -149,10 +150,10 @@ class Store:
         names = list(result_columns())
         with self._index as index:
             index.execute("delete from results where match = ?", (played.key,))
-            index.execute(f"insert or replace into matches values ({', '.join('?' * len(plain))})", plain)
+            index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks
             for row in rows:
                 values = [played.key, *(getattr(row, name) for name in names)]
-                index.execute(f"insert into results values ({', '.join('?' * len(values))})", values)
+                index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
 
     def played(self) -> dict[str, Played]:
         """Return what is known of each match, by its key."""
@@ -174,13 +175,17 @@ class Store:
             del self.__dict__["_index"]
         (self.directory / INDEX).unlink(missing_ok=True)
         for directory in sorted((self.directory / MATCHES).glob("*")):
-            tries = sorted(directory.glob("recording*.mcap"), key=lambda path: path.stat().st_mtime)
-            if tries:
+            if tries := _tries(directory):
                 self.take(tries[-1], attempts=len(tries))
         return len(self.played())
 
-    def take(self, path: Path, *, attempts: int, crash: str = "") -> Played | None:
-        """Read a recording into the index; return what became of its match, None if it has no run card.
+    def take(self, path: Path, *, attempts: int) -> None:
+        """Read a recording into the index; one without a run card says nothing."""
+        if (found := self.read(path, attempts=attempts)) is not None:
+            self.add(*found)
+
+    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Measures]] | None:
+        """Return what became of a recorded match, and its measures; None if there is no run card.
 
         Args:
             path: of the recording.
@@ -194,15 +199,28 @@ class Store:
         if (card := recording.run) is None:
             return None
         rows = measure(recording) if recording.results else []
+        costs = [_cost_usd(other) for other in path.parent.glob("recording*.mcap") if other != path]
+        costs += [row.cost_usd for row in rows] if rows else [_cost_usd(path)]
         played = _judged(card, rows, str(path.relative_to(self.directory)), attempts, crash)
-        self.add(played, rows)
-        return played
+        known = [cost for cost in costs if cost is not None]
+        played = replace(played, cost_usd=sum(known) if known else None)
+        return played, rows
 
-    def crashed(self, match: PlannedMatch, attempts: int, cause: str) -> None:
-        """Note a match of which there is no recording that could be read."""
-        none = {"recording": "", "wall_s": None, "cost_usd": None, "tokens": None, "card": {}}
-        of = {"key": match.key, "cell": match.cell, "seed": match.seed, "repetition": match.repetition}
-        self.add(Played(**of, state="crashed", cause=cause, attempts=attempts, **none), [])
+    def adopt(self) -> None:
+        """Take in recordings of a runner that was killed: what its matches have cost counts."""
+        known = self.played()
+        for directory in (self.directory / MATCHES).glob("*"):
+            tries = _tries(directory)
+            if tries and (directory.name not in known or known[directory.name].attempts < len(tries)):
+                self.take(tries[-1], attempts=len(tries))
+
+
+def unread(match: PlannedMatch, attempts: int, cause: str) -> Played:
+    """Return what became of a match of which there is no recording that can be read."""
+    return Played(
+        key=match.key, cell=match.cell, seed=match.seed, repetition=match.repetition, state="crashed", cause=cause,
+        attempts=attempts, recording="", wall_s=None, cost_usd=None, tokens=None, card={},
+    )  # fmt: skip
 
 
 def result_columns() -> dict[str, str]:
@@ -215,14 +233,30 @@ def _annotations() -> dict[str, Any]:
     return {name: field.type for name, field in Measures.__dataclass_fields__.items()}
 
 
+def _places(values: list[Any]) -> str:
+    return f"({', '.join('?' * len(values))})"
+
+
 def _has_columns(index: sqlite3.Connection) -> bool:
     there = [row[1] for row in index.execute("pragma table_info(results)")]
     return there == ["match", *result_columns()]
 
 
+def _tries(directory: Path) -> list[Path]:
+    """Return the recordings of a match, the newest last."""
+    return sorted(directory.glob("recording*.mcap"), key=lambda path: path.stat().st_mtime)
+
+
+def _cost_usd(path: Path) -> float | None:
+    """Return what a match has cost of which there may be half a recording."""
+    try:
+        return sum(spent_usd(Recording.open(path)).values()) or None
+    except RecordingError:
+        return None
+
+
 def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
     state, cause = _state(rows, crash)
-    costs = [row.cost_usd for row in rows if row.cost_usd is not None]
     labels = card.labels
     return Played(
         key=labels.get("match", card.run),
@@ -234,7 +268,7 @@ def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, cras
         attempts=attempts,
         recording=recording,
         wall_s=max((row.wall_s or 0.0 for row in rows), default=None),
-        cost_usd=sum(costs) if costs else None,
+        cost_usd=None,
         tokens=sum(row.prompt_tokens + row.completion_tokens for row in rows) if rows else None,
         card=comparable(card),
     )
