@@ -10,6 +10,9 @@ from khala_bridge.errors import GameMissing
 from khala_bridge.game.game import find_sc2
 from khala_simulator.process.install import InstallError, install, is_installed
 
+SIMULATOR = f"Khala simulator {__version__}, as"
+STARCRAFT = "StarCraft II"
+
 
 def cache() -> Path:
     """Return where the simulator is unpacked: `$KHALA_CACHE`, or the user's cache directory."""
@@ -34,4 +37,9 @@ def find(source: str) -> tuple[Path, str]:
             raise GameMissing(f"the simulator cannot be laid out: {error}; KHALA_CACHE names another place") from None
     else:
         path = find_sc2(source)
-    return path, f"Khala simulator {__version__}, as" if is_installed(path) else "StarCraft II"
+    return path, SIMULATOR if is_installed(path) else STARCRAFT
+
+
+def name_of(source: str) -> str:
+    """Return the name of a game for the run card, and do not unpack the simulator for it; errors as in `find`."""
+    return SIMULATOR if source == "simulator" else find(source)[1]

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import TaskConfig
 
 KEY_CHARACTERS = 16
+FACTOR = "factor."
+"""Of labels on run cards, and of columns in exports."""
 SWAPPED = "swapped"
 """Name of the factor that says whether the sides' models are swapped."""
 _TASK_FIELDS = {
@@ -70,12 +72,12 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
     count = len(grid) * len(experiment.seeds) * experiment.repetitions
     if count > MOST_MATCHES:
         raise ConfigError(f"the grid has {count} matches, more than {MOST_MATCHES}: split the experiment")
-    _, game_name = games.find(game)
-    prepared = [_prepared(cell, settings) for cell, settings in grid]
+    name = games.name_of(game)
+    prepared = [_prepared(cell, settings, name) for cell, settings in grid]
     planned = [
-        _match(experiment, cell, task, minds, seed, repetition, game_name)
+        one.match(experiment.name, seed, repetition)
         for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
-        for cell, task, minds in prepared
+        for one in prepared
     ]
     return list({match.key: match for match in planned}.values())
 
@@ -118,7 +120,27 @@ def _both_ways(
     yield cell | {SWAPPED: "yes"}, settings.model_copy(update={"sides": {blue: second, red: first}})
 
 
-def _prepared(cell: dict[str, str], settings: Settings) -> tuple[dict[str, str], TaskConfig, dict[str, Minds]]:
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """A cell that can be played, with any seed."""
+
+    cell: dict[str, str]
+    task: TaskConfig
+    minds: dict[str, Minds]
+    played: str
+    """What it plays, as JSON."""
+
+    def match(self, experiment: str, seed: int, repetition: int) -> PlannedMatch:
+        """Return the match with a seed."""
+        text = f"{seed} {repetition} {self.played}"
+        key = hashlib.sha256(text.encode()).hexdigest()[:KEY_CHARACTERS]
+        labels = {"experiment": experiment, "match": key, "repetition": str(repetition)}
+        labels |= {f"{FACTOR}{name}": value for name, value in self.cell.items()}
+        config = MatchConfig(task=self.task, run=f"match-{key}", seed=seed, labels=labels)
+        return PlannedMatch(key, self.cell, seed, repetition, config, self.minds)
+
+
+def _prepared(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
     try:
         task = task_of(settings)
         minds = minds_for(task, settings)
@@ -127,7 +149,13 @@ def _prepared(cell: dict[str, str], settings: Settings) -> tuple[dict[str, str],
             mind.check()
     except ConfigError as error:
         raise ConfigError(f"{_words(cell)}: {error}") from None
-    return cell, task, minds
+    played = {
+        "task": task.model_dump(mode="json"),
+        "game": game,
+        "actions": catalogue_sha256(),
+        "minds": {side: _identity(mind) for side, mind in minds.items()},
+    }
+    return _Prepared(cell, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
 
 
 def task_of(settings: Settings) -> TaskConfig:
@@ -161,31 +189,6 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     if settings.agents:
         common = replace(common, agents=settings.agents)
     return minds_of([side.side for side in task.per_side()], common, settings.sides or {})
-
-
-def _match(
-    experiment: Experiment,
-    cell: dict[str, str],
-    task: TaskConfig,
-    minds: dict[str, Minds],
-    seed: int,
-    repetition: int,
-    game: str,
-) -> PlannedMatch:
-    played = {
-        "task": task.model_dump(mode="json"),
-        "seed": seed,
-        "repetition": repetition,
-        "game": game,
-        "catalogue": catalogue_sha256(),
-        "minds": {side: _identity(mind) for side, mind in minds.items()},
-    }
-    text = json.dumps(played, sort_keys=True, separators=(",", ":"))
-    key = hashlib.sha256(text.encode()).hexdigest()[:KEY_CHARACTERS]
-    labels = {"experiment": experiment.name, "match": key, "repetition": str(repetition)}
-    labels |= {f"factor.{name}": value for name, value in cell.items()}
-    config = MatchConfig(task=task, run=f"match-{key}", seed=seed, labels=labels)
-    return PlannedMatch(key, cell, seed, repetition, config, minds)
 
 
 def _identity(mind: Minds) -> dict[str, Any]:

@@ -122,15 +122,13 @@ class Runner:
             timeout_s=3600 * self.experiment.match_hours,
             processes=self.processes,
         )
-        try:
-            done = await self.engine.play(job)
-        finally:
-            self.spent.held_usd -= part_usd or 0.0
+        done = await self.engine.play(job)
         tries, crash = self._tries[match.key], _CRASHES.get(done.state, "")
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
             found = unread(match, tries, crash or "crash"), []
         self.store.add(*found)
+        self.spent.held_usd -= part_usd or 0.0
         self._end(match, done, found[0])
 
     def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:

@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 from khala.experiment.measures import Measures, measure
+from khala.experiment.plan import FACTOR
 from khala.experiment.spec import Experiment
 from khala.matches import free_recording
 from khala.minds import spent_usd
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 State = Literal["done", "invalid", "crashed"]
 """`invalid`: it was played, and says nothing about its agents; `crashed`: it was not played to its end."""
 FILE, INDEX, MATCHES, LOGS, LOCK = "experiment.yaml", "index.sqlite", "matches", "logs", ".lock"
-FACTOR = "factor."
-"""Of labels on run cards, and of columns in exports."""
 VERSION = 1
 SCHEMA = """
 create table matches (

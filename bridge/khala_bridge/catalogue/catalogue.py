@@ -190,6 +190,7 @@ def example(action: Action) -> str:
     return f"<{action.name}({', '.join(points.get(kind) or next(tags) for kind in action.args)})>"
 
 
+@functools.cache
 def catalogue_sha256() -> str:
     """Return the hash of the whole catalogue, for the run card."""
     digest = hashlib.sha256()

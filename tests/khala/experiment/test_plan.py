@@ -1,0 +1,131 @@
+"""From the file of an experiment to its matches: what a grid holds, what a match is known by, what is refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from khala.experiment.plan import SWAPPED, cells, plan, task_of
+from khala.experiment.spec import Experiment, Settings
+from khala_protocol.configfile import loads
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+PLAYERS = [{"name": "strong", "model": "skilled"}, {"name": "weak", "model": "focus-fire"}]
+
+
+def experiment(**fields: Any) -> Experiment:
+    given = {"name": "e", "factors": {"task": ["2s3z_pair", "3s5z"], "player": PLAYERS}, "seeds": 2}
+    return Experiment.model_validate(given | fields)
+
+
+def cells_of(found: Experiment) -> list[Mapping[str, str]]:
+    return [cell for cell, _ in cells(found)]
+
+
+def test_a_grid_has_every_combination_and_plays_every_cell_before_the_next_seed() -> None:
+    matches = plan(experiment())
+    assert [(match.cell["task"], match.cell["player"], match.seed) for match in matches] == [
+        (task, player, seed) for seed in (1, 2) for task in ("2s3z_pair", "3s5z") for player in ("strong", "weak")
+    ]
+    assert len({match.key for match in matches}) == 8
+
+
+def test_cells_are_left_out_and_added() -> None:
+    found = experiment(
+        exclude=[{"task": "3s5z", "player": "weak"}],
+        include=[{"task": "3s5z", "player": {"name": "nobody", "model": "silent"}}],
+    )
+    assert [tuple(cell.values()) for cell in cells_of(found)] == [
+        ("2s3z_pair", "strong"), ("2s3z_pair", "weak"), ("3s5z", "strong"), ("3s5z", "nobody"),
+    ]  # fmt: skip
+
+
+def test_a_match_is_known_by_what_it_plays_and_by_nothing_else() -> None:
+    def keys(**fields: Any) -> list[str]:
+        return [match.key for match in plan(experiment(seeds=[7], **fields))]
+
+    same = keys(name="other", budget={"usd": 3}, description="words", retries=0)
+    assert same == keys()
+    for changed in ({"fixed": {"max_steps": 5}}, {"fixed": {"clock": "token"}}, {"fixed": {"memory": 2}}):
+        assert not set(keys(**changed)) & set(same), changed
+    assert set(keys(factors={"task": ["2s3z_pair"], "player": PLAYERS[:1]})) < set(same)
+
+
+def test_two_names_of_the_same_settings_are_one_match() -> None:
+    twice = [{"name": "a", "model": "silent"}, {"name": "b", "model": "silent"}]
+    assert len(plan(experiment(factors={"task": ["2s3z_pair"], "player": twice}, seeds=1))) == 1
+
+
+def test_repetitions_are_matches_of_their_own() -> None:
+    matches = plan(experiment(repetitions=3, seeds=1))
+    assert len({match.key for match in matches}) == len(matches) == 12
+    assert [match.repetition for match in matches[::4]] == [0, 1, 2]
+
+
+def test_sides_are_swapped() -> None:
+    found = experiment(
+        factors={"task": ["duel_3m"]}, fixed={"sides": {"blue": "skilled", "red": "silent"}}, swap_sides=True, seeds=1
+    )
+    assert [
+        (match.cell[SWAPPED], {side: mind.policy for side, mind in match.minds.items()}) for match in plan(found)
+    ] == [("no", {"blue": "skilled", "red": "silent"}), ("yes", {"blue": "silent", "red": "skilled"})]
+
+
+def test_settings_reach_the_task() -> None:
+    task = task_of(
+        Settings(
+            task="simple64_eceb", clock="token", level="hard", against="terran", max_steps=9, fields={"max_actions": 2}
+        )
+    )
+    assert (task.clock.rule, task.max_steps, task.max_actions) == ("token", 9, 2)
+    assert (task.map_spec.difficulty, task.map_spec.opponent) == ("hard", "terran")
+
+
+def test_an_agent_may_have_a_model_of_its_own() -> None:
+    found = experiment(fixed={"model": "silent", "agents": {"Zealots": "skilled"}}, factors={"task": ["2s3z_pair"]})
+    (match, *_) = plan(found)
+    groups = match.minds["blue"].groups([agent.name for agent in match.config.task.agents])
+    assert {mind.policy: names for mind, names in groups} == {"silent": ["Stalkers"], "skilled": ["Zealots"]}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("factors: {tsk: [2s3z]}", "there is no setting 'tsk': did you mean task?"),
+        ("factors: {task: [2s3z, 2s3z]}", "the factor task has the value 2s3z twice"),
+        ("factors: {task: []}", "the factor task has no values"),
+        ("factors: {task: 2s3z}", "the factor task needs a list of values"),
+        ("factors: {clock: [frozen]}", "no task is named: give the factor task, or fixed.task"),
+        ("factors: {task: [2s3z]}, seeds: 0", "give a number from 1 to"),
+        ("factors: {task: [2s3z]}, seeds: 9-3", "write it as 1-20"),
+        ("factors: {task: [2s3z]}, exclude: [{player: a}]", "names the factor 'player'; the factors are task"),
+        ("factors: {task: [2s3z]}, exclude: [{task: 3m}]", "exclude names task '3m'; its values are 2s3z"),
+        ("factors: {task: [2s3z]}, include: [{model: silent}]", "needs a value for each of task, and no other"),
+        ("factors: {task: [2s3z]}, fixed: {clok: frozen}", "no such field, did you mean 'clock'?"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_what_is_wrong(text: str, says: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        loads(f"{{name: e, {text}}}", Experiment, source="e.yaml")
+    assert says in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"factors": {"task": ["2s3z_pare"]}}, "task 2s3z_pare: there is no task '2s3z_pare': did you mean"),
+        ({"factors": {"task": ["2s3z"], "model": ["opnai"]}}, "model opnai: there is no model file 'opnai'"),
+        ({"factors": {"task": ["2s3z"]}, "fixed": {"agents": {"Nobody": "silent"}}}, "there is no agent 'Nobody'"),
+        ({"factors": {"task": ["2s3z"]}, "fixed": {"sides": {"green": "silent"}}}, "the task has no side green"),
+        ({"factors": {"task": ["2s3z"]}, "swap_sides": True}, "swap_sides needs the models of two sides"),
+        ({"factors": {"task": ["2s3z"]}, "seeds": "1-10000", "repetitions": 1000}, "the grid has 10000000 matches"),
+    ],
+)
+def test_a_cell_that_cannot_be_played_is_refused_before_anything_is(fields: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        plan(experiment(**fields))
+    assert says in str(refused.value)

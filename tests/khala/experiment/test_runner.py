@@ -1,0 +1,184 @@
+"""The runner plays what is missing, tries again what crashed, and never spends more than it may."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from khala.experiment.plan import plan
+from khala.experiment.runner import Event, Runner, pilot_of
+from khala.experiment.spec import Budget, Experiment
+from khala.experiment.store import Store
+from khala_protocol.errors import ConfigError
+from tests.khala.experiment.made import MadeEngine, record
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala.experiment.job import Job
+    from khala.experiment.plan import PlannedMatch
+
+CLOCK = "jumps"
+
+
+def experiment(**fields: Any) -> Experiment:
+    given = {"name": "e", "fixed": {"model": "scripted"}, "factors": {"task": ["2s3z_pair", "3s5z"]}, "seeds": 3}
+    return Experiment.model_validate(given | fields)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "e")
+
+
+async def run(store: Store, engine: MadeEngine, found: Experiment | None = None, **budget: Any) -> Runner:
+    found = found or experiment()
+    runner = Runner(found, store, engine, Budget(**budget))
+    await runner.play(plan(found))
+    return runner
+
+
+def states(store: Store) -> list[str]:
+    return [played.state for played in store.played().values()]
+
+
+async def test_every_match_is_played_once_and_a_second_run_plays_nothing(store: Store) -> None:
+    engine = MadeEngine()
+    await run(store, engine)
+    assert (states(store), len(engine.jobs), engine.most_at_once) == (["done"] * 6, 6, 2)
+    again = MadeEngine()
+    await run(store, again)
+    assert again.jobs == []
+
+
+async def test_a_grown_grid_plays_only_what_is_new(store: Store) -> None:
+    await run(store, MadeEngine())
+    engine = MadeEngine()
+    await run(store, engine, experiment(seeds=4))
+    assert [job.config.seed for job in engine.jobs] == [4, 4]
+
+
+async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(store: Store) -> None:
+    seen: list[Event] = []
+    always, once = (match.key for match in plan(experiment())[:2])
+
+    def ends(job: Job, attempt: int) -> str:
+        key = job.config.labels["match"]
+        return "lost" if key == always or (key == once and attempt == 1) else "done"
+
+    found = experiment()
+    runner = Runner(found, store, MadeEngine(ends=ends), Budget(), see=seen.append)
+    await runner.play(plan(found))
+    played = store.played()
+    assert (played[always].state, played[always].cause, played[always].attempts) == ("crashed", "crash", 3)
+    assert (played[once].state, played[once].attempts) == ("done", 2)
+    assert [event.what for event in seen if event.match.key == always and event.what != "begins"] == [
+        "again", "again", "ends",
+    ]  # fmt: skip
+
+
+async def test_a_match_without_any_recording_is_known_as_crashed(store: Store) -> None:
+    await run(store, MadeEngine(ends=lambda _job, _try: "nothing"), experiment(seeds=1, retries=0))
+    assert [(one.state, one.recording) for one in store.played().values()] == [("crashed", "")] * 2
+
+
+async def test_a_lost_match_is_a_result_and_one_without_a_model_is_not(store: Store) -> None:
+    def ends(job: Job, attempt: int) -> str:
+        return "invalid" if job.config.seed == 1 else "done"
+
+    await run(store, MadeEngine(ends=ends))
+    assert [(one.seed, one.state, one.cause) for one in store.played().values()] == [
+        (1, "invalid", "model away"), (1, "invalid", "model away"), *[(s, "done", "") for s in (2, 2, 3, 3)],
+    ]  # fmt: skip
+    assert {row["outcome"] for row in store.results() if row["state"] == "done"} == {"win", "loss"}
+
+
+@pytest.mark.parametrize(("slots", "price"), [(1, 0.3), (2, 0.3), (5, 0.1), (2, 2.0)])
+async def test_the_budget_is_never_exceeded(store: Store, slots: int, price: float) -> None:
+    engine = MadeEngine(slots=slots, cost_usd=lambda job: price * (1 + job.config.seed % 3))
+    runner = await run(store, engine, usd=1.9)
+    assert 0 < sum(one.cost_usd or 0.0 for one in store.played().values()) <= 1.9 + 1e-9
+    assert runner.spent.usd == pytest.approx(sum(one.cost_usd or 0.0 for one in store.played().values()))
+    assert runner.spent.held_usd == pytest.approx(0.0)
+    if runner.stopped:
+        assert "the budget of 1.9 USD is used up" in runner.stopped
+
+
+async def test_a_match_whose_money_went_is_not_valid(store: Store) -> None:
+    await run(store, MadeEngine(slots=1, cost_usd=lambda _: 1.0), experiment(seeds=1), usd=0.5)
+    assert [(one.state, one.cause) for one in store.played().values()] == [("invalid", "budget")]
+
+
+async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
+    def ends(job: Job, attempt: int) -> str:
+        return "lost" if attempt < 3 else "done"
+
+    runner = await run(store, MadeEngine(ends=ends, cost_usd=lambda _: 0.25), experiment(seeds=1))
+    assert runner.spent.usd == pytest.approx(2 * 3 * 0.25)
+    assert Runner(experiment(), store, MadeEngine(), Budget()).spent.usd == pytest.approx(1.5)
+
+
+async def test_the_money_of_a_runner_that_was_killed_counts(store: Store) -> None:
+    match = plan(experiment())[0]
+    path = store.recording_for(match.key)
+    path.parent.mkdir(parents=True)
+    record(path, match.config, cost_usd=0.5, result=False)
+    runner = Runner(experiment(), store, MadeEngine(), Budget())
+    assert runner.spent.usd == 0.5
+    assert [(one.state, one.cause) for one in store.played().values()] == [("crashed", "interrupted")]
+
+
+async def test_budgets_of_tokens_and_of_time(store: Store) -> None:
+    runner = await run(store, MadeEngine(slots=1), tokens=3_500)
+    assert (len(store.played()), "3500 tokens" in runner.stopped) == (3, True)
+
+
+async def test_the_pilot_estimates_the_rest(store: Store) -> None:
+    found = experiment(seeds=20)
+    matches = plan(found)
+    runner = Runner(
+        found, store, MadeEngine(cost_usd=lambda job: 0.1 if job.config.task.name == "3s5z" else 0.3), Budget()
+    )
+    await runner.play(pilot_of(matches, 2))
+    estimate = runner.estimate(matches)
+    assert (estimate.matches, estimate.usd, estimate.tokens) == (36, pytest.approx(18 * 0.4), 36_000)
+    assert estimate.hours == pytest.approx(36 * 2.0 / 3600 / 2)
+
+
+async def test_the_index_is_made_again_of_the_recordings(store: Store) -> None:
+    def ends(job: Job, attempt: int) -> str:
+        return "lost" if job.config.seed == 2 and attempt == 1 else "done"
+
+    found = experiment()
+    await run(store, MadeEngine(ends=ends), found)
+    before, rows = store.played(), store.results()
+    assert store.rebuild() == len(before)
+    assert store.played() == before
+    assert sorted(store.results(), key=str) == sorted(rows, key=str)
+
+
+async def test_two_runners_do_not_share_a_directory(store: Store) -> None:
+    store.directory.mkdir()
+    other = Store(store.directory).locked()
+    with store.locked(), pytest.raises(ConfigError, match="another process plays the experiment"):
+        other.__enter__()
+
+
+def test_the_pilot_has_some_of_each_cell() -> None:
+    def places(matches: list[PlannedMatch]) -> list[tuple[str, int]]:
+        return [(match.cell["task"], match.seed) for match in matches]
+
+    assert places(pilot_of(plan(experiment()), 2)) == [(t, s) for s in (1, 2) for t in ("2s3z_pair", "3s5z")]
+
+
+async def test_who_is_cancelled_leaves_what_was_played(store: Store) -> None:
+    found, seen = experiment(), asyncio.Queue[Event]()
+    runner = Runner(found, store, MadeEngine(slots=1), Budget(), see=seen.put_nowait)
+    playing = asyncio.create_task(runner.play(plan(found)))
+    while len(store.played()) < 2:
+        await seen.get()
+    playing.cancel()
+    await asyncio.gather(playing, return_exceptions=True)
+    assert states(store) == ["done"] * 2
