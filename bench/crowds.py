@@ -28,7 +28,7 @@ import cv2
 import numpy as np
 from rich.console import Console
 
-from bench.duels import wilson
+from khala.experiment.statistics import wilson
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.maps.game_map import map_from
@@ -401,9 +401,10 @@ def _odds(decided: list[dict[str, bool]]) -> str:
     texts = []
     for factor in decided[0] if decided else ():
         wins = sum(one[factor] for one in decided)
-        low, high = wilson(wins, len(decided))
-        share, odds = wins / len(decided), binomial(wins, len(decided))
-        texts.append(f"{factor} {wins} of {len(decided)} = {share:.0%} ({low:.0%} to {high:.0%}, p {odds:.2f})")
+        share, odds = wilson(wins, len(decided)), binomial(wins, len(decided))
+        texts.append(
+            f"{factor} {wins} of {len(decided)} = {share.value:.0%} ({share.low:.0%} to {share.high:.0%}, p {odds:.2f})"
+        )
     return "  ".join(texts)
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import subprocess
 import sys
 from collections import Counter
@@ -21,6 +20,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from khala.experiment.statistics import wilson
 from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 NOT_VALID = 3
 """Exit code of `khala run` after a match with results that are not valid."""
-Z = 1.959964
-"""Of a normal distribution, 95 % are within so many standard deviations of the mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,16 +89,6 @@ def _half(
             )
 
 
-def wilson(won: int, games: int) -> tuple[float, float]:
-    """Return the interval in which the share of games won lies with 95 % (Wilson 1927)."""
-    if not games:
-        return 0.0, 1.0
-    share, spread = won / games, Z * Z / games
-    middle = share + spread / 2
-    width = math.sqrt(spread * (share * (1 - share) + spread / 4))
-    return max(0.0, (middle - width) / (1 + spread)), min(1.0, (middle + width) / (1 + spread))
-
-
 def table(a: str, b: str, games: Sequence[Game]) -> Iterator[str]:
     """Yield the lines of a Markdown table: all games, then those of each seat of `a`."""
     b = f"{b} (b)" if a == b else b
@@ -129,8 +117,8 @@ def _line(name: str, games: Sequence[Game]) -> str:
 
 
 def _share(won: int, games: int) -> str:
-    low, high = wilson(won, games)
-    return f"{won} ({100 * low:.0f} to {100 * high:.0f} %)"
+    share = wilson(won, games)
+    return f"{won} ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
 
 
 def main() -> int:

@@ -22,8 +22,8 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING, get_args
 
-from bench.duels import wilson
 from khala import games
+from khala.experiment.statistics import wilson
 from khala.hosting import hosted
 from khala_agents.scripted.players import PLAYERS, PlayerName
 from khala_bridge.task.maps import Difficulty, Race
@@ -133,8 +133,8 @@ def table(played: Sequence[Game]) -> Iterator[str]:
 
 def _cell(played: Sequence[Game]) -> str:
     won = Counter(game.outcome for game in played)["win"]
-    low, high = wilson(won, len(played))
-    return f"{won} of {len(played)} ({100 * low:.0f} to {100 * high:.0f} %)"
+    share = wilson(won, len(played))
+    return f"{won} of {len(played)} ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
 
 
 def main() -> int:

@@ -27,7 +27,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bench.duels import wilson
+from khala.experiment.statistics import wilson
 from khala_simulator.economy import supply
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.opponent import player
@@ -223,11 +223,11 @@ def ladder_table(games: Iterable[Game]) -> Iterator[str]:
     for (weaker, stronger), played in by_pair.items():
         won = sum(1 for g in played if g.winner and (g.first, g.second)[g.winner - 1] == stronger)
         drawn = sum(not g.winner for g in played)
-        low, high = wilson(won, len(played))
+        wins = wilson(won, len(played))
         share = (won + drawn / 2) / len(played)
         yield (
             f"| {stronger.name} | {weaker.name} | {len(played)} | {won} | {drawn} "
-            f"| {share:.0%} ({low:.0%} to {high:.0%}) | {sum(g.minutes for g in played) / len(played):.1f} "
+            f"| {share:.0%} ({wins.low:.0%} to {wins.high:.0%}) | {sum(g.minutes for g in played) / len(played):.1f} "
             f"| {sum(not g.decided for g in played)} | {sum(g.loops_per_s for g in played) / len(played):.0f} |"
         )
 

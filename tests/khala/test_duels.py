@@ -1,4 +1,4 @@
-"""Counting duels: seats, intervals, and games that do not count."""
+"""Counting duels: seats, and games that do not count."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bench import duels
-from bench.duels import Game, table, wilson
+from bench.duels import Game, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,14 +16,6 @@ if TYPE_CHECKING:
 
 def game(side: str, outcome: str, *, valid: bool = True) -> Game:
     return Game(1, side, outcome, killed=100, lost=50, steps=10, wall_s=1.0, valid=valid)
-
-
-@pytest.mark.parametrize(
-    ("won", "games", "low", "high"),
-    [(10, 20, 29.9, 70.1), (0, 10, 0.0, 27.8), (10, 10, 72.2, 100.0), (0, 0, 0.0, 100.0)],
-)
-def test_the_interval_is_the_one_of_wilson(won: int, games: int, low: float, high: float) -> None:
-    assert [round(100 * bound, 1) for bound in wilson(won, games)] == [low, high]
 
 
 def test_games_are_counted_by_seat_and_only_if_they_are_valid() -> None:
