@@ -8,6 +8,7 @@ engine      where a match is played: this machine, or (`ray_engine`) a Ray clust
 store       the directory of an experiment: recordings, and an index of them
 measures    one recording → numbers, by episode and side
 statistics  intervals and tests on numbers
+power       how many games a question needs
 compare     two selections of matches, if they are alike
 report      tables and figures
 """
