@@ -21,7 +21,9 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from aiohttp import web
 
 from khala.experiment.cli import words_of
 from khala.experiment.engine import Local
@@ -32,9 +34,6 @@ from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.scripted.faults import Faults, parse_faults
 from khala_protocol.configfile import load
-
-if TYPE_CHECKING:
-    from aiohttp import web
 
 MOST_OFF = 0.2
 FILE = """
@@ -130,9 +129,9 @@ class Charging(Endpoint):
     refused = 0
 
     async def _complete(self, request: web.Request) -> web.StreamResponse:
-        response: Any = await super()._complete(request)
-        if response.status == 200:
-            usage = json.loads(response.body)["usage"]
+        response = await super()._complete(request)
+        if isinstance(response, web.Response) and response.status == 200:
+            usage = json.loads(response.text or "")["usage"]
             self.charged_usd += (2.0 * usage["prompt_tokens"] + 8.0 * usage["completion_tokens"]) / 1e6
         else:
             self.refused += 1
@@ -207,7 +206,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the moments of the kills")
     parser.add_argument("--usd", type=float, default=0.25, help="cap of the experiment")
     given = parser.parse_args()
-    found: Killed | Money = asyncio.run(kills(given.kills, given.seed) if given.what == "kills" else money(given.usd))
+    found: Killed | Money
+    match given.what:
+        case "kills":
+            found = asyncio.run(kills(given.kills, given.seed))
+        case _:
+            found = asyncio.run(money(given.usd))
     print(found)
     return 0 if found.is_good else 1
 

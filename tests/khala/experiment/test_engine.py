@@ -1,0 +1,112 @@
+"""Matches are played for real: in one process, in workers that are killed, from the command line."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import sqlite3
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from typer.testing import CliRunner
+
+from bench import experiments
+from khala import local, one_process
+from khala.cli import app
+from khala.experiment.engine import Local
+from khala.experiment.job import Job
+from khala.experiment.plan import plan
+from khala.experiment.spec import Experiment
+from khala.experiment.store import Store
+from khala.experiment.worker import played
+from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_protocol.recording import Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.game
+
+
+def job(directory: Path, *, task: str = "2s3z_pair", **fields: Any) -> Job:
+    found = Experiment.model_validate(
+        {"name": "e", "fixed": {"max_steps": 3, "model": "skilled"}, "factors": {"task": [task]}}
+    )
+    (match,) = plan(found)
+    config = match.config.model_copy(update={"record": directory / "recording.mcap"})
+    return Job(config=config, minds=match.minds, timeout_s=120, **fields)
+
+
+async def test_a_match_is_played_and_recorded_in_one_process(tmp_path: Path) -> None:
+    done = await played(job(tmp_path), "simulator")
+    assert (done.state, done.words) == ("done", "")
+    recording = Recording.open(tmp_path / "recording.mcap")
+    assert [(result.steps, set(result.statuses)) for result in recording.results] == [(3, {"Stalkers", "Zealots"})]
+    assert recording.run is not None
+    assert recording.run.labels["factor.task"] == "2s3z_pair"
+    assert recording.run.hardware["cores"]
+    assert len(recording.run.code_sha256) == 64
+
+
+async def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
+    done = await played(job(tmp_path), str(tmp_path / "no game"))
+    assert done.state == "error"
+    assert "no game" in done.words
+
+
+async def test_a_worker_that_dies_loses_its_match_and_the_next_one_is_played(tmp_path: Path) -> None:
+    async with Local(1, game="simulator", logs=tmp_path / "logs") as engine:
+        engine._free.append(worker := await engine._start())
+        playing = asyncio.create_task(engine.play(job(tmp_path / "first")))
+        os.kill(worker._process.pid, signal.SIGKILL)
+        done = await playing
+        assert (done.state, done.words.partition(";")[0]) == ("lost", "its process ended with SIGKILL")
+        (tmp_path / "second").mkdir()
+        assert (await engine.play(job(tmp_path / "second"))).state == "done"
+
+
+@pytest.mark.slow
+async def test_a_match_in_one_process_is_the_match_of_many_processes(tmp_path: Path) -> None:
+    task = change(load_task("2s3z_pair"), max_steps=12)
+    minds = job(tmp_path).minds
+    config = MatchConfig(task=task, run="same", record=tmp_path / "same.mcap")
+    (one,) = await one_process.play(config, minds, game="simulator")
+    (many,) = await local.play(config.model_copy(update={"record": None}), minds, tmp_path, game="simulator")
+    times = {"wall_s": 0, "latency_p50_s": 0, "latency_p95_s": 0, "lag_s": 0}
+    assert one.but(**times) == many.but(**times)
+
+
+@pytest.mark.slow
+def test_an_experiment_from_the_command_line(tmp_path: Path) -> None:
+    file = experiments.write(tmp_path, seeds=1, steps=3)
+    told = CliRunner().invoke(app, ["experiment", "run", str(file), "--out", str(tmp_path), "--jobs", "2", "--json"])
+    assert told.exit_code == 0, told.output
+    line = next(line for line in told.output.splitlines() if line.startswith("{"))
+    assert json.loads(line)["matches"] == {"done": 4}
+    with sqlite3.connect(tmp_path / "attacked" / "index.sqlite") as index:
+        assert index.execute("select count(*) from results").fetchone() == (4,)
+    again = CliRunner().invoke(app, ["experiment", "resume", "attacked", "--out", str(tmp_path)])
+    assert "4 of 4 matches were played before" in again.output
+
+
+@pytest.mark.slow
+def test_a_runner_that_is_killed_again_and_again_ends_with_the_same_table() -> None:
+    killed = asyncio.run(experiments.kills(2, seed=5, seeds=2, steps=4))
+    assert killed.is_good, killed
+    assert killed.kills > 0
+
+
+@pytest.mark.slow
+def test_an_experiment_never_costs_more_than_its_cap() -> None:
+    charged = asyncio.run(experiments.money(0.2, seeds=4, steps=4))
+    assert charged.is_good, charged
+    assert charged.refused > 0
+
+
+def test_a_wrong_name_of_an_experiment_says_which_there_are(tmp_path: Path) -> None:
+    told = CliRunner().invoke(app, ["experiment", "status", "nothing", "--out", str(tmp_path)])
+    assert told.exception is not None
+    assert "there is no experiment in" in str(told.exception)
+    assert not Store(tmp_path / "nothing").played()
