@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from khala.experiment.measures.actions import ActionTally
@@ -33,18 +34,17 @@ def measure(recording: Recording) -> list[Measures]:
     run = recording.run
     if run is None:
         raise RecordingError(f"{recording.path} has no run card, so nobody can say what was played: play it again")
-    accounts: dict[tuple[int, str], _Account] = {}
+    accounts: dict[tuple[int, str], _Account] = defaultdict(_Account)
     for sample in recording:
         match evidence(sample):
             case ObservationGlance() as seen:
-                _of(accounts, seen).see(Question(seen, sample.payload))
+                accounts[seen.episode, seen.side].see(Question(seen, sample.payload))
             case CallGlance() as call:
-                _of(accounts, call).spending.call(call)
+                accounts[call.episode, call.side].spending.call(call)
             case Report() as report:
-                _of(accounts, report).add(report)
+                accounts[report.episode, report.side].add(report)
     results = {(result.episode, result.side): result for result in recording.results}
-    places = sorted({*accounts, *results})
-    return [accounts.get(place, _Account()).row(run, *place, results.get(place)) for place in places]
+    return [accounts[place].row(run, *place, results.get(place)) for place in sorted({*accounts, *results})]
 
 
 class _Account:
@@ -95,7 +95,3 @@ class _Account:
             **vars(self.spending.total()),
             **vars(self._economy.total(identity.game_s)),
         )
-
-
-def _of(accounts: dict[tuple[int, str], _Account], message: ObservationGlance | CallGlance | Report) -> _Account:
-    return accounts.setdefault((message.episode, message.side), _Account())

@@ -52,14 +52,16 @@ class SpendingTally:
         self._endpoints: set[str] = set()
         self._params: set[str] = set()
         self._reported: dict[str, Usage] = defaultdict(Usage)
-        self._called: dict[str, Usage] = defaultdict(Usage)
+        self._paid_usd: dict[str, float] = defaultdict(float)
+        """By agent, what its recorded requests cost."""
 
     def call(self, call: CallGlance) -> None:
         """Take in a request to a model."""
         self._models.add(call.model)
         self._endpoints.add(call.endpoint)
         self._params.add(", ".join(f"{name}={value}" for name, value in sorted(call.params.items())))
-        self._called[call.agent] += call.usage
+        if call.usage.cost_usd is not None:
+            self._paid_usd[call.agent] += call.usage.cost_usd
 
     def add(self, step: Step) -> None:
         """Take in a step."""
@@ -81,14 +83,16 @@ class SpendingTally:
             reasoning_tokens=usage.reasoning_tokens,
             images=usage.images,
             cost_usd=usage.cost_usd,
-            paid_usd=self._paid_usd(),
+            paid_usd=self._paid(),
         )
 
-    def _paid_usd(self) -> float | None:
-        """Return the sum over the agents of what was paid for each: see `khala.minds.spent_usd`."""
-        both = [(self._called[name], self._reported[name]) for name in {*self._called, *self._reported}]
-        costs = [[one.cost_usd for one in pair if one.cost_usd is not None] for pair in both]
-        return sum(max(known) for known in costs if known) if any(costs) else None
+    def _paid(self) -> float | None:
+        """Return what was paid for all agents; the larger sum counts for each, as in `khala.minds.spent_usd`."""
+        paid = dict(self._paid_usd)
+        for agent, usage in self._reported.items():
+            if usage.cost_usd is not None:
+                paid[agent] = max(paid.get(agent, 0.0), usage.cost_usd)
+        return sum(paid.values()) if paid else None
 
 
 def _joined(texts: Iterable[str]) -> str:
