@@ -11,7 +11,19 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.pages import actions, cli, configs, game, knowledge, language, messages, observations, rules, simulator
+from docs.pages import (
+    actions,
+    cli,
+    configs,
+    game,
+    knowledge,
+    language,
+    measures,
+    messages,
+    observations,
+    rules,
+    simulator,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,6 +33,7 @@ REFERENCE = Path(__file__).parent / "reference"
 PAGES: dict[str, Callable[[], str]] = {
     "cli.md": cli.page,
     "messages.md": messages.page,
+    "measures.md": measures.page,
     "observations.md": observations.page,
     "text-language.md": language.page,
     "tasks.md": game.tasks,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import io
+import itertools
 import json
 import re
 import tokenize
@@ -107,6 +108,25 @@ class Describer:
 def about(model: type) -> str:
     """Return the docstring of a model as Markdown."""
     return prose(_null(inspect.cleandoc(model.__doc__ or "")))
+
+
+def attributes(model: type) -> list[tuple[str, str]]:
+    """Return the fields of a dataclass, in order, with the docstring under each as Markdown.
+
+    Raises:
+        LookupError: a field has none.
+    """
+    (body,) = (node.body for node in ast.parse(inspect.getsource(model)).body if isinstance(node, ast.ClassDef))
+    texts = {
+        field.target.id: text.value.value
+        for field, text in itertools.pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
+    }
+    own = [name for name in model.__annotations__ if name not in texts]
+    if own:
+        raise LookupError(f"{model.__name__} says nothing of {', '.join(own)}: write a docstring under each")
+    return [(name, _null(text)) for name, text in texts.items()]
 
 
 def parts(models: Iterable[type[BaseModel]]) -> list[type[BaseModel]]:

@@ -50,7 +50,7 @@ class Communication:
     messages_heeded: int
     """Of `messages_read`: answered, acted on, or both."""
     heeded_share: float | None
-    """`messages_heeded` / `messages_read`, 0 to 1; null if nothing was read."""
+    """`messages_heeded` / `messages_read`, 0 to 1; None if nothing was read."""
 
 
 class CommunicationTally:
@@ -77,7 +77,7 @@ class CommunicationTally:
         wrote_to = {message.recipient.casefold() for message in step.messages if message.sender == agent}
         for message in _read(decision):
             answers = not wrote_to.isdisjoint({message.sender.casefold(), message.recipient.casefold()})
-            acts = is_acted_on(message.text, new, decision.question.whole if decision.question else None)
+            acts = bool(new) and is_acted_on(message.text, new, decision.question.whole if decision.question else None)
             self._read += 1
             self._answered += answers
             self._acted += acts
@@ -112,7 +112,7 @@ def is_acted_on(text: str, orders: Collection[str], seen: Observation | None) ->
         seen: the observation in which the reader found the message.
     """
     tags, points = {tag.casefold() for tag in _TAG.findall(text)}, [*_points(text), *_places(text, seen)]
-    types = {unit.tag.casefold(): unit.type for unit in _units(seen)} if orders else {}
+    types = {unit.tag.casefold(): unit.type for unit in _units(seen)}
     for name, arguments in (found.groups() for order in orders if (found := _ORDER.search(order))):
         targets = {tag.casefold() for tag in _TAG.findall(arguments)}
         if not tags.isdisjoint(targets):

@@ -20,7 +20,7 @@ HALLS = frozenset({"Nexus", "CommandCenter", "Hatchery"})
 
 @dataclass(frozen=True, kw_only=True)
 class Economy:
-    """Economy of a full game. All null if no agent of the side ever saw a town hall of its own in its counts.
+    """Economy of a full game. All None if no agent of the side ever saw a town hall of its own in its counts.
 
     Commanders, developers and builders have these numbers in their observations. What one observation says holds until
     the next one, of any of them.
@@ -34,11 +34,11 @@ class Economy:
     """Unspent vespene, mean over time."""
     expansion_s: float | None
     """Seconds on the game's clock at which there was first seen to be a town hall more than at the beginning, under
-    construction or finished; null if there was none."""
+    construction or finished; None if there was none."""
     workers_5min: int | None
-    """Finished workers at 5:00 on the game's clock; null if the episode ended before."""
+    """Finished workers at 5:00 on the game's clock; None if the episode ended before."""
     army_supply_5min: float | None
-    """Supply that is used by all but finished workers, at 5:00; null if the episode ended before."""
+    """Supply that is used by all but finished workers, at 5:00; None if the episode ended before."""
     workers_end: int | None
     """Finished workers in the last observation."""
     army_supply_end: float | None

@@ -3,7 +3,7 @@
 The kinds are those of the paper (LLM-PySC2, arXiv 2411.05348) and of the survey that names them (arXiv 2309.01219).
 The survey counts a contradiction of anything in the prompt as input-conflicting. Here the part of the prompt that stays
 the same all episode is the input, and what observations said is the context, so that a model that does not follow
-instructions can be told from one that loses track of the game. `KINDS` is the whole mapping.
+instructions can be distinguished from one that loses track of the game. `KINDS` is the whole mapping.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Hallucinations:
     """Hallucinations, by kind. The three kinds and `not_hallucinated` add up to `rejected`."""
 
     calls: int
-    """Calls that policies said: accepted, rejected, and messages that had a recipient. Default replies do not count."""
+    """Calls that policies said: accepted, rejected, and messages. Those of the task's default reply do not count."""
     input_conflicting: int
     """Rejected calls that break the rules of the prompt."""
     context_conflicting: int
@@ -70,9 +70,9 @@ class Hallucinations:
     those that are `outdated`."""
     outdated: int
     """Rejected calls that were right when the agent saw the game, and wrong when they took effect: the observation
-    listed the team, the tag, or the action as valid. None with the clock `frozen`."""
+    listed the team, the tag, or the action as valid. Always 0 with the clock `frozen`."""
     hallucinated_share: float | None
-    """Hallucinations of all three kinds / `calls`, 0 to 1; null without calls."""
+    """Hallucinations of all three kinds / `calls`, 0 to 1; None without calls."""
 
 
 class HallucinationTally:

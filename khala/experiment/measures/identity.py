@@ -52,7 +52,7 @@ class Identity:
     game_s: float
     """Seconds on the game's clock."""
     wall_s: float | None
-    """Seconds of wall time; null if it is unfinished, like all that follows."""
+    """Seconds of wall time; None if it is unfinished, like all that follows."""
     killed_value: float | None
     """Minerals and vespene that the killed units had cost."""
     killed_units: int | None
@@ -62,7 +62,7 @@ class Identity:
     lost_units: int | None
     """Number of units lost."""
     kd: float | None
-    """Value killed / value lost; null if nothing was lost."""
+    """Value killed / value lost; None if nothing was lost."""
     score: float | None
     """The game's score at the end."""
 

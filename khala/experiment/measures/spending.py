@@ -39,7 +39,7 @@ class Spending:
     images: int
     """Pictures sent along."""
     cost_usd: float | None
-    """US dollars of the requests whose price is known, as the result has them; null if no price is known."""
+    """US dollars of the requests whose price is known, as the result has them; None if no price is known."""
     paid_usd: float | None
     """The same with requests whose answers came too late for any report: what the endpoints charged."""
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """Time of the decisions that arrived, as the result has it; all null if none arrived, or without a result."""
+    """Time of the decisions that arrived, as the result has it; all None if none arrived, or without a result."""
 
     latency_p50_s: float | None
     """Median of the seconds from observation to reply, on the host's clock."""
