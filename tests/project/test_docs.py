@@ -23,6 +23,7 @@ import typer
 from docs import generate
 from docs.generate import PAGES, REFERENCE, main, outdated, write
 from docs.pages.markdown import anchor, cell, table
+from docs.pages.schema import attributes
 from khala import testing
 from khala.cli import app
 from khala_agents.config import AgentsFile, ModelConfig
@@ -300,6 +301,25 @@ def test_links_lead_somewhere(subtests: pytest.Subtests) -> None:
                 if not file.exists() or not file.is_relative_to(ROOT) or (title and f"#{title}" not in anchors(file)):
                     broken.append(target)
             assert not broken
+
+
+def test_a_column_without_a_word_about_it_cannot_be_documented() -> None:
+    assert [name for name, _ in attributes(Described)] == ["wordy"]
+    with pytest.raises(LookupError, match="Silent says nothing of mute: write a docstring under each"):
+        attributes(Silent)
+
+
+class Described:
+    """A class whose field has a docstring."""
+
+    wordy: int
+    """About it."""
+
+
+class Silent:
+    """A class with a field that has none."""
+
+    mute: int
 
 
 def test_every_page_can_be_found_from_the_map_of_the_documentation() -> None:
