@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
+from khala.experiment.measures.evidence import tags
 from khala_bridge.knowledge import knowledge
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 NEAR_MINIMAP = 4.0
 """Cells of the minimap, 1/16 of its width, within which two points are the same place."""
-_TAG = re.compile(r"0x[0-9a-f]+", re.IGNORECASE)
 _POINT = re.compile(r"[\[(]\s*(\d+(?:\.\d+)?)\s*,\s*(\d+(?:\.\d+)?)\s*[\])]")
 _ORDER = re.compile(r"<(?:Standing\()?(\w+)(.*)>", re.DOTALL)
 
@@ -32,13 +32,16 @@ _ORDER = re.compile(r"<(?:Standing\()?(\w+)(.*)>", re.DOTALL)
 class Communication:
     """Communication between the agents of a side. Advice from outside is not among it.
 
-    Whether a message was true is not measured: only a person or a known script could say what it meant.
+    Whether a message was true is measured as far as its tags say: what else it meant, only a person could say.
     """
 
     messages_sent: int
     """Messages that agents wrote, undeliverable ones among them."""
     messages_undeliverable: int
     """Of these: to nobody that the sender can write to."""
+    messages_unfounded: int | None
+    """Of `messages_sent`: it names a tag that was not in the observation from which it was written; None if no message
+    named a tag."""
     messages_read: int
     """Pairs of a message and a reader, where the message stood in an observation that the reader's policy answered.
     What an observation shows again does not count again."""
@@ -58,6 +61,7 @@ class CommunicationTally:
 
     def __init__(self) -> None:
         self._sent = self._undeliverable = self._read = self._answered = self._acted = self._heeded = 0
+        self._tagged = self._unfounded = 0
         self._orders: dict[str, frozenset[str]] = {}
         """By agent, the orders of its last answer."""
 
@@ -68,7 +72,16 @@ class CommunicationTally:
         self._undeliverable += reasons.count("unknown_recipient")
         for decision in step.decisions:
             if decision.is_of_policy:
+                self._check(decision, step)
                 self._answer(decision, step)
+
+    def _check(self, decision: Decision, step: Step) -> None:
+        """Look for the tags of an agent's messages in the observation from which it wrote them."""
+        for message in step.messages:
+            named = tags(message.text) if message.sender == decision.report.agent else frozenset()
+            if named and decision.question and decision.question.whole:
+                self._tagged += 1
+                self._unfounded += not named <= tags(decision.question.whole.text)
 
     def _answer(self, decision: Decision, step: Step) -> None:
         agent, given = decision.report.agent, frozenset(decision.report.accepted)
@@ -88,6 +101,7 @@ class CommunicationTally:
         return Communication(
             messages_sent=self._sent,
             messages_undeliverable=self._undeliverable,
+            messages_unfounded=self._unfounded if self._tagged else None,
             messages_read=self._read,
             messages_answered=self._answered,
             messages_acted_on=self._acted,
@@ -111,11 +125,11 @@ def is_acted_on(text: str, orders: Collection[str], seen: Observation | None) ->
         orders: as they were accepted, `Stalker-1 <Attack_Unit(0x1)>`.
         seen: the observation in which the reader found the message.
     """
-    tags, points = {tag.casefold() for tag in _TAG.findall(text)}, [*_points(text), *_places(text, seen)]
+    named, points = tags(text), [*_points(text), *_places(text, seen)]
     types = {unit.tag.casefold(): unit.type for unit in _units(seen)}
     for name, arguments in (found.groups() for order in orders if (found := _ORDER.search(order))):
-        targets = {tag.casefold() for tag in _TAG.findall(arguments)}
-        if not tags.isdisjoint(targets):
+        targets = tags(arguments)
+        if not named.isdisjoint(targets):
             return True
         if any(_names_type(text, type_) for type_ in (*name.split("_"), *(types.get(tag, "") for tag in targets))):
             return True

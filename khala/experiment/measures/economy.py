@@ -38,11 +38,11 @@ class Economy:
     workers_5min: int | None
     """Finished workers at 5:00 on the game's clock; None if the episode ended before."""
     army_supply_5min: float | None
-    """Supply that is used by all but finished workers, at 5:00; None if the episode ended before."""
+    """Supply that is used by all but workers, finished or in training, at 5:00; None if the episode ended before."""
     workers_end: int | None
     """Finished workers in the last observation."""
     army_supply_end: float | None
-    """Supply that is used by all but finished workers, in the last observation."""
+    """Supply that is used by all but workers, finished or in training, in the last observation."""
     bases_end: int | None
     """Finished town halls in the last observation."""
 
@@ -132,6 +132,7 @@ _NONE = Economy(
 def _state(view: ViewGlance, counts: CountsGlance) -> _State:
     has = view.resources
     workers = sum(count.ready for count in counts.units if _is_worker(count.type))
+    training = sum(len(made.progress) for made in counts.production if _is_worker(made.order.removeprefix("Train_")))
     halls = [count for count in counts.structures if _is_hall(count.type)]
     return _State(
         time_s=view.time_s,
@@ -139,7 +140,7 @@ def _state(view: ViewGlance, counts: CountsGlance) -> _State:
         vespene=has.vespene,
         blocked=has.supply_used >= has.supply_cap and has.supply_cap < MAX_SUPPLY,
         workers=workers,
-        army_supply=has.supply_used - workers,
+        army_supply=has.supply_used - workers - training,
         halls=sum(hall.ready + len(hall.under_way) for hall in halls),
         bases=sum(hall.ready for hall in halls),
     )

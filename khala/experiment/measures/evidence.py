@@ -7,6 +7,7 @@ kept: an agent is not asked again before its decision took effect.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -16,7 +17,17 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
-from khala_protocol.messages import AgentReport, Count, Observation, Received, Report, Resources, TypeCount, Usage
+from khala_protocol.messages import (
+    AgentReport,
+    Count,
+    Observation,
+    Production,
+    Received,
+    Report,
+    Resources,
+    TypeCount,
+    Usage,
+)
 from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
 
 if TYPE_CHECKING:
@@ -38,10 +49,11 @@ class _Glance(BaseModel):
 
 
 class CountsGlance(BaseModel):
-    """The numbers of a side's units and structures."""
+    """The numbers of a side's units and structures, and what is in production."""
 
     units: tuple[TypeCount, ...] = ()
     structures: tuple[TypeCount, ...] = ()
+    production: tuple[Production, ...] = ()
 
 
 class ViewGlance(BaseModel):
@@ -85,6 +97,14 @@ def evidence(sample: Recorded) -> Evidence | None:
         return kind.model_validate_json(sample.payload)
     except ValidationError:
         return None
+
+
+_TAG = re.compile(r"0x[0-9a-f]+", re.IGNORECASE)
+
+
+def tags(text: str) -> frozenset[str]:
+    """Return the tags in a text, in small letters."""
+    return frozenset(tag.casefold() for tag in _TAG.findall(text))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
+from khala.experiment.measures.evidence import tags
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
@@ -49,7 +51,6 @@ KINDS: Mapping[RejectionReason, Judgement] = {
 }
 """Every reason for a rejection."""
 
-_TAG = re.compile(r"0x[0-9a-f]+", re.IGNORECASE)
 _NAME = re.compile(r"<(?:Standing\()?\s*(\w+)")
 
 
@@ -137,8 +138,7 @@ def is_outdated(rejection: Rejection, decision: Decision) -> bool:
 
 def _has_shown_all(rejection: Rejection, seen: Observation) -> bool:
     """Return True if the observation has every tag of a call."""
-    shown = {tag.casefold() for tag in _TAG.findall(seen.text)}
-    return {tag.casefold() for tag in _TAG.findall(rejection.text)} <= shown
+    return tags(rejection.text) <= tags(seen.text)
 
 
 def _has_offered(rejection: Rejection, seen: Observation) -> bool:

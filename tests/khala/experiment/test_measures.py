@@ -38,6 +38,7 @@ from khala_protocol.messages import (
     ModelCall,
     Observation,
     Place,
+    Production,
     Received,
     Rejection,
     RejectionReason,
@@ -362,6 +363,17 @@ def test_a_message_is_heeded_once_by_an_order_that_is_new_or_by_an_answer(tmp_pa
     assert row.heeded_share == pytest.approx(2 / 3)
 
 
+def test_a_message_is_unfounded_if_its_sender_did_not_see_what_it_names(tmp_path: Path) -> None:
+    founded, unfounded, plain = (
+        Received(sender="A", recipient="B", text=text) for text in ("Kill 0X1!", "Kill 0x1 and 0x2!", "Kill them!")
+    )
+    steps = [KNEW, report(0, decided(), messages=(founded, unfounded, plain)), result()]
+    (row,) = measure(recorded(tmp_path / "tags.mcap", CARD, *steps))
+    assert (row.messages_sent, row.messages_unfounded) == (3, 1)
+    (row,) = measure(recorded(tmp_path / "plain.mcap", CARD, KNEW, report(0, decided(), messages=(plain,)), result()))
+    assert (row.messages_sent, row.messages_unfounded) == (1, None)
+
+
 # --- economy ----------------------------------------------------------------------------------------------------------
 
 
@@ -369,7 +381,8 @@ def at(
     time_s: float, *, agent: str = "A", probes: int = 12, used: float = 12, cap: float = 15, **more: Any
 ) -> Observation:
     halls = TypeCount(type="Nexus", ready=more.get("halls", 1), under_way=more.get("begun", ()))
-    counts = Counts(units=(TypeCount(type="Probe", ready=probes),), structures=(halls,))
+    training = Production(order="Train_Probe", progress=(0.5,) * more.get("training", 0))
+    counts = Counts(units=(TypeCount(type="Probe", ready=probes),), structures=(halls,), production=(training,))
     has = Resources(minerals=more.get("minerals", 50), vespene=0, supply_used=used, supply_cap=cap)
     return seen(agent, round(time_s), time_s=time_s, resources=has, counts=counts)
 
@@ -380,14 +393,14 @@ def test_the_economy_is_what_observations_say_until_the_next_one(tmp_path: Path)
         at(0), at(0, agent="B", minerals=9999),  # the same moment
         at(100, probes=15, used=15, minerals=200),  # blocked, until 110
         at(110, probes=16, used=16, cap=23, begun=(0.01,), minerals=0),
-        at(300, probes=30, used=44, cap=60, halls=2),
+        at(300, probes=30, used=44, cap=60, halls=2, training=2),
         at(310, probes=30, used=200, cap=200, halls=2, minerals=100),  # the most there is
         report(), result(game_s=320.0),
     )  # fmt: skip
     (row,) = measure(recording)
     assert (row.supply_blocked_s, row.expansion_s) == (10.0, 110.0)
     assert row.minerals_mean == pytest.approx((50 * 100 + 200 * 10 + 0 * 190 + 50 * 10 + 100 * 10) / 320)
-    assert (row.workers_5min, row.army_supply_5min) == (30, 14.0)
+    assert (row.workers_5min, row.army_supply_5min) == (30, 12.0)
     assert (row.workers_end, row.army_supply_end, row.bases_end) == (30, 170.0, 2)
 
 
