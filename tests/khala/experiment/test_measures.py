@@ -424,6 +424,17 @@ def test_bytes_that_are_no_message_are_passed_over(tmp_path: Path) -> None:
     assert (row.accepted, row.messages_read) == (1, 0)
 
 
+def test_an_observation_with_a_field_of_a_later_version_still_has_its_economy(tmp_path: Path) -> None:
+    newer = encode(at(0)).replace(b'"text":', b'"mood":"good","text":')
+    aged = decided(rejections=(rejected("dead_target", "<X(0x1)>"),), age_loops=8, asked_step=0)
+    with Recorder(tmp_path / "r.mcap") as recorder:
+        recorder.write(run_key(RUN, Topic.RUN), encode(CARD))
+        recorder.write(agent_key(RUN, "blue", "A", Topic.OBSERVATION), newer)
+        recorder.write(run_key(RUN, Topic.REPORT), encode(report(1, aged)))
+    (row,) = measure(Recording.open(tmp_path / "r.mcap"))
+    assert (row.bases_end, row.context_conflicting, row.outdated) == (1, 1, 0)  # what it showed is not known
+
+
 def test_a_recording_without_a_run_card_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="has no run card, so nobody can say what was played"):
         measure(recorded(tmp_path / "r.mcap", report()))
