@@ -16,9 +16,6 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.recording import step_samples
 from khala.experiment.measures import measure
 from khala_protocol.codec import encode
@@ -80,7 +77,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="*", type=Path)
     parser.add_argument("--steps", type=int, default=100, help="of the made-up recording")
-    parser.add_argument("--json", action="store_true", help="one JSON array instead of a table")
+    parser.add_argument("--json", action="store_true", help="one JSON array instead of lines")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as directory:
         paths = options.recordings or [make(Path(directory) / "bench.mcap", options.steps)]
@@ -88,10 +85,8 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    table = Table(*rows[0])
     for row in rows:
-        table.add_row(*map(str, row.values()))
-    Console().print(table)
+        print("\n".join(f"{name:24} {value}" for name, value in row.items()), end="\n\n")
 
 
 if __name__ == "__main__":
