@@ -2,7 +2,7 @@
 
     NAME/experiment.yaml                    as it was given
     NAME/matches/KEY/recording.mcap         one directory for each match, under the hash of what it plays
-    NAME/index.sqlite                       tables `matches` and `results`
+    NAME/index.sqlite                       tables `matches`, `results` and `calls`
 
 The recordings are the truth: `rebuild` makes the index of them. A recording without a result is of a match that was
 interrupted or crashed, and stays beside the one of the next try.
@@ -15,11 +15,11 @@ import fcntl
 import json
 import shutil
 import sqlite3
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from khala.experiment.measures import Measures, measure
+from khala.experiment.measures import CallCount, Measures, measure_with_calls
 from khala.experiment.plan import FACTOR
 from khala.experiment.spec import Experiment
 from khala.matches import free_recording
@@ -29,12 +29,13 @@ from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from khala.experiment.plan import PlannedMatch
     from khala_protocol.messages import Run
 
+Row = tuple[Measures, list[CallCount]]
 State = Literal["done", "invalid", "crashed"]
 """`invalid`: it was played, and says nothing about its agents; `crashed`: it was not played to its end."""
 FILE, INDEX, MATCHES, LOGS, LOCK = "experiment.yaml", "index.sqlite", "matches", "logs", ".lock"
@@ -45,6 +46,11 @@ create table matches (
     state text not null, cause text not null, attempts integer not null, recording text not null,
     wall_s real, cost_usd real, tokens integer, card text not null
 );
+create table calls (
+    match text not null, episode integer not null, side text not null,
+    agent text not null, action text not null, became text not null, count integer not null
+);
+create index calls_of_match on calls(match);
 """
 _TYPES = {"str": "text", "int": "integer", "float": "real", "bool": "integer"}
 
@@ -142,15 +148,19 @@ class Store:
                             f"results(match); pragma user_version = {VERSION};")  # fmt: skip
         index.commit()
 
-    def add(self, played: Played, rows: list[Measures]) -> None:
+    def add(self, played: Played, rows: Sequence[Row]) -> None:
         """Note what became of a match; it replaces what was known of it."""
         values = [getattr(played, name) for name in Played.__slots__]
         plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
         names = list(result_columns())
         with self._index as index:
-            index.execute("delete from results where match = ?", (played.key,))
+            for table in ("results", "calls"):
+                index.execute(f"delete from {table} where match = ?", (played.key,))  # noqa: S608
             index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks
-            for row in rows:
+            for row, calls in rows:
+                place = played.key, row.episode, row.side
+                counts = [(*place, *astuple(call)) for call in calls]
+                index.executemany("insert into calls values (?, ?, ?, ?, ?, ?, ?)", counts)
                 values = [played.key, *(getattr(row, name) for name in names)]
                 index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
 
@@ -166,6 +176,10 @@ class Store:
         matches = self.played()
         rows = [dict(row) for row in self._index.execute("select * from results order by rowid")]
         return [_joined(matches[row.pop("match")], row) for row in rows]
+
+    def calls(self) -> list[dict[str, Any]]:
+        """Return what became of calls, by match, episode, side, agent and action."""
+        return [dict(row) for row in self._index.execute("select * from calls order by rowid")]
 
     def rebuild(self) -> int:
         """Make the index anew of the recordings, and return the number of matches."""
@@ -183,7 +197,7 @@ class Store:
         if (found := self.read(path, attempts=attempts)) is not None:
             self.add(*found)
 
-    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Measures]] | None:
+    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
 
         Args:
@@ -197,10 +211,10 @@ class Store:
             return None
         if (card := recording.run) is None:
             return None
-        rows = measure(recording) if recording.results else []
+        rows = measure_with_calls(recording)
         costs = [_cost_usd(other) for other in path.parent.glob("recording*.mcap") if other != path]
-        costs += [row.cost_usd for row in rows] if rows else [_cost_usd(path)]
-        played = _judged(card, rows, str(path.relative_to(self.directory)), attempts, crash)
+        costs += [row.paid_usd for row, _ in rows]
+        played = _judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
         known = [cost for cost in costs if cost is not None]
         played = replace(played, cost_usd=sum(known) if known else None)
         return played, rows

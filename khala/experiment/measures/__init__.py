@@ -10,7 +10,8 @@ identity … economy   a group each: what its numbers mean, and how they are fou
 Above it: the store, the statistics and the reports of experiments. Nothing here compares runs.
 """
 
-from khala.experiment.measures.reading import measure
+from khala.experiment.measures.calls import CallCount
+from khala.experiment.measures.reading import measure, measure_with_calls
 from khala.experiment.measures.row import GROUPS, Measures
 
-__all__ = ["GROUPS", "Measures", "measure"]
+__all__ = ["GROUPS", "CallCount", "Measures", "measure", "measure_with_calls"]

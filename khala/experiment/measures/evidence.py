@@ -75,6 +75,7 @@ class CallGlance(_Glance):
     """What measures need of a request to a model."""
 
     model: str
+    answered_by: str = ""
     endpoint: str
     params: dict[str, str | int | float | bool | None] = {}
     usage: Usage = Usage()

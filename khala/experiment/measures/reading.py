@@ -6,6 +6,7 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from khala.experiment.measures.actions import ActionTally
+from khala.experiment.measures.calls import CallCount, CallTally
 from khala.experiment.measures.communication import CommunicationTally
 from khala.experiment.measures.economy import EconomyTally
 from khala.experiment.measures.evidence import CallGlance, Decision, ObservationGlance, Question, Step, evidence
@@ -31,6 +32,11 @@ def measure(recording: Recording) -> list[Measures]:
     Raises:
         RecordingError: the recording has no run card.
     """
+    return [row for row, _ in measure_with_calls(recording)]
+
+
+def measure_with_calls(recording: Recording) -> list[tuple[Measures, list[CallCount]]]:
+    """Return the same rows, each with the calls of its agents; errors as in `measure`."""
     run = recording.run
     if run is None:
         raise RecordingError(f"{recording.path} has no run card, so nobody can say what was played: play it again")
@@ -44,7 +50,10 @@ def measure(recording: Recording) -> list[Measures]:
             case Report() as report:
                 accounts[report.episode, report.side].add(report)
     results = {(result.episode, result.side): result for result in recording.results}
-    return [accounts[place].row(run, *place, results.get(place)) for place in sorted({*accounts, *results})]
+    return [
+        (accounts[place].row(run, *place, results.get(place)), accounts[place].calls.total())
+        for place in sorted({*accounts, *results})
+    ]
 
 
 class _Account:
@@ -57,6 +66,7 @@ class _Account:
         self._hallucinations, self._communication = HallucinationTally(), CommunicationTally()
         self._economy = EconomyTally()
         self.spending = SpendingTally()
+        self.calls = CallTally()
 
     def see(self, question: Question) -> None:
         """Take in an observation."""
@@ -73,6 +83,7 @@ class _Account:
             self._hallucinations,
             self._communication,
             self.spending,
+            self.calls,
         ):
             tally.add(step)
 

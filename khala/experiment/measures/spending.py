@@ -19,7 +19,9 @@ class Spending:
     """Models, tokens and money. Values of several agents are sorted, and joined by `; `."""
 
     models: str
-    """Names of the models, as their endpoints call them; empty if no request was recorded."""
+    """Names of the models, as they were asked for; empty if no request was recorded."""
+    answered_by: str
+    """Names of the models that answered, as their endpoints call them; empty if none said."""
     endpoints: str
     """Base URLs of their endpoints."""
     params: str
@@ -49,6 +51,7 @@ class SpendingTally:
 
     def __init__(self) -> None:
         self._models: set[str] = set()
+        self._answered_by: set[str] = set()
         self._endpoints: set[str] = set()
         self._params: set[str] = set()
         self._reported: dict[str, Usage] = defaultdict(Usage)
@@ -58,6 +61,7 @@ class SpendingTally:
     def call(self, call: CallGlance) -> None:
         """Take in a request to a model."""
         self._models.add(call.model)
+        self._answered_by.add(call.answered_by)
         self._endpoints.add(call.endpoint)
         self._params.add(", ".join(f"{name}={value}" for name, value in sorted(call.params.items())))
         if call.usage.cost_usd is not None:
@@ -73,6 +77,7 @@ class SpendingTally:
         usage = sum(self._reported.values(), Usage())
         return Spending(
             models=_joined(self._models),
+            answered_by=_joined(self._answered_by),
             endpoints=_joined(self._endpoints),
             params=_joined(self._params),
             requests=usage.requests,
