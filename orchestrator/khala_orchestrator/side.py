@@ -241,6 +241,7 @@ class Side:
     ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
         heard = {seat.agent: self._heard(seat, played, result) for seat in self.seats}
+        before, after = self._now.snapshot.score, result.snapshot.score
         self._deliver(played.post)
         for agent, feedback in heard.items():
             self._pending[agent] = _joined(self._pending[agent], feedback)
@@ -255,7 +256,9 @@ class Side:
             advisers=tuple(m.agent for m in played.post.taken if m.human),
             functions=result.played.functions,
             env_steps=result.env_steps,
-            score=result.snapshot.score.total,
+            score=after.total,
+            killed_value=after.killed - before.killed,
+            lost_value=after.lost - before.lost,
             unasked={seat.agent: why for seat, why in unasked.items() if seat.side == self.name},
             incidents=tuple(incidents),
             timings=timings,

@@ -947,6 +947,11 @@ class Report(Wire):
     env_steps: int = 0
     """Number of `SC2Env.step` calls of the joint action."""
     score: float = 0.0
+    killed_value: float | None = None
+    """Minerals + vespene of what the side destroyed in this step; over an episode they sum up to that of its result.
+    None in recordings of versions that did not say."""
+    lost_value: float | None = None
+    """Minerals + vespene of what the side lost in this step."""
     unasked: dict[str, Unasked] = {}
     """By agent that could have been asked in this step, why it was not: it has no units to command, or its
     `every_loops` and `when` put it off. Those who still think are not among them."""
