@@ -22,6 +22,7 @@ import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
+from khala.dataset.cli import app as dataset
 from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.cli import app as experiment
 from khala.keys import app as keys
@@ -302,6 +303,7 @@ for command, epilog in (
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
+app.add_typer(dataset, name="dataset")
 app.add_typer(experiment, name="experiment")
 app.add_typer(keys, name="keys")
 app.add_typer(khala_simulator.cli.app, name="sc2")

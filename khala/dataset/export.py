@@ -1,0 +1,130 @@
+"""Recordings → a data set: find the files, read their rows, choose, write, and say what is in it."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from khala.dataset.card import NAME, Contents, card
+from khala.dataset.files import Files
+from khala.dataset.rows import Rows
+from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.keys import Topic
+from khala_protocol.recording import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from khala.dataset.card import Recipe
+    from khala.dataset.rows import Row
+
+log = logging.getLogger(__name__)
+
+LOST = ".lost-"
+"""In the name of a recording that a whole one stands beside, see `khala.hosting`."""
+
+
+def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
+    """Write a data set, and return what is in it.
+
+    Args:
+        sources: recordings, and directories in which they are searched for.
+        out: the directory, which must not exist yet or be empty.
+        recipe: which rows, in which forms.
+
+    Raises:
+        ConfigError: there is no recording, no row, or something in the way.
+        RecordingError: a named file is no recording.
+    """
+    _require_empty(out)
+    contents = Contents()
+    recordings = list(_opened(sources, contents))
+    try:
+        with Files(out, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
+            for recording in recordings:
+                for row in _rows(recording, recipe, contents):
+                    split = recipe.split.part(row)
+                    files.write(split, row)
+                    contents.add(split, row)
+        if not contents.rows:
+            raise ConfigError(_nothing(contents), source="--only" if recipe.choice.only else None)
+        for form in recipe.formats:
+            (out / form / NAME).write_text(card(contents, recipe, form), encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot be written: {error.strerror}", source=str(error.filename or out)) from None
+    return contents
+
+
+def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[Row]:
+    """Yield the rows of a recording that are exported; count the other decisions."""
+    assert recording.run is not None
+    rows = Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images)
+    for row in rows:
+        if why := recipe.choice.why_not(row):
+            contents.left_out[why] += 1
+        else:
+            yield row
+    contents.left_out += rows.left_out
+
+
+def _opened(sources: Sequence[Path], contents: Contents) -> Iterator[Recording]:
+    seen: set[Path] = set()
+    for source in sources:
+        for path in _found(source):
+            if path.resolve() in seen:
+                continue
+            seen.add(path.resolve())
+            recording = _recording(path, named=path == source)
+            if recording is None:
+                contents.unread += 1
+            else:
+                contents.recordings += 1
+                yield recording
+
+
+def _found(source: Path) -> Sequence[Path]:
+    if not source.is_dir():
+        return [source]
+    found = sorted(path for path in source.rglob("*.mcap") if LOST not in path.name)
+    if not found:
+        raise ConfigError("holds no recordings (*.mcap)", source=str(source))
+    return found
+
+
+def _recording(path: Path, *, named: bool) -> Recording | None:
+    """Return a recording of a match; None for one that was found in a directory and is none.
+
+    Raises:
+        RecordingError: it was named, and is none.
+    """
+    try:
+        return _match(path)
+    except RecordingError as error:
+        if named:
+            raise
+        log.warning("%s; it is left out", error)
+        return None
+
+
+def _match(path: Path) -> Recording:
+    recording = Recording.open(path)
+    if recording.run is None:
+        raise RecordingError(f"{path} has no run card: it was ended before the match began")
+    return recording
+
+
+def _has_pictures(recordings: Sequence[Recording], recipe: Recipe) -> bool:
+    """Return whether the data set has pictures: a column has one type, in rows without any, too."""
+    keys = (key for recording in recordings for key in recording.counts)
+    return recipe.images and any(f"/{Topic.IMAGE}/" in key for key in keys)
+
+
+def _require_empty(out: Path) -> None:
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ConfigError("is there already, and is not empty: name another directory", source=str(out))
+
+
+def _nothing(contents: Contents) -> str:
+    left_out = ", ".join(f"{reason}: {count}" for reason, count in sorted(contents.left_out.items()) if count)
+    return f"no decision is left to export ({left_out or 'the recordings hold none'})"

@@ -1,0 +1,214 @@
+"""Rows → files: for each form a folder with a file for each split, made when its first row comes."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+from khala.dataset import forms
+from khala_protocol.errors import ConfigError
+from khala_protocol.files import MB
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+    from typing import TextIO
+
+    from khala.dataset.rows import Row
+
+ROW_GROUP_BYTES = 16 * MB
+"""Rows are written to Parquet when they have so many bytes; a reader needs as much memory."""
+ROW_GROUP_ROWS = 1000
+
+
+class Form(StrEnum):
+    """A form of rows: a folder of a data set."""
+
+    PARQUET = "parquet"
+    OPENAI = "openai"
+    SHAREGPT = "sharegpt"
+
+    @property
+    def suffix(self) -> str:
+        """The end of the names of its files."""
+        return "parquet" if self is Form.PARQUET else "jsonl"
+
+
+class Writer(Protocol):
+    """What writes the rows of one split."""
+
+    def write(self, row: Row) -> None:
+        """Write a row."""
+        ...
+
+    def close(self) -> None:
+        """End the file."""
+        ...
+
+
+class Files:
+    """The files of a data set. A context manager.
+
+    Args:
+        directory: of the data set.
+        formats: each form once.
+        images: whether it has pictures.
+    """
+
+    def __init__(self, directory: Path, formats: tuple[Form, ...], *, images: bool) -> None:
+        self._directory, self._formats, self._images = directory, formats, images
+        self._writers: dict[tuple[Form, str], Writer] = {}
+        self._stack = ExitStack()
+        if Form.PARQUET in formats:
+            import_pyarrow()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def write(self, split: str, row: Row) -> None:
+        """Write a row in every form."""
+        for form in self._formats:
+            writer = self._writers.get((form, split))
+            if writer is None:
+                path = self._directory / form / f"{split}.{form.suffix}"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                writer = self._writers[form, split] = _WRITERS[form](path, self._images)
+                self._stack.callback(writer.close)
+            writer.write(row)
+
+
+class OpenAI:
+    """Chats in OpenAI's form, one a line; pictures stand in them as data URLs."""
+
+    def __init__(self, path: Path, images: bool) -> None:
+        self._file: TextIO = path.open("w", encoding="utf-8", newline="\n")
+        self._images = images
+
+    def write(self, row: Row) -> None:
+        """Write a row."""
+        self._file.write(json.dumps(forms.openai(row, images=self._images)) + "\n")
+
+    def close(self) -> None:
+        """End the file."""
+        self._file.close()
+
+
+class ShareGPT:
+    """Chats in ShareGPT's form, one a line; each picture is a file of its own, written once."""
+
+    def __init__(self, path: Path, images: bool) -> None:
+        self._file: TextIO = path.open("w", encoding="utf-8", newline="\n")
+        self._images, self._pictures = images, path.with_name("images")
+        if images:
+            self._pictures.mkdir(exist_ok=True)
+
+    def write(self, row: Row) -> None:
+        """Write a row, and its pictures."""
+        for picture in row.pictures if self._images else ():
+            path = self._pictures / picture.file_name
+            if not path.exists():
+                path.write_bytes(picture.data)
+        self._file.write(json.dumps(forms.sharegpt(row, images=self._images)) + "\n")
+
+    def close(self) -> None:
+        """End the file."""
+        self._file.close()
+
+
+class Parquet:
+    """All that is known of each row, with the pictures as a column that `datasets` decodes."""
+
+    def __init__(self, path: Path, images: bool) -> None:
+        pa, pq = import_pyarrow()
+        self._pa, self._images = pa, images
+        self._schema = _schema(pa)
+        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._rows: list[dict[str, Any]] = []
+        self._bytes = 0
+
+    def write(self, row: Row) -> None:
+        """Take a row; rows are written in groups."""
+        self._rows.append(_plain(row, images=self._images))
+        self._bytes += sum(len(message.content) for message in row.prompt)
+        self._bytes += sum(len(picture.data) for picture in row.pictures)
+        if self._bytes > ROW_GROUP_BYTES or len(self._rows) == ROW_GROUP_ROWS:
+            self._flush()
+
+    def close(self) -> None:
+        """Write the last group, and end the file."""
+        self._flush()
+        self._writer.close()
+
+    def _flush(self) -> None:
+        if self._rows:
+            self._writer.write_table(self._pa.Table.from_pylist(self._rows, schema=self._schema))
+            self._rows, self._bytes = [], 0
+
+
+_WRITERS: dict[Form, Callable[[Path, bool], Writer]] = {
+    Form.PARQUET: Parquet,
+    Form.OPENAI: OpenAI,
+    Form.SHAREGPT: ShareGPT,
+}
+
+
+def import_pyarrow() -> tuple[Any, Any]:
+    """Return pyarrow and its module for Parquet.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import pyarrow  # type: ignore[import-untyped]  # noqa: PLC0415, ICN001  # an extra
+        import pyarrow.parquet  # type: ignore[import-untyped]  # noqa: PLC0415
+    except ImportError:
+        raise ConfigError('Parquet needs pyarrow, which is not installed: pip install "khala[data]"') from None
+    return pyarrow, pyarrow.parquet
+
+
+def _schema(pa: Any) -> Any:
+    """Return the columns. The metadata say to `datasets` that the pictures are some."""
+    text, whole, number = pa.string(), pa.int64(), pa.float64()
+    fields = {
+        "id": text, "run": text, "task": text, "map": text, "game": text, "seed": whole,
+        "side": text, "agent": text, "episode": whole, "step": whole, "game_loop": whole,
+        "prompt": pa.list_(pa.struct({"role": text, "content": text})), "prompt_recorded": pa.bool_(),
+        "images": pa.list_(pa.struct({"bytes": pa.binary(), "path": text})), "image_titles": pa.list_(text),
+        "reply": text, "status": text, "model": text,
+        "accepted": pa.list_(text),
+        "rejected": pa.list_(pa.struct({"reason": text, "message": text, "text": text, "team": text})),
+        "fate": text, "age_loops": whole,
+        "reward": number, "reward_to_go": number, "outcome": text, "valid": pa.bool_(),
+        "usage": pa.struct({"requests": whole, "prompt_tokens": whole, "completion_tokens": whole,
+                            "cached_tokens": whole, "reasoning_tokens": whole, "cost_usd": number}),
+    }  # fmt: skip
+    features = {"images": [{"_type": "Image"}]}
+    return pa.schema(fields.items(), metadata={"huggingface": json.dumps({"info": {"features": features}})})
+
+
+def _plain(row: Row, *, images: bool) -> dict[str, Any]:
+    pictures = row.pictures if images else ()
+    same = (
+        "id", "run", "task", "game", "seed", "side", "agent", "episode", "step", "game_loop", "prompt_recorded",
+        "reply", "status", "model", "fate", "age_loops", "outcome", "valid",
+    )  # fmt: skip
+    return {name: getattr(row, name) for name in same} | {
+        "map": row.map_name,
+        "prompt": [{"role": message.role, "content": message.content} for message in row.prompt],
+        "images": [{"bytes": picture.data, "path": picture.file_name} for picture in pictures],
+        "image_titles": [picture.ref.title for picture in pictures],
+        "accepted": list(row.accepted),
+        "rejected": [
+            rejection.model_dump(include={"reason", "message", "text", "team"}) for rejection in row.rejections
+        ],
+        "reward": row.reward.reward,
+        "reward_to_go": row.reward.to_go,
+        "usage": row.usage.model_dump(
+            include={"requests", "prompt_tokens", "completion_tokens", "cached_tokens", "reasoning_tokens", "cost_usd"}
+        ),
+    }

@@ -1,0 +1,78 @@
+"""A row → one chat, in the form of OpenAI's fine-tuning and in that of ShareGPT.
+
+Texts stand there as they are, hostile ones too; the one exception is the placeholder of ShareGPT's pictures, which
+would be counted as a picture where a text has it.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from khala.dataset.rows import Picture, Row
+    from khala_protocol.messages import ChatMessage
+
+_FROM = {"system": "system", "user": "human", "assistant": "gpt"}
+PLACEHOLDER = "<image>"
+BROKEN_PLACEHOLDER = "< image>"
+
+
+def openai(row: Row, *, images: bool) -> dict[str, Any]:
+    """Return a row in OpenAI's form.
+
+    Args:
+        row: of the data set.
+        images: whether the data set has pictures: then each content is a list of parts, because a column has one type.
+    """
+    pictures = {picture.ref.sha256: picture for picture in row.pictures}
+    asked = [{"role": message.role, "content": _content(message, pictures, images=images)} for message in row.prompt]
+    said = [_text(row.reply)] if images else row.reply
+    return {"messages": [*asked, {"role": "assistant", "content": said}]}
+
+
+def _content(message: ChatMessage, pictures: dict[str, Picture], *, images: bool) -> str | list[dict[str, Any]]:
+    """Return the content of a message: before each picture its title, and the text after them, as a model got it."""
+    if not images:
+        return message.content
+    parts: list[dict[str, Any]] = []
+    for ref in message.images:
+        if picture := pictures.get(ref.sha256):
+            url = f"data:{ref.media_type};base64,{b64encode(picture.data).decode()}"
+            parts += [_text(ref.title), {"type": "image_url", "image_url": {"url": url}}]
+    return [*parts, _text(message.content)]
+
+
+def _text(words: str) -> dict[str, Any]:
+    return {"type": "text", "text": words}
+
+
+def sharegpt(row: Row, *, images: bool) -> dict[str, Any]:
+    """Return a row in ShareGPT's form, with what it is; pictures are named by their files.
+
+    Args:
+        row: of the data set.
+        images: whether the data set has pictures.
+    """
+    shown = {picture.ref.sha256 for picture in row.pictures}
+    chat = [{"from": _FROM[message.role], "value": _value(message, shown, images=images)} for message in row.prompt]
+    plain: dict[str, Any] = {
+        "id": row.id,
+        "conversations": [*chat, {"from": "gpt", "value": _unbroken(row.reply, images=images)}],
+        "task": row.task,
+        "seed": row.seed,
+        "model": row.model,
+        "status": row.status,
+        "outcome": row.outcome,
+    }
+    return plain | ({"images": [f"images/{picture.file_name}" for picture in row.pictures]} if images else {})
+
+
+def _value(message: ChatMessage, shown: set[str], *, images: bool) -> str:
+    refs = [ref for ref in message.images if ref.sha256 in shown] if images else []
+    above = "".join(f"{_unbroken(ref.title, images=images)}\n{PLACEHOLDER}\n" for ref in refs)
+    return above + _unbroken(message.content, images=images)
+
+
+def _unbroken(words: str, *, images: bool) -> str:
+    return words.replace(PLACEHOLDER, BROKEN_PLACEHOLDER) if images else words

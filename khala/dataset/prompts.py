@@ -1,0 +1,37 @@
+"""The prompt of a decision, as the policy that asks a language model makes it of a briefing and observations.
+
+Two things are the model's own and cannot be made again: a summary of the game, and a memory that an agents file gave to
+one agent. The memory of the task is there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from khala_agents.memory import Memory, NoMemory, memory_of
+from khala_agents.prompt import Prompt
+
+if TYPE_CHECKING:
+    from khala_protocol.messages import Briefing, ChatMessage, Observation
+
+
+class Prompter:
+    """The prompts of one agent, decision by decision."""
+
+    def __init__(self) -> None:
+        self._briefing: Briefing | None = None
+        self._prompt: Prompt | None = None
+        self._memory: Memory = NoMemory()
+
+    def messages(self, briefing: Briefing, observation: Observation) -> tuple[ChatMessage, ...]:
+        """Return the prompt for an observation, with its pictures."""
+        if self._prompt is None or briefing != self._briefing:
+            self._briefing, self._prompt = briefing, Prompt(briefing)
+            self._memory = memory_of(briefing.memory)
+        recalled = self._memory.recall(observation)
+        text = "\n".join(filter(None, (recalled.text, observation.text)))
+        return self._prompt.messages(text, recalled.messages, images=observation.images)
+
+    def remember(self, observation: Observation, reply: str) -> None:
+        """Note a step that was answered, for the prompts to come."""
+        self._memory.remember(observation, reply)

@@ -1,0 +1,265 @@
+"""A recording → one row for each decision of an agent whose reply counted.
+
+A row is complete when the report of its decision came, and, if its agent asked a model, the request: requests travel
+on their own topic and may arrive some steps later. Until then rows wait, a bounded number of them. Above: `khala.
+dataset.export`; below: the recording, `khala.dataset.rewards` and `khala.dataset.prompts`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict, defaultdict
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala.dataset.prompts import Prompter
+from khala.dataset.rewards import COUNTED, UNKNOWN, Reward, rewards
+from khala_orchestrator.roster import Seat
+from khala_protocol.files import MB
+from khala_protocol.keys import Topic
+from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report, Usage
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from khala_protocol.messages import AgentReport, ChatMessage, Fate, ImageRef, Rejection, Result, Run
+    from khala_protocol.recording import Recorded, Recording
+
+MOST_WAITING = 64
+"""Rows that wait for the request of their decision; of more, the oldest gets a prompt that is made again."""
+MOST_PICTURE_BYTES = 64 * MB
+"""Pictures that are kept for observations to come. A picture is published just before the observation with it."""
+_READ = frozenset({Topic.BRIEFING, Topic.OBSERVATION, Topic.REPLY, Topic.EXCHANGE, Topic.REPORT})
+UNFINISHED = "unfinished"
+"""The outcome of an episode whose recording ends before it does."""
+
+
+class Place(NamedTuple):
+    """Which decision of a run it is."""
+
+    seat: Seat
+    episode: int
+    step: int
+
+
+class Picture(NamedTuple):
+    """A picture that was sent with a prompt."""
+
+    ref: ImageRef
+    data: bytes
+
+    @property
+    def file_name(self) -> str:
+        """The name of a file with it: the hash of its bytes, and its format."""
+        return f"{sha256(self.data).hexdigest()[:32]}.{self.ref.media_type.partition('/')[2]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One decision of one agent."""
+
+    run: str
+    task: str
+    map_name: str
+    game: str
+    versions: Mapping[str, str]
+    seed: int
+    """Of the episode: that of the run, and one more for each episode."""
+    side: str
+    agent: str
+    episode: int
+    step: int
+    game_loop: int
+    prompt: tuple[ChatMessage, ...]
+    prompt_recorded: bool
+    """Whether a model got this prompt; otherwise it is made of the briefing and the observation."""
+    pictures: tuple[Picture, ...]
+    """Those sent with the prompt that are in the recording, in their order."""
+    reply: str
+    status: str
+    model: str
+    """As its endpoint calls it; "" if no model gave the reply."""
+    usage: Usage
+    accepted: tuple[str, ...]
+    rejections: tuple[Rejection, ...]
+    fate: Fate | None
+    age_loops: int
+    reward: Reward
+    outcome: str
+    valid: bool
+
+    @property
+    def id(self) -> str:
+        """The place of the decision, as one text."""
+        return f"{self.run}/{self.side}/{self.agent}/{self.episode}/{self.step}"
+
+
+@dataclass(slots=True)
+class _Open:
+    """A decision on its way."""
+
+    seen: Observation
+    prompt: tuple[ChatMessage, ...]
+    pictures: dict[str, bytes]
+    reply: Reply | None = None
+    call: ModelCall | None = None
+    report: AgentReport | None = None
+
+    @property
+    def is_complete(self) -> bool:
+        if self.reply is None or self.reply.attempts == 0:
+            return True
+        return self.call is not None and (self.call.status == "ok" or self.call.attempt >= self.reply.attempts)
+
+
+@dataclass(slots=True)
+class _Pictures:
+    """The newest pictures by their hashes."""
+
+    kept: OrderedDict[str, bytes] = field(default_factory=OrderedDict)
+    size: int = 0
+
+    def put(self, data: bytes) -> None:
+        digest = sha256(data).hexdigest()
+        if digest in self.kept:
+            self.kept.move_to_end(digest)
+            return
+        self.kept[digest] = data
+        self.size += len(data)
+        while self.size > MOST_PICTURE_BYTES:
+            self.size -= len(self.kept.popitem(last=False)[1])
+
+
+class Rows:
+    """The rows of one recording, in the order in which their decisions were reported.
+
+    Args:
+        recording: of a match; it is read twice.
+        run: its run card.
+        gamma: discount of the reward-to-go.
+        images: whether rows have their pictures.
+
+    Attributes:
+        left_out: the number of decisions without a row, by the reason.
+    """
+
+    def __init__(self, recording: Recording, run: Run, *, gamma: float = 0.99, images: bool = True) -> None:
+        self.left_out: Counter[str] = Counter()
+        self._recording, self._run, self._images = recording, run, images
+        self._rewards = rewards(recording, gamma)
+        self._results: dict[tuple[str, int], Result] = {(r.side, r.episode): r for r in recording.results}
+        self._prompters: dict[Seat, Prompter] = defaultdict(Prompter)
+        self._briefings: dict[Seat, Briefing] = {}
+        self._pictures = _Pictures()
+        self._open: dict[Place, _Open] = {}
+        self._settled: dict[Place, _Open] = {}
+
+    def __iter__(self) -> Iterator[Row]:
+        for sample in self._recording:
+            self._take(sample)
+            yield from self._ready()
+        yield from map(self._row, self._settled.values())
+        self._settled = {}
+        self.left_out["no report"] += len(self._open)
+
+    def _take(self, sample: Recorded) -> None:
+        address = sample.address
+        if address is None:
+            return
+        if address.topic is Topic.IMAGE and self._images:
+            self._pictures.put(sample.payload)
+        if address.topic not in _READ:
+            return
+        match sample.message:
+            case Report() as report:
+                self._settle(report)
+            case Briefing() | Observation() | Reply() | ModelCall() as said:
+                seat = Seat(said.side, said.agent)
+                if seat == (address.side, address.agent):  # not under the key of another agent
+                    self._note(seat, said)
+
+    def _note(self, seat: Seat, said: Briefing | Observation | Reply | ModelCall) -> None:
+        match said:
+            case Briefing():
+                self._briefings[seat] = said
+            case Observation():
+                self._ask(seat, said)
+            case Reply():
+                self._answer(Place(seat, said.episode, said.step), said)
+            case ModelCall(purpose="decision"):
+                place = Place(seat, said.episode, said.step)
+                if one := self._open.get(place) or self._settled.get(place):
+                    one.call = said
+
+    def _ask(self, seat: Seat, seen: Observation) -> None:
+        """Open a decision. A host that goes on after it was killed asks again; what came before was lost with it."""
+        briefing = self._briefings.get(seat)
+        if briefing is None:
+            return
+        found = {ref.sha256: self._pictures.kept.get(ref.sha256) for ref in seen.images}
+        pictures = {digest: data for digest, data in found.items() if data is not None}
+        prompt = self._prompters[seat].messages(briefing, seen)
+        self._open[Place(seat, seen.episode, seen.step)] = _Open(seen, prompt, pictures)
+
+    def _answer(self, place: Place, reply: Reply) -> None:
+        one = self._open.get(place)
+        if one is None or one.reply is not None:
+            return
+        one.reply = reply
+        if reply.status == "ok":
+            self._prompters[place.seat].remember(one.seen, reply.text)
+
+    def _settle(self, report: Report) -> None:
+        for agent in report.agents:
+            asked = report.step if agent.asked_step is None else agent.asked_step
+            place = Place(Seat(agent.side, agent.agent), report.episode, asked)
+            one = self._open.pop(place, None)
+            if agent.status not in COUNTED:
+                self.left_out[agent.status] += 1
+            elif one is None or one.reply is None:
+                self.left_out["not recorded"] += 1
+            elif not one.reply.text.strip():
+                self.left_out["no words"] += 1
+            else:
+                one.report = agent
+                self._settled[place] = one
+
+    def _ready(self) -> Iterator[Row]:
+        for place in [place for place, one in self._settled.items() if one.is_complete]:
+            yield self._row(self._settled.pop(place))
+        while len(self._settled) > MOST_WAITING:
+            yield self._row(self._settled.pop(next(iter(self._settled))))
+
+    def _row(self, one: _Open) -> Row:
+        seen, reply, report, call = one.seen, one.reply, one.report, one.call
+        assert reply is not None and report is not None
+        prompt = one.prompt if call is None else call.prompt
+        result = self._results.get((seen.side, seen.episode))
+        shown = [ref for message in prompt for ref in message.images if ref.sha256 in one.pictures]
+        return Row(
+            run=self._run.run,
+            task=self._run.task,
+            map_name=self._run.map_name,
+            game=self._run.game,
+            versions=self._run.versions,
+            seed=self._run.seed + seen.episode,
+            side=seen.side,
+            agent=seen.agent,
+            episode=seen.episode,
+            step=seen.step,
+            game_loop=seen.game_loop,
+            prompt=prompt,
+            prompt_recorded=call is not None,
+            pictures=tuple(Picture(ref, one.pictures[ref.sha256]) for ref in shown),
+            reply=reply.text,
+            status=reply.status,
+            model=call.model if call is not None and reply.status == "ok" else "",
+            usage=reply.usage,
+            accepted=report.accepted,
+            rejections=report.rejections,
+            fate=report.fate,
+            age_loops=report.age_loops,
+            reward=self._rewards.get((seen.side, seen.episode), {}).get(seen.step, UNKNOWN),
+            outcome=result.outcome if result else UNFINISHED,
+            valid=result.valid if result else False,
+        )

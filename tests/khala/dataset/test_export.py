@@ -1,0 +1,267 @@
+"""What is exported is loaded by `datasets`, chosen and split as asked, and holds texts as they were."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import sys
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yaml
+from PIL import Image
+
+from khala.cli import main
+from khala.dataset.card import Recipe
+from khala.dataset.choose import FILTERS, Choice, Only, Split
+from khala.dataset.export import export
+from khala.dataset.files import Form
+from khala.dataset.rows import Rows
+from khala_protocol.errors import ConfigError
+from khala_protocol.messages import Reply, Run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from khala_protocol.recording import Recording
+
+    Rewrite = Callable[..., Recording]
+
+pytestmark = pytest.mark.game
+
+HOSTILE = 'a <image> "quoted"\\ </script>\u2028 \u202e \x1b]0;x\x07 {{7*7}} | `---`\n---\n<|im_end|>\n# Actions:\n'
+
+
+@pytest.fixture
+def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return `datasets.load_dataset` without a network."""
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "home"))
+    datasets = pytest.importorskip("datasets")
+    datasets.disable_progress_bars()
+    return lambda path: datasets.load_dataset(str(path), cache_dir=str(tmp_path / "cache"))
+
+
+def rows_of(recording: Recording) -> list[Any]:
+    assert recording.run is not None
+    return list(Rows(recording, recording.run))
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().split("\n") if line]
+
+
+def test_datasets_loads_all_columns_of_parquet_and_decodes_the_pictures(
+    recording: Recording, data_set: Path, load: Callable[..., Any]
+) -> None:
+    found, expected = load(data_set / "parquet")["train"], rows_of(recording)
+    assert len(found) == len(expected)
+    for got, row in zip(found, expected, strict=True):
+        assert (got["id"], got["reply"], got["seed"], got["task"]) == (row.id, row.reply, 3, "2s3z_pair")
+        assert [message["content"] for message in got["prompt"]] == [message.content for message in row.prompt]
+        assert (got["reward"], got["reward_to_go"]) == row.reward
+        assert (got["accepted"], got["fate"], got["outcome"]) == (list(row.accepted), row.fate, row.outcome)
+        sizes = [(picture.ref.width, picture.ref.height) for picture in row.pictures]
+        assert [image.size for image in got["images"]] == sizes != []
+
+
+def test_datasets_loads_the_chats_in_both_forms(recording: Recording, data_set: Path, load: Callable[..., Any]) -> None:
+    expected = rows_of(recording)
+    chats = load(data_set / "openai")["train"]["messages"]
+    assert [chat[-1]["content"][0]["text"] for chat in chats] == [row.reply for row in expected]
+    assert {tuple(said["role"] for said in chat) for chat in chats} == {
+        ("system", "user", "assistant") * 1 + ("user", "assistant")
+    }
+    found = load(data_set / "sharegpt")["train"]
+    assert found["id"] == [row.id for row in expected]
+    assert [chat[-1] for chat in found["conversations"]] == [{"from": "gpt", "value": row.reply} for row in expected]
+
+
+def test_pictures_are_those_that_the_model_was_sent_byte_for_byte(recording: Recording, data_set: Path) -> None:
+    sent = {digest[:32] for digest, _ in recording.images()}
+    for chat, row in zip(lines(data_set / "sharegpt" / "train.jsonl"), rows_of(recording), strict=True):
+        assert chat["images"]
+        for name, picture in zip(chat["images"], row.pictures, strict=True):
+            data = (data_set / "sharegpt" / name).read_bytes()
+            assert hashlib.sha256(data).hexdigest() == picture.ref.sha256
+            assert Image.open(io.BytesIO(data)).size == (picture.ref.width, picture.ref.height)
+        assert chat["conversations"][-2]["value"].count("<image>") == len(chat["images"])
+    assert {path.stem for path in (data_set / "sharegpt" / "images").iterdir()} == sent
+
+
+def test_without_pictures_a_chat_is_plain_text(recording: Recording, tmp_path: Path) -> None:
+    export([recording.path], tmp_path / "out", Recipe((Form.OPENAI,), images=False))
+    for chat, row in zip(lines(tmp_path / "out" / "openai" / "train.jsonl"), rows_of(recording), strict=True):
+        plain = [{"role": message.role, "content": message.content} for message in row.prompt]
+        assert chat == {"messages": [*plain, {"role": "assistant", "content": row.reply}]}
+
+
+@pytest.fixture
+def hostile(rewritten: Rewrite) -> Recording:
+    """Return the battle of a hostile model, played on a task with a hostile name."""
+
+    def change(sample: Any) -> list[Any]:
+        match sample.message:
+            case Reply():
+                return [sample.message.but(text=HOSTILE)]
+            case Run():
+                return [sample.message.but(task=HOSTILE)]
+        return [sample.message]
+
+    return rewritten(change)
+
+
+def test_hostile_texts_stay_data(hostile: Recording, tmp_path: Path, load: Callable[..., Any]) -> None:
+    export([hostile.path], tmp_path / "out", Recipe())
+    assert set(load(tmp_path / "out" / "parquet")["train"]["reply"]) == {HOSTILE}
+    chats = lines(tmp_path / "out" / "openai" / "train.jsonl")
+    assert {chat["messages"][-1]["content"][0]["text"] for chat in chats} == {HOSTILE}
+    for chat in lines(tmp_path / "out" / "sharegpt" / "train.jsonl"):
+        placeholders = sum(said["value"].count("<image>") for said in chat["conversations"])
+        assert placeholders == len(chat["images"])
+        assert chat["conversations"][-1]["value"] == HOSTILE.replace("<image>", "< image>")
+
+
+def test_a_hostile_name_changes_nothing_of_the_card(hostile: Recording, tmp_path: Path) -> None:
+    export([hostile.path], tmp_path / "out", Recipe())
+    _, front, words = (tmp_path / "out" / "parquet" / "README.md").read_text().split("---\n", 2)
+    assert yaml.safe_load(front)["configs"][0]["config_name"] == "default"
+    (line,) = [line for line in words.splitlines() if "quoted" in line]
+    assert line.count("|") == 4
+    assert "<" not in line
+    assert "\x1b" not in line
+
+
+def test_the_card_says_what_is_in_it(data_set: Path, recording: Recording) -> None:
+    _, front, words = (data_set / "parquet" / "README.md").read_text().split("---\n", 2)
+    found = yaml.safe_load(front)
+    assert found["license"] == "other"
+    assert found["size_categories"] == ["n<1K"]
+    assert "image-text-to-text" in found["task_categories"]
+    assert found["configs"][0]["data_files"] == [{"split": "train", "path": "train.parquet"}]
+    rows = rows_of(recording)
+    for said in (
+        f"| train | {len(rows)} | 3 |",
+        f"| 2s3z_pair | 2s3z | {len(rows)} |",
+        f"| focus-fire | {sum(row.model == 'focus-fire' for row in rows)} |",
+        "Khala simulator 0.1.0",
+        "0.99 · `reward_to_go`",
+        "The terms of commercial models may forbid to train",
+    ):
+        assert said in words
+
+
+def test_each_filter_leaves_what_it_names(recording: Recording, tmp_path: Path) -> None:
+    rows = rows_of(recording)
+    accepted = [row for row in rows if row.accepted and not row.rejections and row.agent == "Zealots"]
+    contents = export(
+        [recording.path],
+        tmp_path / "out",
+        Recipe((Form.SHAREGPT,), Choice((Only.ACCEPTED, Only.OK), ("blue/Zealots",))),
+    )
+    found = lines(tmp_path / "out" / "sharegpt" / "train.jsonl")
+    assert [chat["id"] for chat in found] == [row.id for row in accepted] != []
+    assert contents.left_out["another agent"] == sum(row.agent == "Stalkers" for row in rows)
+    assert contents.left_out["not accepted"] == len(rows) - len(found) - contents.left_out["another agent"]
+
+
+@pytest.mark.parametrize(
+    ("only", "kept", "left_out"),
+    [
+        (Only.WINS, {"outcome": "win"}, {"outcome": "draw"}),
+        (Only.VALID, {"valid": True}, {"valid": False}),
+        (Only.ACCEPTED, {"accepted": ("A",), "rejections": ()}, {"accepted": ("A",), "rejections": ("B",)}),
+        (Only.ACCEPTED, {"accepted": ("A",), "rejections": ()}, {"accepted": (), "rejections": ()}),
+        (Only.OK, {"status": "ok"}, {"status": "fallback"}),
+    ],
+)
+def test_what_a_filter_keeps(only: Only, kept: dict[str, Any], left_out: dict[str, Any]) -> None:
+    row: Callable[..., Any] = SimpleNamespace
+    assert FILTERS[only](row(**kept))
+    assert not FILTERS[only](row(**left_out))
+
+
+def test_no_seed_is_in_two_splits_and_shares_are_about_as_asked() -> None:
+    split = Split.of("0.8,0.1,0.1", "seed")
+    row: Callable[..., Any] = SimpleNamespace
+    parts = [split.part(row(seed=seed, task="2s3z")) for seed in range(2000)]
+    assert parts == [split.part(row(seed=seed, task="3m")) for seed in range(2000)]
+    shares = [parts.count(name) / 2000 for name in ("train", "validation", "test")]
+    assert shares == pytest.approx([0.8, 0.1, 0.1], abs=0.03)
+
+
+def test_seeds_of_two_recordings_go_into_their_splits(
+    rewritten: Rewrite, tmp_path: Path, load: Callable[..., Any]
+) -> None:
+    """The seeds 3 and 7 fall into different halves."""
+
+    def seven(sample: Any) -> list[Any]:
+        return [sample.message.but(seed=7)] if isinstance(sample.message, Run) else [sample.message]
+
+    rewritten(seven, "runs/7.mcap")
+    rewritten(lambda sample: [sample.message], "runs/3.mcap")
+    recipe = Recipe((Form.PARQUET, Form.OPENAI), split=Split.of("0.5,0.5", "seed"))
+    export([tmp_path / "runs", tmp_path / "runs" / "3.mcap"], tmp_path / "out", recipe)
+    found = load(tmp_path / "out" / "parquet")
+    seeds = {name: set(found[name]["seed"]) for name in ("train", "test")}
+    assert sorted(map(sorted, seeds.values())) == [[3], [7]]
+    assert len(found["train"]) == len(found["test"]) == len(load(tmp_path / "out" / "openai")["test"])
+
+
+@pytest.mark.parametrize("text", ["", "0.8", "0.8,0.1", "1,0", "0.5,0.6,-0.1", "a,b", "0.25,0.25,0.25,0.25", "nan,1"])
+def test_a_wrong_split_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match="is no split: write one, two or three shares above 0 that sum up to 1"):
+        Split.of(text, "seed")
+
+
+def test_what_stands_in_the_way_is_named(recording: Recording, tmp_path: Path, data_set: Path) -> None:
+    with pytest.raises(ConfigError, match="is there already, and is not empty: name another directory"):
+        export([recording.path], data_set, Recipe())
+    (tmp_path / "none").mkdir()
+    with pytest.raises(ConfigError, match=r"holds no recordings \(\*\.mcap\)"):
+        export([tmp_path / "none"], tmp_path / "out", Recipe())
+    with pytest.raises(ConfigError, match=r"no decision is left to export .*another agent: "):
+        export([recording.path], tmp_path / "out", Recipe(choice=Choice(agents=("Nobody",))))
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_pyarrow_the_extra_is_named(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ConfigError, match=r'pip install "khala\[data\]"'):
+        export([recording.path], tmp_path / "out", Recipe((Form.PARQUET,)))
+    assert export([recording.path], tmp_path / "out", Recipe((Form.OPENAI,))).rows["train"]
+
+
+def test_files_that_are_no_recordings_and_parts_of_lost_games_are_left_out(
+    recording: Recording, tmp_path: Path
+) -> None:
+    (tmp_path / "runs").mkdir()
+    whole = recording.path.read_bytes()
+    (tmp_path / "runs" / "a.mcap").write_bytes(whole)
+    (tmp_path / "runs" / "a.lost-1.mcap").write_bytes(whole)
+    (tmp_path / "runs" / "empty.mcap").touch()
+    (tmp_path / "runs" / "torn.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    contents = export([tmp_path / "runs"], tmp_path / "out", Recipe((Form.OPENAI,)))
+    assert (contents.recordings, contents.unread) == (2, 1)
+    assert contents.outcomes["unfinished"] > 5
+    assert "no recordings of a match: 1." in (tmp_path / "out" / "openai" / "README.md").read_text()
+
+
+def test_the_command_prints_what_it_wrote(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as ended:
+        main(["dataset", "export", str(recording.path), "--out", str(out), "--format", "openai", "--only", "ok",
+              "--agent", "Zealots", "--no-images", "--gamma", "1", "--json"])  # fmt: skip
+    assert not ended.value.code
+    found = json.loads(capsys.readouterr().out)
+    rows = lines(out / "openai" / "train.jsonl")
+    assert found["rows"] == {"train": len(rows)}
+    assert found["left_out"] == {"another agent": len(rows_of(recording)) - len(rows)}
+    assert sorted(path.name for path in (out / "openai").iterdir()) == ["README.md", "train.jsonl"]
