@@ -30,7 +30,7 @@ def export(
         list[Path], typer.Argument(help="Recordings, and directories in which they are searched for.", metavar="SOURCE")
     ],
     *,
-    out: Annotated[Path, typer.Option(help="Directory of the data set; it must not exist yet.", metavar="DIR")],
+    out: Annotated[Path, typer.Option(help="Directory of the data set, new or empty.", metavar="DIR")],
     formats: Annotated[
         list[Form] | None,
         typer.Option(

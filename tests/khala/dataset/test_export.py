@@ -19,7 +19,7 @@ from khala.dataset.choose import FILTERS, Choice, Only, Split
 from khala.dataset.export import export
 from khala.dataset.files import Form
 from khala.dataset.rows import Rows
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import Reply, Run
 
 if TYPE_CHECKING:
@@ -223,6 +223,10 @@ def test_what_stands_in_the_way_is_named(recording: Recording, tmp_path: Path, d
     (tmp_path / "none").mkdir()
     with pytest.raises(ConfigError, match=r"holds no recordings \(\*\.mcap\)"):
         export([tmp_path / "none"], tmp_path / "out", Recipe())
+    with pytest.raises(RecordingError, match="there is no such file"):
+        export([tmp_path / "none.mcap"], tmp_path / "out", Recipe())
+    with pytest.raises(ConfigError, match="Not a directory"):
+        export([recording.path], recording.path / "out", Recipe())
     with pytest.raises(ConfigError, match=r"no decision is left to export .*another agent: "):
         export([recording.path], tmp_path / "out", Recipe(choice=Choice(agents=("Nobody",))))
     assert not (tmp_path / "out").exists()
