@@ -1,5 +1,6 @@
 """Data sets made of recordings: one row for each decision of an agent, and agents that play from them.
 
+    row       what is known of one decision
     rows      a recording → rows, one by one
     rewards   what a decision was worth
     prompts   the prompt of a decision, made again where no request to a model was recorded

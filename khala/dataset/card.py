@@ -21,7 +21,7 @@ from khala_protocol.visible import visible_line
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from khala.dataset.rows import Row
+    from khala.dataset.row import Row
 
 NAME = "README.md"
 _SIZES = {

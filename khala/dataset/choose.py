@@ -13,7 +13,7 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from khala.dataset.rows import Row
+    from khala.dataset.row import Row
 
 SplitBy = Literal["seed", "run", "task"]
 

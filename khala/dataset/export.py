@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala.dataset.card import Recipe
-    from khala.dataset.rows import Row
+    from khala.dataset.row import Row
 
 log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from khala.dataset import forms
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.files import MB
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import TextIO
 
-    from khala.dataset.rows import Row
+    from khala.dataset.row import Row
 
 ROW_GROUP_BYTES = 16 * MB
 """Rows are written to Parquet when they have so many bytes; a reader needs as much memory."""
@@ -145,9 +145,13 @@ class Parquet:
         self._writer.close()
 
     def _flush(self) -> None:
-        if self._rows:
-            self._writer.write_table(self._pa.Table.from_pylist(self._rows, schema=self._schema))
-            self._rows, self._bytes = [], 0
+        rows, self._rows, self._bytes = self._rows, [], 0
+        try:
+            table = self._pa.Table.from_pylist(rows, schema=self._schema)
+        except (OverflowError, ValueError) as error:  # a recording may be anyone's, and hold any number
+            raise RecordingError(f"a number of these recordings is too large for Parquet: {error}") from None
+        if rows:
+            self._writer.write_table(table)
 
 
 _WRITERS: dict[Form, Callable[[Path, bool], Writer]] = {

@@ -10,7 +10,7 @@ from base64 import b64encode
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from khala.dataset.rows import Picture, Row
+    from khala.dataset.row import Picture, Row
     from khala_protocol.messages import ChatMessage
 
 _FROM = {"system": "system", "user": "human", "assistant": "gpt"}

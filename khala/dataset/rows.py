@@ -13,16 +13,17 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala.dataset.prompts import Prompter
-from khala.dataset.rewards import COUNTED, UNKNOWN, Reward, rewards
+from khala.dataset.rewards import COUNTED, UNKNOWN, rewards
+from khala.dataset.row import UNFINISHED, Picture, Row
 from khala_orchestrator.roster import Seat
 from khala_protocol.files import MB
 from khala_protocol.keys import Topic
-from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report, Usage
+from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from khala_protocol.messages import AgentReport, ChatMessage, Fate, ImageRef, Rejection, Result, Run
+    from khala_protocol.messages import AgentReport, ChatMessage, Result, Run
     from khala_protocol.recording import Recorded, Recording
 
 MOST_WAITING = 64
@@ -30,8 +31,6 @@ MOST_WAITING = 64
 MOST_PICTURE_BYTES = 64 * MB
 """Pictures that are kept for observations to come. A picture is published just before the observation with it."""
 _READ = frozenset({Topic.BRIEFING, Topic.OBSERVATION, Topic.REPLY, Topic.EXCHANGE, Topic.REPORT})
-UNFINISHED = "unfinished"
-"""The outcome of an episode whose recording ends before it does."""
 
 
 class Place(NamedTuple):
@@ -40,58 +39,6 @@ class Place(NamedTuple):
     seat: Seat
     episode: int
     step: int
-
-
-class Picture(NamedTuple):
-    """A picture that was sent with a prompt."""
-
-    ref: ImageRef
-    data: bytes
-
-    @property
-    def file_name(self) -> str:
-        """The name of a file with it: the hash of its bytes, and its format."""
-        return f"{sha256(self.data).hexdigest()[:32]}.{self.ref.media_type.partition('/')[2]}"
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One decision of one agent."""
-
-    run: str
-    task: str
-    map_name: str
-    game: str
-    versions: Mapping[str, str]
-    seed: int
-    """Of the episode: that of the run, and one more for each episode."""
-    side: str
-    agent: str
-    episode: int
-    step: int
-    game_loop: int
-    prompt: tuple[ChatMessage, ...]
-    prompt_recorded: bool
-    """Whether a model got this prompt; otherwise it is made of the briefing and the observation."""
-    pictures: tuple[Picture, ...]
-    """Those sent with the prompt that are in the recording, in their order."""
-    reply: str
-    status: str
-    model: str
-    """As its endpoint calls it; "" if no model gave the reply."""
-    usage: Usage
-    accepted: tuple[str, ...]
-    rejections: tuple[Rejection, ...]
-    fate: Fate | None
-    age_loops: int
-    reward: Reward
-    outcome: str
-    valid: bool
-
-    @property
-    def id(self) -> str:
-        """The place of the decision, as one text."""
-        return f"{self.run}/{self.side}/{self.agent}/{self.episode}/{self.step}"
 
 
 @dataclass(slots=True)

@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import sys
+import tracemalloc
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +20,10 @@ from khala.dataset.choose import FILTERS, Choice, Only, Split
 from khala.dataset.export import export
 from khala.dataset.files import Form
 from khala.dataset.rows import Rows
+from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.messages import Reply, Run
+from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report, Result, Run
+from khala_protocol.recording import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,6 +136,14 @@ def test_a_hostile_name_changes_nothing_of_the_card(hostile: Recording, tmp_path
     assert line.count("|") == 4
     assert "<" not in line
     assert "\x1b" not in line
+
+
+def test_a_number_that_parquet_cannot_hold_is_said(rewritten: Rewrite, tmp_path: Path) -> None:
+    def change(sample: Any) -> list[Any]:
+        return [sample.message.but(seed=10**30)] if isinstance(sample.message, Run) else [sample.message]
+
+    with pytest.raises(RecordingError, match="a number of these recordings is too large for Parquet"):
+        export([rewritten(change).path], tmp_path / "out", Recipe((Form.PARQUET,)))
 
 
 def test_the_card_says_what_is_in_it(data_set: Path, recording: Recording) -> None:
@@ -269,3 +280,32 @@ def test_the_command_prints_what_it_wrote(
     assert found["rows"] == {"train": len(rows)}
     assert found["left_out"] == {"another agent": len(rows_of(recording)) - len(rows)}
     assert sorted(path.name for path in (out / "openai").iterdir()) == ["README.md", "train.jsonl"]
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_recordings(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("khala.dataset.files.ROW_GROUP_BYTES", 200_000)
+
+    def peak(episodes: int) -> int:
+        """Return the most bytes that are in use while so many episodes are exported."""
+        with Recorder(tmp_path / f"{episodes}.mcap") as recorder:
+            for episode in range(episodes):
+                for sample in recording:
+                    if isinstance(sample.message, Observation | Reply | ModelCall | Report | Result | Briefing):
+                        recorder.write(sample.key, encode(sample.message.but(episode=episode)))
+                    elif episode == 0 or sample.message is None:
+                        recorder.write(sample.key, sample.payload)
+                    if isinstance(sample.message, Report):
+                        recorder.flush()
+        tracemalloc.start()
+        contents = export([recorder.path], tmp_path / f"{episodes}", Recipe())
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert contents.rows["train"] == episodes * len(rows_of(recording))
+        return most
+
+    peak(1)  # imports what is needed
+    few = peak(5)
+    assert peak(20) < 1.25 * few

@@ -14,7 +14,7 @@ from khala_protocol.messages import ModelCall, Reply, Report, Result
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from khala.dataset.rows import Row
+    from khala.dataset.row import Row
     from khala_protocol.messages import Wire
     from khala_protocol.recording import Recorded, Recording
 
