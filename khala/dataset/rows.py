@@ -200,7 +200,7 @@ class Rows:
             pictures=tuple(Picture(ref, one.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
             status=reply.status,
-            model=call.model if call is not None and reply.status == "ok" else "",
+            model=(call.answered_by or call.model) if call is not None and reply.status == "ok" else "",
             usage=reply.usage,
             accepted=report.accepted,
             rejections=report.rejections,
