@@ -167,15 +167,18 @@ def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
 
 
 def spent_usd(recording: Recording) -> dict[Seat, float]:
-    """Return what each agent has paid for its model in a recorded match.
+    """Return what each agent has paid for its model in a recorded match; in a fork, since it was forked.
 
     A call whose answer came too late is in no report, and one that the recording left out is in no exchange: the larger
     of the two sums counts.
     """
+    first = recording.run.forked.step if recording.run and recording.run.forked else 0
     calls, reports = defaultdict[Seat, float](float), defaultdict[Seat, float](float)
     for call in recording.of(ModelCall):
-        calls[Seat(call.side, call.agent)] += call.usage.cost_usd or 0.0
+        if call.step >= first:
+            calls[Seat(call.side, call.agent)] += call.usage.cost_usd or 0.0
     for report in recording.of(Report):
         for agent in report.agents:
-            reports[Seat(agent.side, agent.agent)] += agent.usage.cost_usd or 0.0
+            if (report.step if agent.asked_step is None else agent.asked_step) >= first:
+                reports[Seat(agent.side, agent.agent)] += agent.usage.cost_usd or 0.0
     return {seat: max(calls[seat], reports[seat]) for seat in {**calls, **reports}}

@@ -61,9 +61,15 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         agents=tuple(card for side in task.per_side() for card in side.cards()),
         advisers=tuple(dict.fromkeys(adviser.name for side in task.per_side() for adviser in side.advisers)),
         catalogue_sha256=catalogue_sha256(),
-        versions={"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES},
+        versions=versions(),
         code_sha256=code_sha256(),
         hardware=hardware(),
         labels=config.labels,
         config=task.model_dump(mode="json"),
+        forked=config.forked,
     )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what plays, here and now."""
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES}

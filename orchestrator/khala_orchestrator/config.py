@@ -22,7 +22,7 @@ from khala_configs import CONFIGS
 from khala_protocol.configfile import load, words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Clock, Frozen, MemoryRule
+from khala_protocol.messages import Clock, Forked, Frozen, MemoryRule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,6 +45,8 @@ class MatchConfig(Frozen):
     """The MCAP file that every topic is written to; None for no recording."""
     labels: dict[str, str] = Field(default_factory=dict)
     """For the run card: what an experiment calls this match."""
+    forked: Forked | None = None
+    """Where it was forked from another match."""
 
     @model_validator(mode="after")
     def _once_over_lan(self) -> Self:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from khala_bridge.game.game import Sides
+    from khala_orchestrator.match import MatchObserver
     from khala_orchestrator.turn import Question
     from khala_protocol.messages import AgentReport
     from khala_protocol.recording import RecordedStep, Recording
@@ -49,7 +50,10 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
     try:
         task = TaskConfig.model_validate(run.config)
         game, _, _version = run.game.rpartition(" ")
-        config = MatchConfig(task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes, labels=run.labels)
+        config = MatchConfig(
+            task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes, labels=run.labels,
+            forked=run.forked,
+        )  # fmt: skip
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))
@@ -85,20 +89,23 @@ def modules_of(task: TaskConfig) -> set[str]:
     return {module for module, colon, _ in names if colon}
 
 
-async def replay(recording: Recording, game: Sides, *, modules: Collection[str] = ()) -> list[Difference]:
+async def replay(
+    recording: Recording, game: Sides, *, modules: Collection[str] = (), observer: MatchObserver | None = None
+) -> list[Difference]:
     """Play a recording again, up to its last complete step.
 
     Args:
         recording: of a match.
         game: the game of `recorded_config`, started.
         modules: see `recorded_config`.
+        observer: is notified of what happens.
 
     Returns:
         every observation that differs from the recorded one; a replay that diverges ends at its first step.
     """
     turn = RecordedTurn(recording)
     config = recorded_config(recording, modules=modules)
-    match = Match(config, game, sides_of(config), turn, SilentObserver())
+    match = Match(config, game, sides_of(config), turn, observer or SilentObserver())
     try:
         async for _ in match.play():
             pass

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 RESUMED = "the host or the game was lost, and the match was resumed here"
+FORKED = "the match was forked here: all decisions before are recorded ones"
 
 
 class ResumeError(RecordingError):
@@ -58,6 +59,12 @@ class Unfinished:
         """Number of sides, each of which has a report and a result of its own."""
         return len(self.config.task.per_side())
 
+    @property
+    def incident(self) -> str:
+        """What the report of the first live step says."""
+        forked = self.config.forked
+        return FORKED if forked is not None and forked.step == self.steps else RESUMED
+
     def kept(self) -> Iterator[Recorded]:
         """Yield the recorded samples up to the last complete step, in the order of the file.
 
@@ -89,7 +96,7 @@ def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfin
     """
     config = config or recorded_config(recording)
     check_repeatable(recording, config.task)
-    if not config.game.startswith("Khala simulator"):
+    if not plays_the_same_twice(config):
         raise ResumeError(
             f"{recording.path} was played on {config.game}, which does not play the same game twice: begin a new run"
         )
@@ -102,6 +109,11 @@ def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfin
     return Unfinished(recording, config, results, len(reports) // sides)
 
 
+def plays_the_same_twice(config: MatchConfig) -> bool:
+    """Return whether the game of a match depends on nothing but its seed and what is decided."""
+    return config.game.startswith("Khala simulator")
+
+
 class ResumedTurn:
     """An `AgentPool` that begins with recorded answers, and goes on with live agents."""
 
@@ -109,6 +121,7 @@ class ResumedTurn:
         """Take a match, its agents, and what to do before they are asked for the first time."""
         self._recorded: RecordedTurn | None = RecordedTurn(past.recording, first_episode=past.episode)
         self._live = live
+        self._incident = past.incident
         self._go_live = go_live
         self._open: dict[Seat, Question] = {}
 
@@ -128,7 +141,7 @@ class ResumedTurn:
                 await self._go_live()
                 questions = [*self._open.values(), *questions]
                 answers = await self._live.ask(questions, wait=wait)
-                return replace(answers, incidents=[RESUMED, *answers.incidents])
+                return replace(answers, incidents=[self._incident, *answers.incidents])
         return await self._live.ask(questions, wait=wait)
 
     async def _again(self, recorded: RecordedTurn, questions: list[Question], *, wait: bool) -> Answers:

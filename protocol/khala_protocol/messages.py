@@ -859,6 +859,19 @@ class AgentCard(Frozen):
     required: bool = True
 
 
+class Forked(Frozen):
+    """Where a match was forked: what was decided before this step are the recorded decisions of another match."""
+
+    run: str
+    """Name of the other match."""
+    sha256: str
+    """Of its recording."""
+    episode: Count
+    """Its episode; the fork has no other one, and calls it 0."""
+    step: Count
+    """The first step whose decisions are the fork's own."""
+
+
 class Run(Wire):
     """Host → all but agents: the run card, with everything needed to repeat a run or to trust its numbers."""
 
@@ -888,6 +901,8 @@ class Run(Wire):
     """What an experiment calls this match: its name, its hash, and its place in the grid."""
     config: dict[str, object] = {}
     """The task file with all its defaults."""
+    forked: Forked | None = None
+    """None: it was played from its beginning; see `khala fork`."""
 
 
 class AgentReport(Frozen):
