@@ -25,6 +25,7 @@ from khala.actions import actions
 from khala.dataset.cli import app as dataset
 from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.cli import app as experiment
+from khala.fork.cli import FORK_EPILOG, fork
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.options import (
@@ -294,6 +295,7 @@ for command, epilog in (
     (khala_orchestrator.cli.router, khala_orchestrator.cli.ROUTER_EPILOG),
     (khala_orchestrator.cli.replay, khala_orchestrator.cli.REPLAY_EPILOG),
     (khala_orchestrator.cli.tasks, None),
+    (fork, FORK_EPILOG),
     (actions, ACTIONS_EPILOG),
     (serve, SERVE_EPILOG),
     (submit, SUBMIT_EPILOG),

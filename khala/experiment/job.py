@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path  # noqa: TC003  # pydantic evaluates it
+from typing import Literal
 
 from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala_orchestrator.config import MatchConfig  # noqa: TC001
 from khala_protocol.messages import Frozen
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 DoneState = Literal["done", "error", "timeout", "lost"]
 
@@ -23,6 +21,8 @@ class Job(Frozen):
     timeout_s: float
     processes: bool = False
     """Whether agents get processes of their own."""
+    beginning: Path | None = None
+    """A recording of what was played of it before; its agents go on from there."""
 
     @property
     def directory(self) -> Path:

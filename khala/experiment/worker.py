@@ -15,8 +15,10 @@ import sys
 from khala import one_process
 from khala.experiment.job import Done, Job
 from khala.local import play as play_with_processes
+from khala_orchestrator.resume import unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
+from khala_protocol.recording import Recording
 from khala_protocol.signals import cancelled_by_signal
 
 
@@ -45,10 +47,11 @@ async def played(job: Job, game: str) -> Done:
     """Play a match, and return how it ended."""
     try:
         async with asyncio.timeout(job.timeout_s):
+            past = unfinished(Recording.open(job.beginning)) if job.beginning else None
             if job.processes:
-                results = await play_with_processes(job.config, job.minds, job.directory, game=game)
+                results = await play_with_processes(job.config, job.minds, job.directory, game=game, past=past)
             else:
-                results = await one_process.play(job.config, job.minds, game=game)
+                results = await one_process.play(job.config, job.minds, game=game, past=past)
     except TimeoutError:
         return Done(state="timeout", words=f"it took longer than {job.timeout_s / 3600:g} hours")
     except (KhalaError, ExceptionGroup) as error:

@@ -1,12 +1,12 @@
 """`khala fork`: what if others had decided from a step of a recorded match on?
 
-    players   who decides after the step
-    play      one fork, in one process
-    crew      processes that play forks, several at once
-    futures   all forks of a step: numbered, paid from one budget, played
-    figures   what became of them, as numbers with intervals and as tables
-    scan      at which steps it matters most who decides
-    cli       the command
+cli       the options of the command
+commands  what it does
+players   who decides after the step
+futures   forks: each named, begun from the recording, paid from one budget, and played by an engine
+figures   what became of them: numbers with intervals, and tables
+scan      at which steps it matters most who decides
+recorded  the recorded future, played once more
 
-`khala_orchestrator.fork` is below, which makes the beginning of a fork from a recording.
+`khala_orchestrator.fork` is below, which makes the beginning of a fork, and `khala.experiment.engine`, which plays it.
 """

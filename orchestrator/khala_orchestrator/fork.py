@@ -1,9 +1,9 @@
 """Fork a recorded match: the recorded decisions up to a step, and from there on those of other agents.
 
-A fork is a match of one episode that others go on with: `write_beginning` copies the recorded episode up to the step, as
-the recording of a match of its own, and `khala_orchestrator.resume` plays it again, compares every observation, and asks
-live agents from there on. So a fork's recording is a whole one, which is replayed and forked like any other. Advice is
-added to the copy, in the step before: agents find it in the first observation that they decide on.
+A fork is a match of one episode that others go on with: `write_beginning` copies the recorded episode up to the step,
+as the recording of a match of its own, and `khala_orchestrator.resume` plays it again, compares every observation, and
+asks live agents from there on. So a fork's recording is a whole one, which is replayed and forked like any other.
+Advice is added to the copy, in the step before: agents find it in the first observation that they decide on.
 
 Above it: `khala.fork`.
 """
@@ -74,6 +74,18 @@ class Trunk:
         """Return the game loop at which a step is decided."""
         return self.loops[step - 1] if step else 0
 
+    def check(self, step: int) -> None:
+        """Check that there is a step.
+
+        Raises:
+            ForkError: there is none.
+        """
+        if not 0 <= step < len(self.loops):
+            raise ForkError(
+                f"{self.recording.path} has the steps 0 to {len(self.loops) - 1} of episode {self.episode}: "
+                f"it cannot be forked at step {step}"
+            )
+
     def fork(self, step: int, run: str, *, memory: str | None = None) -> MatchConfig:
         """Return the match that is forked at a step.
 
@@ -86,11 +98,7 @@ class Trunk:
             ForkError: there is no such step.
             ConfigError: the rule is wrong, or changes what was seen before the step.
         """
-        if not 0 <= step < len(self.loops):
-            raise ForkError(
-                f"{self.recording.path} has the steps 0 to {len(self.loops) - 1} of episode {self.episode}: "
-                f"it cannot be forked at step {step}"
-            )
+        self.check(step)
         forked = Forked(run=self.config.run, sha256=self.sha256, episode=self.episode, step=step)
         changes = {"run": run, "forked": forked, "task": _with_memory(self.config.task, memory)}
         return self.config.model_copy(update=changes)
@@ -117,7 +125,7 @@ def trunk_of(recording: Recording, episode: int = 0) -> Trunk:
     loops = _loops(recording, episode, sides=len(config.task.per_side()))
     if not loops:
         raise ForkError(f"{recording.path} has no complete step of episode {episode}")
-    results = [result for result in recording.results if result.episode == episode]
+    results = [one for one in recording.results if one.episode == episode and one.outcome != "aborted"]
     with recording.path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     alone = config.model_copy(update={"seed": config.seed + episode, "episodes": 1, "labels": {}})
@@ -125,7 +133,7 @@ def trunk_of(recording: Recording, episode: int = 0) -> Trunk:
 
 
 def _loops(recording: Recording, episode: int, *, sides: int) -> list[int]:
-    """Return the game loop after each step of which every side has a report; the last step of a torn file may lack one."""
+    """Return the game loop after each step of which every side has a report, as the last one of a torn file may not."""
     reports = [report.game_loop for report in recording.of(Report) if report.episode == episode]
     return reports[sides - 1 :: sides]
 

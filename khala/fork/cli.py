@@ -1,0 +1,130 @@
+"""The command `khala fork`, which `khala.cli` mounts."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from khala.options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
+from khala_orchestrator.cli import Json
+from khala_protocol.errors import ConfigError
+
+FORK_EPILOG = """
+Examples:\n
+    khala fork runs/first/recording.mcap --at 20\n
+    khala fork runs/first/recording.mcap --at 20 --model deepseek --times 20 --budget-usd 2\n
+    khala fork runs/first --at 20 --model openai --agent Commander=anthropic\n
+    khala fork runs/first --at 20 --model openai --advise "Commander: fall back and wait for reinforcements"\n
+    khala fork runs/duel --at 40 --blue openai --red skilled\n
+    khala fork runs/first --scan --model skilled --every 10
+"""
+TIMES = 20
+
+
+def fork(
+    recording: Annotated[Path, typer.Argument(help="A recording, or the directory of its run.", metavar="RECORDING")],
+    *,
+    at: Annotated[
+        int | None, typer.Option(min=0, help="The first step that others decide; see `khala replay`.", metavar="STEP")
+    ] = None,
+    scan: Annotated[
+        bool, typer.Option("--scan", help="Fork at many steps, and rank them by how much the outcome differs.")
+    ] = False,
+    every: Annotated[
+        int | None, typer.Option(min=1, help="With --scan: steps from one fork to the next.", show_default="a twelfth")
+    ] = None,
+    episode: Annotated[int, typer.Option(min=0, help="Episode to fork.", metavar="N")] = 0,
+    times: Annotated[
+        int | None,
+        typer.Option(min=1, help="Forks at a step.", show_default=f"{TIMES}, with --scan 1", metavar="N"),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="Model that decides from the step on; recorded plays the recorded future once more.",
+            metavar="NAME",
+            show_default="recorded",
+        ),
+    ] = None,
+    model_name: ModelName = None,
+    base_url: BaseUrl = None,
+    policy: PolicyName = None,
+    fallback: Fallback = None,
+    agent: Annotated[
+        list[str] | None,
+        typer.Option(help="Model of a single agent; may be given several times.", metavar="NAME=MODEL"),
+    ] = None,
+    blue: Mind = None,
+    red: Mind = None,
+    side_model: SideModel = None,
+    advise: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What an adviser says before the step: 'Commander: attack', 'everyone: attack'; several times.",
+            metavar="WHO: TEXT",
+        ),
+    ] = None,
+    memory: Annotated[
+        str | None,
+        typer.Option(
+            help="Past steps in the prompt: a number, or such as steps=4,summary=20. It is empty at the step.",
+            show_default="as recorded",
+            metavar="RULE",
+        ),
+    ] = None,
+    budget_usd: Annotated[
+        float | None, typer.Option(min=0, help="Limit of all forks together in US dollars, in equal parts.")
+    ] = None,
+    latency: Latency = 0.0,
+    game: Game = "simulator",
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Forks at once.", show_default="by cores and memory", metavar="N")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Directory in which each fork gets its own directory.", show_default="runs/RUN-forks", metavar="DIR"
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Ask what would have been if others had decided from a step of a recorded match on.
+
+    The match is played again with its recorded decisions up to the step, where each observation must be the recorded
+    one; then others decide, to the end, in this many forks. Each is recorded like any match. A table sets what became
+    of them against the recorded future.
+
+    The game is deterministic: forks differ only by what is decided in them. A model that chooses among its words by
+    chance (temperature) makes each fork another; a scripted player, or any policy that answers the same to the same
+    text, makes them all alike, and --times 1 is enough.
+
+    Only matches on the simulator can be forked, and none with the clock realtime.
+    """
+    from khala.fork import commands  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
+    from khala.minds import Minds, named_sides  # noqa: PLC0415
+
+    if (at is None) != scan:
+        raise ConfigError("say where to fork: --at STEP, or --scan for many steps")
+    sides = named_sides(side_model or (), blue=blue, red=red)
+    trunk = commands.opened(recording, episode)
+    changes = {
+        "--policy": policy, "--model-name": model_name, "--base-url": base_url, "--fallback": fallback,
+        "--agent": agent, "the model of a side": sides, "--advise": advise, "--memory": memory,
+    }  # fmt: skip
+    changed = [option for option, value in changes.items() if value]
+    if model == "recorded" or (model is None and not changed and at is not None):
+        if changed or at is None:
+            what = ", ".join(changed) or "--scan"
+            raise ConfigError(f"a recorded future has nothing but what was recorded: leave out {what}, or say --model")
+        commands.repeat(trunk, at, game, as_json=as_json)
+        return
+    common = None
+    if model or policy:
+        common = Minds(model or "scripted", model_name, base_url, policy, budget_usd, latency, fallback)
+    elif about_a_model := [option for option in ("--model-name", "--base-url", "--fallback") if option in changed]:
+        raise ConfigError(f"{about_a_model[0]} is about a model: name it with --model")
+    plan = commands.planned(trunk, out, common, sides, agent or (), advise or (), memory)
+    if at is not None:
+        commands.fork_at(plan, at, times or TIMES, jobs=jobs, budget_usd=budget_usd, game=game, as_json=as_json)
+    else:
+        commands.scan(plan, every, times or 1, jobs=jobs, budget_usd=budget_usd, game=game, as_json=as_json)
