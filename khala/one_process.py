@@ -17,6 +17,7 @@ from khala.minds import groups_of
 from khala_agents.llm.limits import Budget
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.worker import run_workers
+from khala_orchestrator.roster import Seat
 from khala_protocol.bus.memory import MemoryBroker
 
 if TYPE_CHECKING:
@@ -56,9 +57,12 @@ async def play(
     config = config.model_copy(update={"game": name})
     broker, stop = MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
+        by_side = await _policies(config, minds, stack)
+        if past is not None:
+            _remind(by_side, past)
         agents = [
             asyncio.create_task(run_workers(broker.session(), config.run, side, policies, stop=stop))
-            for side, policies in (await _policies(config, minds, stack)).items()
+            for side, policies in by_side.items()
         ]
         try:
             match = hosted(config, sc2path, broker.session(), watch=watch, past=past, launched=launched)
@@ -82,6 +86,13 @@ async def _policies(
     for side, mind, names in groups:
         made[side] |= mind.policies(names, base_url, budgets[side])
     return made
+
+
+def _remind(by_side: Mapping[str, Mapping[str, Policy]], past: Unfinished) -> None:
+    """Have agents remember what was played before them."""
+    for side, policies in by_side.items():
+        for name, policy in policies.items():
+            policy.remember(past.decisions(Seat(side, name)))
 
 
 async def _unless_one_fails(match: asyncio.Task[list[Result]], agents: Sequence[asyncio.Task[Any]]) -> list[Result]:

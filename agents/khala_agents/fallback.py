@@ -15,8 +15,10 @@ from khala_agents.llm.client import LLMError, OutOfMoney
 from khala_agents.policy import Decision, Policy
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from khala_agents.policy import Context, Said
-    from khala_protocol.messages import Briefing
+    from khala_protocol.messages import Briefing, Observation
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +52,11 @@ class Fallback(Policy):
         """Prepare both for an episode."""
         await self._other.prepare(briefing)
         await self.model.prepare(briefing)
+
+    def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:
+        """Have both remember."""
+        self.model.remember(decisions)
+        self._other.remember(decisions)
 
     async def decide(self, context: Context) -> Said:
         """Return the model's reply, or else the other's, marked as a fallback."""

@@ -34,11 +34,11 @@ from khala_agents.summary import Summary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context
-    from khala_protocol.messages import Briefing, ChatMessage, Pace, Purpose
+    from khala_protocol.messages import Briefing, ChatMessage, Observation, Pace, Purpose
 
 log = logging.getLogger(__name__)
 
@@ -81,6 +81,7 @@ class LLMPolicy(Policy):
         self.try_timeout_s = try_timeout_s
         self.vision = vision
         self.pace = pace
+        self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
@@ -123,9 +124,16 @@ class LLMPolicy(Policy):
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
         text = await self._completed(_Tries(self, context, messages, pictures))
-        self._memory.remember(observation, text)
-        self._summary.end_decision(observation, text)
+        self._note(observation, text)
         return text
+
+    def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:
+        """Have memory and summary begin with these steps, in the episode that they are of."""
+        self._before = tuple(decisions)
+
+    def _note(self, observation: Observation, reply: str) -> None:
+        self._memory.remember(observation, reply)
+        self._summary.end_decision(observation, reply)
 
     async def reflect(self, context: Context) -> None:
         """Ask for a new summary of the game, if one is due."""
@@ -181,11 +189,16 @@ class LLMPolicy(Policy):
         return self._prompt[1]
 
     def _remember_for(self, briefing: Briefing) -> None:
-        """Begin with an empty memory, as the configuration of the agent says, or else the task."""
+        """Begin with the memory that the configuration of the agent names, or else the task."""
         rule = self._rule or briefing.memory
         self._memory = self._own_memory or memory_of(rule)
         self._memory.clear()
         self._summary = Summary(0 if self._own_memory else rule.summary)
+        for observation, reply in self._before:
+            if observation.episode == briefing.episode:
+                self._summary.begin_decision(observation)
+                self._memory.recall(observation)  # which tells it what became of the step before
+                self._note(observation, reply)
 
 
 class _Tries:

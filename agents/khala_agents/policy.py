@@ -26,7 +26,7 @@ from khala_agents.pictures import PictureStore
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from khala_protocol.messages import Briefing, ModelCall, Observation, Pace
 
@@ -120,6 +120,12 @@ class Policy(ABC):
 
     async def prepare(self, briefing: Briefing) -> None:  # noqa: B027  # a hook
         """Get ready for an episode, before its first observation."""
+
+    def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:  # noqa: B027  # a hook
+        """Take in observations and replies of steps that were played before it came, as if it had decided them.
+
+        Called before anything else, of an agent that goes on with a recorded match.
+        """
 
     @abstractmethod
     async def decide(self, context: Context) -> Said:

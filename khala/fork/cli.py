@@ -67,7 +67,7 @@ def fork(
     memory: Annotated[
         str | None,
         typer.Option(
-            help="Past steps in the prompt: a number, or such as steps=4,summary=20. It is empty at the step.",
+            help="Past steps in the prompt, recorded ones too: a number, or such as steps=4,summary=20.",
             show_default="as recorded",
             metavar="RULE",
         ),

@@ -122,7 +122,7 @@ class RecordedTurn:
         self.differences: list[Difference] = []
         self._sides = len({report.side for report in recording.of(Report)} or {None})
         self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
-        self._replies = _accepted(recording)
+        self._replies = accepted_replies(recording)
         self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
         for report in recording.of(Report):
             for agent in report.agents:
@@ -189,7 +189,7 @@ class RecordedTurn:
         self.differences.append(Difference(agent, step.episode, step.step, "observation", recorded, sent))
 
 
-def _accepted(recording: Recording) -> dict[tuple[int, int, Seat], Reply]:
+def accepted_replies(recording: Recording) -> dict[tuple[int, int, Seat], Reply]:
     """Return the first reply to each question since it was last asked.
 
     A host asks again only what it has no answer to. What came before was lost with the host before it, or was a guess.

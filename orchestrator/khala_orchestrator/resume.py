@@ -11,10 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from khala_orchestrator.replay import EndOfRecording, RecordedTurn, check_repeatable, recorded_config
+from khala_orchestrator.replay import (
+    EndOfRecording,
+    RecordedTurn,
+    accepted_replies,
+    check_repeatable,
+    recorded_config,
+)
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import RecordingError
-from khala_protocol.messages import ModelCall, Report
+from khala_protocol.messages import ModelCall, Observation, Report
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Iterator
@@ -64,6 +70,14 @@ class Unfinished:
         """What the report of the first live step says."""
         forked = self.config.forked
         return FORKED if forked is not None and forked.step == self.steps else RESUMED
+
+    def decisions(self, seat: Seat) -> list[tuple[Observation, str]]:
+        """Return what an agent saw in the steps of the next episode to play, and the replies that its model gave."""
+        replies = accepted_replies(self.recording)
+        found = ((seen, replies.get((seen.episode, seen.step, seat))) for seen in self.recording.of(
+            Observation, agent=seat.agent, side=seat.side
+        ) if seen.episode == self.episode)  # fmt: skip
+        return [(seen, reply.text) for seen, reply in found if reply is not None and reply.status == "ok"]
 
     def kept(self) -> Iterator[Recorded]:
         """Yield the recorded samples up to the last complete step, in the order of the file.

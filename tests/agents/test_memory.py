@@ -175,6 +175,21 @@ async def test_a_summary_is_asked_for_beside_decisions_and_read_from_the_third_o
     assert before in second.prompt[-1].content
 
 
+@pytest.mark.parametrize("rule", [MemoryRule(steps=2), MemoryRule(steps=3, whole=True), MemoryRule(steps=2, summary=9)])
+async def test_who_goes_on_with_a_match_remembers_the_steps_before_as_its_own(
+    briefing: Callable[..., Briefing], game: list[Observation], rule: MemoryRule
+) -> None:
+    whole = Played(LLMPolicy(Model()), briefing(memory=rule))
+    said = await whole.play(game)
+    late = Played(LLMPolicy(Model()), briefing(memory=rule))
+    late.policy.remember(list(zip(game[:4], said, strict=False)))
+    await late.policy.prepare(late.briefing)
+    await late.play(game[4:])
+    prompts, recorded = ([call.prompt for call in played.exchanges] for played in (late, whole))
+    assert prompts == recorded[4:]
+    assert any("step 3." in message.content for message in prompts[0])
+
+
 @pytest.mark.parametrize(("summary_s", "status", "shown"), [(1.5, "ok", 2), (60.0, "cancelled", 0)])
 async def test_a_late_summary_is_dropped_and_a_replay_has_the_same_prompts(
     summary_s: float, status: str, shown: int, briefing: Callable[..., Briefing], game: list[Observation]

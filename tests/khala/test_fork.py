@@ -29,7 +29,7 @@ from khala_orchestrator.config import load_task
 from khala_orchestrator.fork import Trunk, trunk_of
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.messages import Casualties, Observation, Reply, Result
+from khala_protocol.messages import Casualties, ModelCall, Observation, Reply, Result
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
@@ -116,6 +116,17 @@ async def test_the_player_who_was_recorded_comes_to_the_recorded_end(golden: Tru
 
 @pytest.mark.game
 @pytest.mark.slow
+async def test_a_model_that_goes_on_remembers_the_recorded_steps(golden: Trunk, tmp_path: Path) -> None:
+    plan = planned(golden, tmp_path, "scripted/skilled", memory="steps=2,whole=true")
+    (future,) = await play_all(plan.forks(45, 1), Here())
+    replies = {(reply.agent, reply.step): reply.text for reply in golden.recording.of(Reply)}
+    first = next(call for call in Recording.open(future.fork.record).of(ModelCall) if call.step == 45)
+    remembered = [message.content for message in first.prompt if message.role == "assistant"]
+    assert remembered[1:] == [replies[first.agent, 43], replies[first.agent, 44]]
+
+
+@pytest.mark.game
+@pytest.mark.slow
 async def test_a_scan_finds_where_it_matters_that_somebody_decides(golden: Trunk, tmp_path: Path) -> None:
     plan = planned(golden, tmp_path, "silent")
     steps = steps_of(golden, 25)
@@ -187,7 +198,7 @@ PRICED = """
 profile: compatible
 model: skilled
 base_url: {base_url}
-prices: {{input_per_million: 100.0, output_per_million: 100.0}}
+prices: {{prompt: 100.0, completion: 100.0}}
 """
 
 
