@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
-from scipy.stats import binomtest  # type: ignore[import-untyped]
 
+from khala.experiment.statistics import wilson
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ class Figures:
         futures: number of those that are valid, and are counted below.
         invalid: number of the others.
         win_rate: won / futures; None without any.
-        low, high: interval in which the win rate lies with 95 % (Wilson).
+        low: lower bound of the interval in which the win rate lies with 95 % (Wilson).
+        high: upper bound of it.
         kd: value killed / value lost, of all together; None if nothing was lost.
         balance: value killed minus value lost, on average.
         game_s: seconds of the game from the step to the end, the median.
@@ -52,7 +53,7 @@ def figures(results: Iterable[Result], *, from_loop: int) -> Figures:
     every = list(results)
     valid = [result for result in every if result.valid]
     endings, number = Counter(result.outcome for result in valid), len(valid)
-    low, high = _wilson(endings["win"], number)
+    win_rate = wilson(endings["win"], number)
     killed, lost = sum(result.killed.value for result in valid), sum(result.lost.value for result in valid)
     return Figures(
         futures=number,
@@ -60,20 +61,13 @@ def figures(results: Iterable[Result], *, from_loop: int) -> Figures:
         won=endings["win"],
         drawn=endings["draw"],
         lost=endings["loss"],
-        win_rate=endings["win"] / number if number else None,
-        low=low,
-        high=high,
+        win_rate=win_rate.value,
+        low=win_rate.low,
+        high=win_rate.high,
         kd=killed / lost if lost else None,
         balance=(killed - lost) / number if number else 0.0,
         game_s=statistics.median((r.game_loop - from_loop) / LOOPS_PER_S for r in valid) if number else 0.0,
     )
-
-
-def _wilson(won: int, number: int) -> tuple[float, float]:
-    if not number:
-        return 0.0, 1.0
-    found = binomtest(won, number).proportion_ci(confidence_level=0.95, method="wilson")
-    return float(found.low), float(found.high)
 
 
 def of_side(futures: Iterable[Future], side: str) -> list[Result]:
