@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import psutil
 import pytest
 
+from khala import one_process
 from khala.cli import main
 from khala.exit_codes import NOT_VALID, SIGNALLED
 from khala.experiment.job import Done
@@ -25,7 +26,7 @@ from khala.fork.recorded import repeated
 from khala.fork.scan import ranked, steps_of
 from khala.minds import Minds
 from khala.testing import replay_host
-from khala_orchestrator.config import load_task
+from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.fork import Trunk, trunk_of
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
@@ -87,7 +88,7 @@ async def test_a_fork_is_the_recorded_match_up_to_its_step_and_goes_on_as_others
     golden: Trunk, tmp_path: Path
 ) -> None:
     step, steps = 40, len(golden.loops)
-    (future,) = await play_all(planned(golden, tmp_path, "focus-fire").forks(step, 1), Here())
+    (future,) = await play_all(planned(golden, tmp_path, "skilled").forks(step, 1), Here())
     assert future.error == ""
     forked = Recording.open(future.fork.record)
     assert seen_in(forked, range(step + 1)) == seen_in(golden.recording, range(step + 1))
@@ -103,8 +104,8 @@ async def test_a_fork_is_the_recorded_match_up_to_its_step_and_goes_on_as_others
 @pytest.mark.game
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [0, 7, 30, 50])
-async def test_the_player_who_was_recorded_comes_to_the_recorded_end(golden: Trunk, tmp_path: Path, step: int) -> None:
-    futures = await play_all(planned(golden, tmp_path, "skilled").forks(step, 2), Here())
+async def test_the_model_that_was_recorded_comes_to_the_recorded_end(golden: Trunk, tmp_path: Path, step: int) -> None:
+    futures = await play_all(planned(golden, tmp_path, "scripted").forks(step, 2), Here())
     steps = range(len(golden.loops))
     for future in futures:
         assert seen_in(Recording.open(future.fork.record), steps) == seen_in(golden.recording, steps)
@@ -117,7 +118,7 @@ async def test_the_player_who_was_recorded_comes_to_the_recorded_end(golden: Tru
 @pytest.mark.game
 @pytest.mark.slow
 async def test_a_model_that_goes_on_remembers_the_recorded_steps(golden: Trunk, tmp_path: Path) -> None:
-    plan = planned(golden, tmp_path, "scripted/skilled", memory="steps=2,whole=true")
+    plan = planned(golden, tmp_path, "scripted", memory="steps=2,whole=true")
     (future,) = await play_all(plan.forks(45, 1), Here())
     replies = {(reply.agent, reply.step): reply.text for reply in golden.recording.of(Reply)}
     first = next(call for call in Recording.open(future.fork.record).of(ModelCall) if call.step == 45)
@@ -139,11 +140,9 @@ async def test_a_scan_finds_where_it_matters_that_somebody_decides(golden: Trunk
 @pytest.mark.game
 @pytest.mark.slow
 async def test_each_side_of_a_duel_gets_a_player(tmp_path: Path) -> None:
-    command = ["run", "duel_3m", "--policy", "skilled", "--max-steps", "12", "--out", str(tmp_path), "--run", "duel"]
-    with pytest.raises(SystemExit) as ended:
-        main(command)
-    assert not ended.value.code
-    trunk = trunk_of(Recording.open(tmp_path / "duel" / "recording.mcap"))
+    config = MatchConfig(task=change(load_task("duel_3m"), max_steps=12), run="duel", record=tmp_path / "duel.mcap")
+    await one_process.play(config, dict.fromkeys(("blue", "red"), Minds().named("skilled")), game="simulator")
+    trunk = trunk_of(Recording.open(tmp_path / "duel.mcap"))
     minds = players_of(trunk.config.task, None, {"blue": "silent", "red": "skilled"}, [])
     (future,) = await play_all(Plan(trunk, minds, tmp_path / "forks").forks(6, 1), Here())
     assert {result.side for result in future.results} == {"blue", "red"}
