@@ -160,6 +160,7 @@ def khala(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.game
 def test_the_command_prints_what_became_of_forks_and_leaves_their_recordings(tmp_path: Path) -> None:
     command = ["fork", str(GOLDEN), "--at", "47", "--policy", "focus-fire", "--times", "1", "--out", "forks", "--json"]
