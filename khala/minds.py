@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from khala import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model
-from khala_agents.llm.limits import Budget
+from khala_agents.llm.limits import Budget, own_turns
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
@@ -23,6 +23,7 @@ from khala_protocol.messages import ModelCall, Report
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.recording import Recording
@@ -84,20 +85,23 @@ class Minds:
         """
         self.policies([""], self.base_url, Budget(self.budget_usd))
 
-    def policies(self, names: Sequence[str], base_url: str | None, budget: Budget) -> dict[str, Policy]:
+    def policies(
+        self, names: Sequence[str], base_url: str | None, budget: Budget, gates: Gates = own_turns
+    ) -> dict[str, Policy]:
         """Return a policy for each agent, for agents in this process.
 
         Args:
             names: of the agents.
             base_url: of the scripted endpoint, where it is needed.
             budget: of all agents of the side.
+            gates: where requests to models wait for their turn.
 
         Raises:
             ConfigError: as in `check`.
         """
         spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
         address = base_url if self.needs_endpoint else self.base_url
-        workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address})
+        workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address}, gates=gates)
         return {name: workshop.policy(spec) for name in names}
 
     @property

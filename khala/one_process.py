@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from khala import games
 from khala.hosting import hosted
 from khala.minds import groups_of
-from khala_agents.llm.limits import Budget
+from khala_agents.llm.limits import Budget, own_turns
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.worker import run_workers
 from khala_orchestrator.roster import Seat
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from khala.minds import Minds
+    from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
     from khala_bridge.game.env import Launched
     from khala_orchestrator.config import MatchConfig
@@ -39,6 +40,7 @@ async def play(
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
     launched: Launched | None = None,
+    gates: Gates = own_turns,
 ) -> list[Result]:
     """Play a match with its agents in this process.
 
@@ -49,6 +51,7 @@ async def play(
         watch: is called with the run card, every report and every result.
         past: what was played of this match before.
         launched: a process of the game.
+        gates: where requests to models wait for their turn.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
@@ -57,7 +60,7 @@ async def play(
     config = config.model_copy(update={"game": name})
     broker, stop = MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
-        by_side = await _policies(config, minds, stack)
+        by_side = await _policies(config, minds, stack, gates)
         if past is not None:
             _remind(by_side, past)
         agents = [
@@ -73,7 +76,7 @@ async def play(
 
 
 async def _policies(
-    config: MatchConfig, minds: Mapping[str, Minds], stack: contextlib.AsyncExitStack
+    config: MatchConfig, minds: Mapping[str, Minds], stack: contextlib.AsyncExitStack, gates: Gates
 ) -> dict[str, dict[str, Policy]]:
     """Return the policies of all agents, by side; start the scripted endpoint if one asks it."""
     groups = list(groups_of(config.task, minds))
@@ -84,7 +87,7 @@ async def _policies(
     budgets = {side: Budget(mind.budget_usd, source="the budget of the match") for side, mind in minds.items()}
     made: dict[str, dict[str, Policy]] = {side: {} for side in minds}
     for side, mind, names in groups:
-        made[side] |= mind.policies(names, base_url, budgets[side])
+        made[side] |= mind.policies(names, base_url, budgets[side], gates)
     return made
 
 

@@ -21,7 +21,7 @@ from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
-from khala_agents.llm.limits import Budget, Limits
+from khala_agents.llm.limits import Budget, Limits, own_turns
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.replay import ReplayClient
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_agents.llm.client import LLMClient
+    from khala_agents.llm.limits import Gates
     from khala_protocol.messages import MemoryRule, ModelCall
 
 
@@ -92,6 +93,7 @@ class Workshop:
         budget_usd: what all agents of the process may spend together.
         budget: shared with other workshops, instead of one for `budget_usd`.
         overrides: fields given on the command line; they replace those of every model file.
+        gates: where requests wait for their turn, if not with those of this process alone.
     """
 
     def __init__(
@@ -100,9 +102,11 @@ class Workshop:
         budget_usd: float | None = None,
         overrides: Mapping[str, str | float | None] | None = None,
         budget: Budget | None = None,
+        gates: Gates = own_turns,
     ) -> None:
         self._budget = budget or Budget(budget_usd, source="the budget of this process")
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
+        self._gates = gates
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
         self._breakers: dict[str, Breaker] = {}
 
@@ -134,11 +138,10 @@ class Workshop:
             if self._budget.limit_usd is not None and not config.prices.known:
                 raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
             limits = Limits(
-                config.limits,
+                gate=self._gates(f"{config.model} at {config.base_url}", config.limits, f"model file {name}"),
                 prices=config.prices,
                 budget=self._budget,
                 max_tokens=config.max_tokens,
-                source=f"model file {name}",
             )
             self._models[name] = config, limits
         return self._models[name]

@@ -11,15 +11,20 @@ import asyncio
 import gc
 import logging
 import sys
+from typing import TYPE_CHECKING
 
 from khala import one_process
 from khala.experiment.job import Done, Job
 from khala.local import play as play_with_processes
+from khala_agents.llm.limits import own_turns
 from khala_orchestrator.resume import unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
 from khala_protocol.recording import Recording
 from khala_protocol.signals import cancelled_by_signal
+
+if TYPE_CHECKING:
+    from khala_agents.llm.limits import Gates
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -28,9 +33,14 @@ def main(arguments: list[str] | None = None) -> None:
     options.add_argument("--game", default="simulator")
     given = options.parse_args(arguments)
     end_with_parent()
+    log_quietly()
+    asyncio.run(cancelled_by_signal(_work(given.game)))
+
+
+def log_quietly() -> None:
+    """Log what a person should know."""
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
-    asyncio.run(cancelled_by_signal(_work(given.game)))
 
 
 async def _work(game: str) -> None:
@@ -39,19 +49,24 @@ async def _work(game: str) -> None:
         done = await played(Job.model_validate_json(line), game)
         sys.stdout.write(done.model_dump_json() + "\n")
         sys.stdout.flush()
-        gc.unfreeze()  # the host freezes what it finds; a process of many matches would keep all of them
-        gc.collect()
+        tidy()
 
 
-async def played(job: Job, game: str) -> Done:
-    """Play a match, and return how it ended."""
+def tidy() -> None:
+    """Free what a match leaves behind."""
+    gc.unfreeze()  # the host freezes what it finds; a process of many matches would keep all of them
+    gc.collect()
+
+
+async def played(job: Job, game: str, gates: Gates = own_turns) -> Done:
+    """Play a match, and return how it ended; requests to models wait for their turn at the gates."""
     try:
         async with asyncio.timeout(job.timeout_s):
             past = unfinished(Recording.open(job.beginning)) if job.beginning else None
             if job.processes:
                 results = await play_with_processes(job.config, job.minds, job.directory, game=game, past=past)
             else:
-                results = await one_process.play(job.config, job.minds, game=game, past=past)
+                results = await one_process.play(job.config, job.minds, game=game, past=past, gates=gates)
     except TimeoutError:
         return Done(state="timeout", words=f"it took longer than {job.timeout_s / 3600:g} hours")
     except (KhalaError, ExceptionGroup) as error:

@@ -1,4 +1,4 @@
-"""Limits that the agents of a process share: requests in flight, requests and tokens a minute, money.
+"""Limits that agents share: requests in flight, requests and tokens a minute, money.
 
     async with limits.admit(tokens=900, deadline=…) as ticket:
         completion = await client.complete(request)
@@ -7,6 +7,8 @@
 `admit` waits for its turn, in the order of arrival, and raises `LimitExceeded` where waiting is useless: the
 money is used up, or the turn would come after the deadline. It knows no model and no HTTP. `khala_agents.llm.retry`
 handles a provider's own limits; these keep an experiment below them, and within its budget.
+
+Requests wait at a `Gate`. That of a process is `Turns`; on a cluster, those of all processes wait at the same one.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from __future__ import annotations
 import asyncio
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 from pydantic import Field
 
@@ -22,7 +24,7 @@ from khala_agents.llm.client import LLMError
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Callable, Iterator
 
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import Usage
@@ -34,7 +36,10 @@ LimitType = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
 
 
 class LimitRules(Frozen):
-    """Limits for one endpoint, shared by all agents of a process that use it; None for no limit."""
+    """Limits for one endpoint, shared by all agents of a process that use it; None for no limit.
+
+    With `khala experiment run --on ray`, the agents of all matches share them.
+    """
 
     in_flight: int | None = Field(default=None, ge=1)
     """Requests at the same time."""
@@ -141,6 +146,77 @@ class Bucket:
         return now
 
 
+class Gate(Protocol):
+    """Where the requests to one endpoint wait for their turn, in the order of their arrival."""
+
+    async def enter(self, tokens: int, patience_s: float | None) -> int:
+        """Wait for the turn of a request with a prompt of about `tokens`; return its place.
+
+        Raises:
+            LimitExceeded: its turn would not come in `patience_s`.
+        """
+
+    def leave(self, place: int, more_tokens: int) -> None:
+        """Give the place to the next request; this one had so many tokens more, or less, than was said."""
+
+
+class Turns:
+    """The gate of one process."""
+
+    def __init__(self, rules: LimitRules | None = None, *, source: str = "the model file") -> None:
+        rules = rules or LimitRules()
+        self._in_flight = asyncio.Semaphore(rules.in_flight) if rules.in_flight else None
+        self._requests = _bucket("requests_per_minute", rules.requests_per_minute, source)
+        self._tokens = _bucket("tokens_per_minute", rules.tokens_per_minute, source)
+        self._inside: set[int] = set()
+        self._last = 0
+
+    async def enter(self, tokens: int, patience_s: float | None) -> int:
+        """See `Gate.enter`."""
+        deadline = None if patience_s is None else asyncio.get_running_loop().time() + patience_s
+        if self._in_flight:
+            await self._in_flight.acquire()
+        try:
+            await self._take_turn(tokens, deadline)
+        except BaseException:
+            if self._in_flight:
+                self._in_flight.release()
+            raise
+        self._last += 1
+        self._inside.add(self._last)
+        return self._last
+
+    def leave(self, place: int, more_tokens: int) -> None:
+        """See `Gate.leave`; a place that was given back already stays so."""
+        if place not in self._inside:
+            return
+        self._inside.remove(place)
+        if self._tokens:
+            self._tokens.correct(more_tokens)
+        if self._in_flight:
+            self._in_flight.release()
+
+    async def _take_turn(self, tokens: int, deadline: float | None) -> None:
+        if self._requests:
+            await self._requests.take(1, deadline)
+        if self._tokens:
+            try:
+                await self._tokens.take(tokens, deadline)
+            except BaseException:
+                if self._requests:
+                    self._requests.correct(-1)
+                raise
+
+
+Gates: TypeAlias = "Callable[[str, LimitRules, str], Gate]"
+"""Makes the gate of an endpoint: from its name, its rules, and where they stand."""
+
+
+def own_turns(_: str, rules: LimitRules, source: str) -> Gate:
+    """Return a gate for this process alone."""
+    return Turns(rules, source=source)
+
+
 @dataclass(slots=True)
 class Ticket:
     """The right to make one request.
@@ -159,7 +235,7 @@ class Ticket:
 
 
 class Limits:
-    """The limits of one endpoint in this process."""
+    """The limits of one endpoint: its gate, and the money of this process."""
 
     def __init__(
         self,
@@ -168,16 +244,16 @@ class Limits:
         prices: Prices | None = None,
         budget: Budget | None = None,
         max_tokens: int | None = None,
-        source: str = "the model file",
+        gate: Gate | None = None,
     ) -> None:
-        """Take the rules of the endpoint, and what a request may cost; `max_tokens` is the limit of an answer."""
-        rules = rules or LimitRules()
+        """Take the rules of the endpoint, or its gate, and what a request may cost.
+
+        `max_tokens` is the limit of an answer.
+        """
         self.budget = budget or Budget(None)
         self._prices = prices
         self._longest = LONGEST_ANSWER if max_tokens is None else max_tokens
-        self._in_flight = asyncio.Semaphore(rules.in_flight) if rules.in_flight else None
-        self._requests = _bucket("requests_per_minute", rules.requests_per_minute, source)
-        self._tokens = _bucket("tokens_per_minute", rules.tokens_per_minute, source)
+        self._gate = gate or Turns(rules)
 
     @asynccontextmanager
     async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
@@ -192,43 +268,32 @@ class Limits:
         clock = asyncio.get_running_loop().time
         arrived = clock()
         self.budget.check()
-        if self._in_flight:
-            await self._in_flight.acquire()
+        place = await self._gate.enter(tokens, None if deadline is None else deadline - arrived)
+        ticket = Ticket(waited_s=clock() - arrived)
         try:
-            await self._take_turn(tokens, deadline)
-            ticket = Ticket(waited_s=clock() - arrived)
             with self.budget.holding(self._most_usd(tokens)):  # it may have been spent during the wait
                 try:
                     yield ticket
                 finally:
-                    self._settle(ticket.usage, tokens)
+                    self._pay(ticket.usage, tokens)
         finally:
-            if self._in_flight:
-                self._in_flight.release()
+            self._gate.leave(place, _more_tokens(ticket.usage, tokens))
 
     def _most_usd(self, tokens: int) -> float:
         """Return the price of a prompt of about `tokens` and of the longest answer; 0 if it is not known."""
         return (self._prices and self._prices.cost_usd(prompt=tokens, completion=self._longest)) or 0.0
 
-    async def _take_turn(self, tokens: int, deadline: float | None) -> None:
-        if self._requests:
-            await self._requests.take(1, deadline)
-        if self._tokens:
-            try:
-                await self._tokens.take(tokens, deadline)
-            except BaseException:
-                if self._requests:
-                    self._requests.correct(-1)
-                raise
-
-    def _settle(self, usage: Usage | None, estimated: int) -> None:
-        known = usage is not None and not usage.unknown_requests
-        if usage is not None and known:
-            if self._tokens:
-                self._tokens.correct(usage.prompt_tokens + usage.completion_tokens - estimated)
+    def _pay(self, usage: Usage | None, estimated: int) -> None:
+        if usage is not None and not usage.unknown_requests:
             self.budget.spend(usage.cost_usd or 0.0)
         elif self._prices:
             self.budget.spend(self._prices.cost_usd(prompt=estimated, completion=0) or 0.0)
+
+
+def _more_tokens(usage: Usage | None, estimated: int) -> int:
+    if usage is None or usage.unknown_requests:
+        return 0
+    return usage.prompt_tokens + usage.completion_tokens - estimated
 
 
 def _bucket(kind: LimitType, per_minute: float | None, source: str) -> Bucket | None:

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits, Turns
 from khala_agents.llm.pricing import Prices
 from khala_protocol.messages import Usage
 
@@ -149,3 +149,25 @@ async def test_a_budget_is_shared_by_endpoints_and_a_rate_is_not() -> None:
 def test_a_price_is_known_only_if_all_of_it_is(prices: Prices, cost: float | None) -> None:
     found = prices.cost_usd(prompt=1000, completion=200, cached=400)
     assert found == (None if cost is None else pytest.approx(cost))
+
+
+# --- a gate that several have ---------------------------------------------------------------------------
+
+
+async def test_limits_with_the_same_gate_let_no_more_through_together_than_one_would() -> None:
+    gate = Turns(LimitRules(requests_per_minute=6, in_flight=6))
+    mine, yours = Limits(gate=gate), Limits(gate=gate)
+    admitted = await asyncio.gather(*(use(limits) for _ in range(4) for limits in (mine, yours)))
+    assert admitted == [0, 0, 0, 0, 0, 0, 10, 20]
+
+
+async def test_a_place_that_was_given_back_is_not_given_back_once_more() -> None:
+    gate = Turns(LimitRules(in_flight=1, tokens_per_minute=600))
+    place = await gate.enter(600, None)
+    for _ in range(2):
+        gate.leave(place, -300)
+    await gate.enter(400, None)
+    assert asyncio.get_running_loop().time() == 10, "300 came back once, 10 flow in each second"
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(1):
+            await gate.enter(0, None)
