@@ -1,0 +1,164 @@
+"""Plays matches on a Ray cluster: each is a Ray task with a core and its memory.
+
+The node plays it in a process that plays many, and its recording travels back with the answer, or over an fsspec URL
+that all nodes can write. Ray itself tries nothing again: a match whose node or process dies is `lost`, and the runner
+plays it once more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from khala.experiment import worker
+from khala.experiment.engine import MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
+from khala.experiment.job import Done, Job
+from khala_protocol.errors import ConfigError
+
+try:
+    import fsspec  # type: ignore[import-untyped]  # it has no types
+    import ray
+    from ray.exceptions import RayError
+
+    from khala.experiment.ray_limits import endpoints, gates_at
+except ModuleNotFoundError as error:
+    raise ConfigError(f"there is no {error.name}: pip install 'khala[ray]'", source="--on ray") from None
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+MATCH_BYTES = MATCH_MB * 2**20
+REACH_S = 10.0
+
+
+class Ray:
+    """Plays matches on the nodes of a Ray cluster."""
+
+    def __init__(
+        self, slots: int | None, *, game: str, address: str | None = None, recordings: str | None = None
+    ) -> None:
+        """Take how many matches at a time, which game, and where the cluster is.
+
+        Args:
+            slots: None for as many as the cluster has room for when the engine begins.
+            game: as the nodes find it.
+            address: of the cluster: `HOST:PORT`, or `auto`; None for one on this machine, which ends with the engine.
+            recordings: where nodes write recordings, each in a directory with its key as name, an fsspec URL; None to
+                get them over Ray.
+        """
+        self.slots = slots or 0
+        self._game, self._address, self._url = game, address, recordings
+        self._endpoints: Any = None
+
+    async def __aenter__(self) -> Self:
+        if self._address not in (None, "auto"):
+            await _check(self._address)
+        self._connect()
+        self.slots = self.slots or _room_of_the_cluster()
+        if not self.slots:
+            ray.shutdown()
+            raise ConfigError(f"no node of the cluster has a core and {MATCH_MB} MB: --jobs says how many matches to "
+                              "play at a time once it has", source=f"Ray at {self._address}")  # fmt: skip
+        self._endpoints = endpoints()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        ray.shutdown()  # Ray ends what still runs with the runner, and each game its process is gone
+
+    async def play(self, job: Job) -> Done:
+        """Play a match on a node that has room for it."""
+        assert job.config.record is not None
+        playing = _match.remote(job.model_dump_json(), self._game, self._url, self._endpoints)
+        try:
+            done, recording = await playing
+        except asyncio.CancelledError:
+            ray.cancel(playing)
+            raise
+        except RayError as error:
+            return Done(state="lost", words=f"Ray says: {str(error).strip().splitlines()[-1]}")
+        if isinstance(recording, str):
+            recording = await asyncio.to_thread(_read, recording)
+        if recording is not None:
+            _write(job.config.record, recording)
+        return Done.model_validate_json(done)
+
+    def _connect(self) -> None:
+        ended_by = signal.getsignal(signal.SIGTERM)
+        local: dict[str, Any] = {"include_dashboard": False, "num_cpus": self.slots or slots_of_this_machine()}
+        options = {} if self._address else local
+        try:
+            ray.init(self._address or "local", log_to_driver=False, logging_level=logging.ERROR, **options)
+        except Exception as error:  # a node that does not start raises no narrower one
+            raise ConfigError(f"Ray did not start: {error}", source=f"--address {self._address or 'local'}") from error
+        signal.signal(signal.SIGTERM, ended_by)  # Ray has set its own, which would end us in the middle
+
+
+async def _check(address: str) -> None:
+    """Raise `ConfigError` unless something listens there: Ray itself would wait for minutes."""
+    host, colon, port = address.rpartition(":")
+    if not (colon and port.isdecimal()) or "://" in host:
+        raise ConfigError("give HOST:PORT, such as 10.0.0.5:6379, or auto", source=f"--address {address}")
+    try:
+        async with asyncio.timeout(REACH_S):
+            _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise ConfigError(
+            f"there is no Ray cluster ({why}): start one with `ray start --head`", source=f"--address {address}"
+        ) from None
+    writer.close()
+
+
+def _room_of_the_cluster() -> int:
+    """Return how many matches the nodes play at the same time."""
+    nodes: list[dict[str, Any]] = ray.nodes()  # type: ignore[no-untyped-call]  # by Ray
+    alive = [node["Resources"] for node in nodes if node["Alive"]]
+    return sum(int(min(has.get("CPU", 0), has.get("memory", 0) // MATCH_BYTES)) for has in alive)
+
+
+# --- on a node ----------------------------------------------------------------------------------------
+
+
+@ray.remote(num_cpus=1, memory=MATCH_BYTES, max_retries=0, max_calls=MATCHES_OF_A_PROCESS)
+def _match(text: str, game: str, url: str | None, actor: Any) -> tuple[str, bytes | str | None]:
+    """Play a match; return how it ended, and its recording, or where it is; None if there is none."""
+    worker.log_quietly()
+    job = Job.model_validate_json(text)
+    assert job.config.record is not None
+    with tempfile.TemporaryDirectory(prefix="khala-") as directory:
+        here = Path(directory) / job.config.record.name
+        config = job.config.model_copy(update={"record": here})
+        done = asyncio.run(worker.played(job.model_copy(update={"config": config}), game, gates_at(actor)))
+        worker.tidy()
+        recording = here.read_bytes() if here.exists() else None
+    if url is None or recording is None:
+        return done.model_dump_json(), recording
+    place = f"{url.rstrip('/')}/{job.directory.name}/{job.config.record.name}"
+    _put(place, recording)
+    return done.model_dump_json(), place
+
+
+# --- recordings ---------------------------------------------------------------------------------------
+
+
+def _put(place: str, recording: bytes) -> None:
+    with fsspec.open(place, "wb", auto_mkdir=True) as file:
+        file.write(recording)
+
+
+def _read(place: str) -> bytes:
+    with fsspec.open(place, "rb") as file:
+        return bytes(file.read())
+
+
+def _write(record: Path, recording: bytes) -> None:
+    """Write all of a recording, or nothing."""
+    part = record.with_suffix(".part")
+    part.write_bytes(recording)
+    part.replace(record)
