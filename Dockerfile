@@ -4,6 +4,7 @@
 #     docker build -t khala .                          docker run --rm khala run 2s3z_pair
 #     docker build -t khala-agents --target agents .   docker run --rm khala-agents Stalkers --run first --connect …
 #
+# Nodes of a Ray cluster need Ray as well: docker build --build-arg EXTRAS="--extra ray" -t khala-ray .
 # Any image with Python 3.11, 3.12 or 3.13, pip and glibc works: docker build --build-arg PYTHON_IMAGE=…
 ARG PYTHON_IMAGE=python:3.12-slim
 
@@ -21,7 +22,8 @@ FROM source AS build-agents
 RUN --mount=type=cache,target=/var/cache/uv uv sync --frozen --no-dev --no-editable --package khala-agents
 
 FROM source AS build-all
-RUN --mount=type=cache,target=/var/cache/uv uv sync --frozen --no-dev --no-editable \
+ARG EXTRAS=""
+RUN --mount=type=cache,target=/var/cache/uv uv sync --frozen --no-dev --no-editable ${EXTRAS} \
     && /opt/khala/bin/khala sc2 install /opt/StarCraftII
 
 FROM ${PYTHON_IMAGE} AS base

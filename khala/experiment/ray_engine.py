@@ -160,5 +160,6 @@ def _read(place: str) -> bytes:
 def _write(record: Path, recording: bytes) -> None:
     """Write all of a recording, or nothing."""
     part = record.with_suffix(".part")
+    part.touch(0o600)  # as the host makes its own
     part.write_bytes(recording)
     part.replace(record)

@@ -118,14 +118,25 @@ def test_a_service_runs_as_an_ordinary_user(service: str) -> None:
 @every_service
 def test_a_service_is_healthy_or_waits_for_one_that_is(service: str) -> None:
     conditions = {name: needed["condition"] for name, needed in SERVICES[service].get("depends_on", {}).items()}
-    assert "healthcheck" in SERVICES[service] or "service_healthy" in conditions.values()
+    alone = service == "experiment"  # it needs none of the others
+    assert alone or "healthcheck" in SERVICES[service] or "service_healthy" in conditions.values()
     for name, condition in conditions.items():
         assert condition == ("service_healthy" if "healthcheck" in SERVICES[name] else "service_started")
 
 
-def test_only_agents_reach_the_world() -> None:
+def test_only_agents_and_experiments_reach_the_world() -> None:
     inside = {name for name, network in COMPOSE["networks"].items() if network.get("internal")}
-    assert {name for name, service in SERVICES.items() if not inside.issuperset(service["networks"])} == {"agents"}
+    outside = {name for name, service in SERVICES.items() if not inside.issuperset(service["networks"])}
+    assert outside == {"agents", "experiment"}
+
+
+def test_an_experiment_is_played_when_its_profile_is_asked_for() -> None:
+    assert {name: service["profiles"] for name, service in SERVICES.items() if "profiles" in service} == {
+        "experiment": ["experiment"]
+    }
+    asked = parsed(command_of("experiment"))
+    assert asked["processes"]
+    assert asked["out"].is_relative_to("/runs"), "where the volume is"
 
 
 def test_who_joins_from_outside_comes_over_loopback_unless_told_otherwise() -> None:
@@ -134,17 +145,18 @@ def test_who_joins_from_outside_comes_over_loopback_unless_told_otherwise() -> N
 
 def test_services_stay_and_a_match_ends() -> None:
     policies = {name: service["restart"] for name, service in SERVICES.items()}
-    assert policies == {**dict.fromkeys(SERVICES, "unless-stopped"), "host": "no"}
+    assert policies == {**dict.fromkeys(SERVICES, "unless-stopped"), "host": "no", "experiment": "no"}
 
 
 # --- keys ---------------------------------------------------------------------------------------------
 
 
 def test_keys_are_given_to_agents_as_a_file_and_to_nobody_else() -> None:
-    assert [name for name, service in SERVICES.items() if "secrets" in service] == ["agents"]
-    environment = SERVICES["agents"]["environment"]
-    assert {name for name in environment if "KEY" in name} == {f"{key}_FILE" for key in KEYS}
-    assert {environment[f"{key}_FILE"] for key in KEYS} == {"/run/secrets/model_key"}
+    assert [name for name, service in SERVICES.items() if "secrets" in service] == ["agents", "experiment"]
+    for service in ("agents", "experiment"):
+        environment = SERVICES[service]["environment"]
+        assert {name for name in environment if "KEY" in name} == {f"{key}_FILE" for key in KEYS}
+        assert {environment[f"{key}_FILE"] for key in KEYS} == {"/run/secrets/model_key"}
     assert set(COMPOSE["secrets"]["model_key"]) == {"file"}
 
 
@@ -283,6 +295,8 @@ def test_the_documentation_names_files_and_services_that_exist(page: str) -> Non
             continue
         files = [after for before, after in itertools.pairwise(words) if before == "-f"]
         assert set(files) <= set(FILES)
+        profiles = [after for before, after in itertools.pairwise(words) if before == "--profile"]
+        assert set(profiles) <= {"experiment"}
         if "up" in words:
             named = words[words.index("up") + 1 :]
             assert {word for word in named if not word.startswith("-")} <= SERVICES.keys()

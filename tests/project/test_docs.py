@@ -55,7 +55,10 @@ FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | 
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
 LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", "yaml actions", *MODELS}
-OTHER_PROGRAMS = {"cd", "cp", "curl", "docker", "export", "git", "make", "mkdir", "pip", "scp", "source", "ssh"}
+OTHER_PROGRAMS = {
+    "cd", "cp", "curl", "docker", "export", "git", "kubectl", "make", "mkdir", "pip", "ray", "sbatch", "scp", "source",
+    "ssh",
+}  # fmt: skip
 ALONE = {"khala-agent": "agent", "khala-llm": "llm", "khala-sc2": "sc2"}
 """The commands of a package that is installed without the others, and what `khala` calls them."""
 
