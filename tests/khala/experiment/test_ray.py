@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -147,6 +151,25 @@ async def test_when_a_node_is_killed_every_match_is_played_once_with_the_results
 
     alone = await run(tmp_path / "local", Local(2, game="simulator", logs=tmp_path / "logs"), found)
     assert rows(store) == rows(alone)
+
+
+async def test_ctrl_c_ends_ray_on_this_machine_and_keeps_what_was_played(tmp_path: Path) -> None:
+    pytest.importorskip("ray")
+    file = tmp_path / "many.yaml"
+    fixed = {"task": "2s3z_pair", "max_steps": 6, "model": "skilled"}
+    file.write_text(yaml.safe_dump({"name": "many", "fixed": fixed, "factors": {"task": ["2s3z_pair"]}, "seeds": 1000}))
+    words = ("experiment", "run", str(file), "--on", "ray", "--jobs", "1", "--out", str(tmp_path))
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "khala", *words), stderr=subprocess.PIPE, env=os.environ | PATIENT
+    )
+    assert process.stderr is not None
+    said = [await process.stderr.readline()]
+    assert b"done in" in said[0], (said[0] + await process.stderr.read()).decode()
+    process.send_signal(signal.SIGINT)
+    said.append(await process.stderr.read())
+    assert await process.wait() == 128 + signal.SIGINT
+    assert b"interrupted: " in said[1]
+    assert {played.state for played in Store(tmp_path / "many").played().values()} == {"done"}
 
 
 @pytest.mark.parametrize(
