@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from khala.experiment import worker
-from khala.experiment.engine import MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
+from khala.experiment.engine import END_S, MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
 from khala.experiment.job import Done, Job
 from khala_protocol.errors import ConfigError
 
@@ -79,6 +79,7 @@ class Ray:
             done, recording = await playing
         except asyncio.CancelledError:
             ray.cancel(playing)
+            await asyncio.to_thread(ray.wait, [playing], timeout=END_S)  # its game ends in order
             raise
         except RayError as error:
             return Done(state="lost", words=f"Ray says: {str(error).strip().splitlines()[-1]}")

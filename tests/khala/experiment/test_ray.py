@@ -17,7 +17,7 @@ from khala.experiment.plan import plan
 from khala.experiment.runner import Event, Runner
 from khala.experiment.spec import Budget, Experiment
 from khala.experiment.store import Store
-from khala_agents.scripted.endpoint import Endpoint
+from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ PATIENT = {
     "RAY_USAGE_STATS_ENABLED": "0",
 }
 """A node of Ray is a dozen processes, and this machine may have two cores."""
-PER_MINUTE = 20
+PER_MINUTE = 18
 
 
 def experiment(**fields: Any) -> Experiment:
@@ -94,15 +94,21 @@ def rows(store: Store) -> dict[str, dict[str, Any]]:
 
 
 class TimedEndpoint(Endpoint):
-    """Keeps when it was asked."""
+    """Keeps when it was asked, and how many requests it had at once."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(Behaviour(latency_s=0.3))
         self.times: list[float] = []
+        self.now = self.most_at_once = 0
 
     async def _complete(self, request: web.Request) -> web.StreamResponse:
         self.times.append(asyncio.get_running_loop().time())
-        return await super()._complete(request)
+        self.now += 1
+        self.most_at_once = max(self.now, self.most_at_once)
+        try:
+            return await super()._complete(request)
+        finally:
+            self.now -= 1
 
 
 async def test_matches_on_two_nodes_ask_a_model_together_no_more_often_than_its_file_says(
@@ -111,7 +117,7 @@ async def test_matches_on_two_nodes_ask_a_model_together_no_more_often_than_its_
     shared = tmp_path / "shared"
     async with TimedEndpoint() as endpoint:
         file = tmp_path / "limited.yaml"
-        limits = {"requests_per_minute": PER_MINUTE, "in_flight": 3}
+        limits = {"requests_per_minute": PER_MINUTE, "in_flight": 1}
         model = {"profile": "compatible", "model": "skilled", "base_url": endpoint.base_url, "limits": limits}
         file.write_text(yaml.safe_dump(model))
         found = experiment(factors={"player": [{"name": "limited", "model": str(file)}]}, seeds=2)
@@ -119,6 +125,7 @@ async def test_matches_on_two_nodes_ask_a_model_together_no_more_often_than_its_
     assert engine.slots == 2
     assert [played.state for played in store.played().values()] == ["done"] * 2
 
+    assert endpoint.most_at_once == 1
     first, *_ = times = sorted(endpoint.times)
     assert len(times) == 2 * 2 * 6, "matches, agents, steps"
     for number, at in enumerate(times, 1):
