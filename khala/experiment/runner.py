@@ -127,6 +127,7 @@ class Runner:
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
             found = unread(match, tries, crash or "crash"), []
+            self.spent.usd += part_usd or 0.0  # nobody knows what it has cost: a node that died took the recording
         self.store.add(*found)
         self.spent.held_usd -= part_usd or 0.0
         self._end(match, done, found[0])
