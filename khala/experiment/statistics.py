@@ -183,7 +183,8 @@ def ratio_of_sums(
 
 def _quotient(over: float, under: float) -> float | None:
     if under:
-        return float(over / under)
+        with np.errstate(over="ignore"):  # infinite it is
+            return float(np.float64(over) / under)
     return math.inf if over else None
 
 
