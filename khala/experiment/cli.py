@@ -12,6 +12,8 @@ import typer
 from rich.table import Table
 
 from khala.exit_codes import FAILED, NOT_VALID, SIGNALLED
+from khala.experiment.options import OUT, Directory, Out
+from khala.experiment.results import COMPARE_EPILOG, compare, export, report
 from khala.options import Game
 from khala_orchestrator.cli import Json
 from khala_orchestrator.console import stderr_console, stdout_console
@@ -38,13 +40,10 @@ Examples:\n
     khala experiment run my_grid.yaml --on ray --address 10.0.0.5:6379
 """
 SHIPPED = "experiments"
-OUT = Path("experiments")
 
 File = Annotated[
     str, typer.Argument(help="A shipped experiment, see `khala experiment list`, or a .yaml file.", metavar="FILE")
 ]
-Directory = Annotated[Path, typer.Argument(help="Directory of an experiment, or its name below --out.", metavar="DIR")]
-Out = Annotated[Path, typer.Option(help="Directory in which each experiment gets its own.", metavar="DIR")]
 On = Annotated[str, typer.Option(help="Where matches are played: local, or ray for a Ray cluster.", metavar="ENGINE")]
 Jobs = Annotated[
     int | None,
@@ -163,6 +162,11 @@ def index(directory: Directory, *, out: Out = OUT) -> None:
     """Make the index of an experiment anew of its recordings."""
     store = _opened(directory, out)
     stderr_console().print(f"{store.rebuild()} matches are in {store.directory / 'index.sqlite'}", soft_wrap=True)
+
+
+app.command(epilog=COMPARE_EPILOG)(compare)
+app.command()(report)
+app.command()(export)
 
 
 def path_of(file: str) -> Path:

@@ -1,0 +1,66 @@
+"""The measures of an experiment as a table for other programs: a row for each episode and side."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING, Any
+
+from khala.experiment.measures import Measures
+from khala.experiment.plan import FACTOR
+from khala.experiment.selection import factors_of
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala.experiment.store import Store
+
+Columns = dict[str, type]
+
+
+def write_csv(store: Store, path: Path) -> int:
+    """Write the rows as CSV, an empty cell for nothing, and return their number."""
+    columns, rows = table(store)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(columns))
+        writer.writeheader()
+        writer.writerows(rows)
+    return len(rows)
+
+
+def write_parquet(store: Store, path: Path) -> int:
+    """Write the rows as Parquet, each column with its type, and return their number.
+
+    Raises:
+        ConfigError: pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415  # of the extra `data`
+        from pyarrow import parquet  # noqa: PLC0415
+    except ImportError:
+        raise ConfigError("Parquet needs pyarrow: pip install 'khala[data]', or give --csv") from None
+    columns, rows = table(store)
+    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+    schema = pa.schema([(name, kinds[kind]) for name, kind in columns.items()])
+    parquet.write_table(pa.Table.from_pylist(rows, schema=schema), path)
+    return len(rows)
+
+
+def table(store: Store) -> tuple[Columns, list[dict[str, Any]]]:
+    """Return the columns with their types, and the rows."""
+    played = store.played()
+    columns = _columns(factors_of(played.values()))
+    rows = [row | {"recording": played[row["match"]].recording} for row in store.results()]
+    return columns, [{name: _typed(row.get(name), kind) for name, kind in columns.items()} for row in rows]
+
+
+def _columns(factors: tuple[str, ...]) -> Columns:
+    about: Columns = {"match": str, "state": str, "cause_of_state": str, "repetition": int}
+    kinds = {kind.__name__: kind for kind in (str, int, float, bool)}
+    measures = {name: kinds[str(one.type).split(" | ")[0]] for name, one in Measures.__dataclass_fields__.items()}
+    return {**about, **{f"{FACTOR}{name}": str for name in factors}, **measures, "recording": str}
+
+
+def _typed(value: Any, kind: type) -> Any:
+    """Return a value of SQLite, which has no booleans, in the type of its column."""
+    return None if value is None else kind(value)

@@ -1,0 +1,17 @@
+"""The report of an experiment: tables, figures, and how it was played.
+
+    document = report(store)
+    write(document, directory, ["html"])
+
+summary      the numbers of a cell, with intervals
+conditions   how it was played, and what should be the same and is not
+tables       summaries as tables
+figures      summaries as pictures
+document     what a report consists of, in no format
+markdown, html, latex   a document in a format
+build        puts a document together, and writes it
+"""
+
+from khala.experiment.report.build import FORMATS, report, write
+
+__all__ = ["FORMATS", "report", "write"]

@@ -1,0 +1,117 @@
+"""Put the report of an experiment together, and write it in the formats that are wanted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from khala.experiment.plan import cells as planned_cells
+from khala.experiment.report import html, latex, markdown
+from khala.experiment.report.conditions import conditions, warnings
+from khala.experiment.report.document import Document, Section
+from khala.experiment.report.figures import figures
+from khala.experiment.report.summary import cells, summary
+from khala.experiment.report.tables import beside, not_counted, overview, tables
+from khala.experiment.selection import factors_of
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from khala.experiment.report.document import Figure
+    from khala.experiment.report.summary import Summary
+    from khala.experiment.spec import Experiment
+    from khala.experiment.store import Store
+
+
+class Format(NamedTuple):
+    """How a document is written."""
+
+    suffix: str
+    text: Callable[[Document], str]
+    picture: str
+    """Suffix of the pictures beside it; "" if it holds them."""
+    bytes_of: Callable[[Figure], bytes]
+
+
+FORMATS = {
+    "markdown": Format("md", markdown.text, "png", lambda figure: figure.png),
+    "latex": Format("tex", latex.text, "pdf", lambda figure: figure.pdf),
+    "html": Format("html", html.text, "", lambda figure: figure.svg.encode()),
+}
+
+
+class Report(NamedTuple):
+    """The report as a document, and the numbers in it."""
+
+    document: Document
+    summaries: list[Summary]
+
+    def data(self) -> dict[str, Any]:
+        """Return the numbers, for JSON."""
+        return {"experiment": self.document.title, "warnings": self.document.warnings, "cells": self.summaries}
+
+
+def report(store: Store, by: Sequence[str] = ()) -> Report:
+    """Return the report of an experiment.
+
+    Args:
+        store: of the experiment.
+        by: factors whose values get a line each; all of them if none is named.
+
+    Raises:
+        ConfigError: no match was played, or there is no such factor.
+    """
+    experiment, known = store.experiment(), store.played()
+    if not known:
+        raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
+    played, rows = list(known.values()), store.results()
+    groups = cells(played, rows, by)
+    summaries = [summary(cell) for cell in groups]
+    compared = beside(experiment.published, summaries)
+    sections = [
+        Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
+        Section("Beside what was published", (experiment.differs,) if experiment.differs else (), _some(compared)),
+        Section("More", tables=_some(*tables(summaries)[1:])),
+        Section("Not counted", tables=_some(not_counted(summaries))),
+        Section("How it was played", tables=(conditions(store, played, rows),)),
+    ]
+    sections = [one for one in sections if one.tables or one.figures]
+    found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
+    paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
+    return Report(Document(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
+
+
+def write(document: Document, directory: Path, formats: Sequence[str]) -> list[Path]:
+    """Write a document, and its pictures beside it; return the files, the documents first."""
+    directory.mkdir(parents=True, exist_ok=True)
+    texts: dict[Path, bytes] = {}
+    pictures: dict[Path, bytes] = {}
+    for one in (FORMATS[name] for name in formats):
+        texts[directory / f"report.{one.suffix}"] = one.text(document).encode()
+        if one.picture:
+            found = (figure for section in document.sections for figure in section.figures)
+            pictures |= {directory / f"{figure.name}.{one.picture}": one.bytes_of(figure) for figure in found}
+    for path, content in (texts | pictures).items():
+        path.write_bytes(content)
+    return [*texts, *pictures]
+
+
+def _some(*tables: Any) -> tuple[Any, ...]:
+    return tuple(table for table in tables if table is not None)
+
+
+def _planned(experiment: Experiment) -> int:
+    return len(list(planned_cells(experiment))) * len(experiment.seeds) * experiment.repetitions
+
+
+def _missing(experiment: Experiment, played: int) -> list[str]:
+    planned = _planned(experiment)
+    return [f"{planned - played} of {planned} matches were not played yet"] if played < planned else []
+
+
+def _count(experiment: Experiment, summaries: Sequence[Summary], factors: Sequence[str]) -> str:
+    games = sum(one.games for one in summaries)
+    costs = [one.usd * one.games for one in summaries if one.usd is not None]
+    money = f" They cost {sum(costs):.2f} USD." if any(costs) else ""
+    return f"{games} games in {len(summaries)} cells of {', '.join(factors)}; {len(experiment.seeds)} seeds.{money}"

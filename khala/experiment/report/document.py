@@ -1,0 +1,49 @@
+"""What a report consists of. Its texts are plain: each format escapes what means something in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of texts."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int
+    """The first so many columns are words, which begin at the left; the others are numbers."""
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A picture in the forms that formats take."""
+
+    name: str
+    """Of its files, without a suffix."""
+    caption: str
+    svg: str
+    png: bytes
+    pdf: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part with a heading."""
+
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A whole report."""
+
+    title: str
+    paragraphs: tuple[str, ...]
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...]

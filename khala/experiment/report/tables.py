@@ -1,0 +1,218 @@
+"""Summaries of cells as tables: what is asked of all, and columns only where there are values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from khala.experiment.numbers import NONE, number, ratio, ratio_with, share, share_with
+from khala.experiment.report.document import Table
+from khala.experiment.report.summary import FATES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from khala.experiment.report.summary import Summary
+    from khala.experiment.spec import Published
+
+
+MOST_COLUMNS = 4
+"""Values of the last factor that stand beside each other."""
+
+
+class Column(NamedTuple):
+    """One column."""
+
+    title: str
+    value: Callable[[Summary], str]
+    always: bool = False
+    """Whether it is there without any value."""
+
+
+class Kind(NamedTuple):
+    """One table."""
+
+    title: str
+    columns: tuple[Column, ...]
+    note: str
+
+
+KINDS = (
+    Kind(
+        "Results",
+        (
+            Column("games", lambda one: str(one.games), always=True),
+            Column("won", lambda one: share_with(one.won), always=True),
+            Column("draws", lambda one: str(one.draws or NONE)),
+            Column("K/D", lambda one: ratio_with(one.kd), always=True),
+            Column("length", lambda one: _clock(one.length_s)),
+            Column("not counted", lambda one: str(sum(one.not_counted.values()) or NONE)),
+        ),
+        "Won: share of games with its Wilson interval of 95 %; a draw is not won. K/D: value killed in all games / "
+        "value lost in all games, with its bootstrap interval of 95 %. Length: median, in minutes of the game.",
+    ),
+    Kind(
+        "Actions",
+        (
+            Column("accepted", lambda one: number(one.accepted)),
+            Column("refused", lambda one: number(one.refused)),
+            Column("input-conflicting", lambda one: _hundredth(one.hallucinations["input_conflicting"])),
+            Column("fact-conflicting", lambda one: _hundredth(one.hallucinations["fact_conflicting"])),
+            Column("context-conflicting", lambda one: _hundredth(one.hallucinations["context_conflicting"])),
+        ),
+        "Accepted and refused: calls per game. The others: hallucinations of the paper's three kinds, per 100 calls.",
+    ),
+    Kind(
+        "Decisions",
+        (
+            *(Column(name, lambda one, name=name: _some_share(one.fates[name])) for name in FATES),  # type: ignore[misc]
+            Column("latency p50", lambda one: _seconds(one.latency_p50_s)),
+            Column("p95", lambda one: _seconds(one.latency_p95_s)),
+            Column("age p50", lambda one: _some(one.age_p50_loops)),
+            Column("age p95", lambda one: _some(one.age_p95_loops)),
+        ),
+        "What became of decisions, in shares. Latency: from observation to reply, in seconds of the wall; age: from "
+        "observation to effect, in game loops; both are medians over games.",
+    ),
+    Kind(
+        "Tokens and money",
+        (
+            Column("tokens a game", lambda one: _some(one.tokens)),
+            Column("USD a game", lambda one: _usd(one.usd)),
+            Column("USD a win", lambda one: _usd(one.usd_per_win)),
+        ),
+        "Tokens: read and written. USD: of requests whose price is known; a win costs what all games cost / games won.",
+    ),
+    Kind(
+        "Messages",
+        (
+            Column("sent", lambda one: _some(one.messages["messages_sent"])),
+            Column("undeliverable", lambda one: _some(one.messages["messages_undeliverable"])),
+            Column("unfounded", lambda one: _some(one.messages["messages_unfounded"])),
+            Column("read", lambda one: _some(one.messages["messages_read"])),
+            Column("answered", lambda one: _some(one.messages["messages_answered"])),
+            Column("acted on", lambda one: _some(one.messages["messages_acted_on"])),
+        ),
+        "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted on: "
+        "the reader gave a new order that names what the message names.",
+    ),
+    Kind(
+        "Economy",
+        (
+            Column("supply blocked", lambda one: _seconds(one.supply_blocked_s)),
+            Column("minerals unspent", lambda one: number(one.minerals)),
+            Column("vespene unspent", lambda one: number(one.vespene)),
+            Column("first expansion", lambda one: _expansion(one.expansion_s, one.expanded, one.games)),
+        ),
+        "Supply blocked: seconds per game. Unspent: mean over time. First expansion: median of the games that had one, "
+        "in minutes of the game.",
+    ),
+)  # fmt: skip
+
+
+def tables(summaries: Sequence[Summary]) -> list[Table]:
+    """Return the tables of cells, without those that would be empty."""
+    return [table for kind in KINDS if (table := _table(kind, summaries)) is not None]
+
+
+def _table(kind: Kind, summaries: Sequence[Summary]) -> Table | None:
+    texts = {column: [column.value(one) for one in summaries] for column in kind.columns}
+    shown = [column for column in kind.columns if column.always or any(text != NONE for text in texts[column])]
+    if not shown or not summaries:
+        return None
+    factors = tuple(summaries[0].where)
+    rows = [(*one.where.values(), *(texts[column][i] for column in shown)) for i, one in enumerate(summaries)]
+    return Table(kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note)
+
+
+def overview(summaries: Sequence[Summary]) -> Table | None:
+    """Return wins and K/D with columns for each value of the last factor, as papers print them."""
+    if not summaries or len(summaries[0].where) < 2:
+        return None
+    *first, last = summaries[0].where
+    values = list(dict.fromkeys(one.where[last] for one in summaries))
+    rows: dict[tuple[str, ...], dict[str, Summary]] = {}
+    for one in summaries:
+        rows.setdefault(tuple(one.where[name] for name in first), {})[one.where[last]] = one
+    if not 2 <= len(values) <= MOST_COLUMNS:
+        return None
+    columns = (*first, *(f"{value}: {what}" for value in values for what in ("won", "K/D")))
+    texts = [
+        (*where, *(text for value in values for text in _won_and_kd(found.get(value)))) for where, found in rows.items()
+    ]
+    return Table("Overview", columns, tuple(texts), len(first))
+
+
+def not_counted(summaries: Sequence[Summary]) -> Table | None:
+    """Return which matches are in no number, and why; None if there are none."""
+    causes = list(dict.fromkeys(cause for one in summaries for cause in one.not_counted))
+    if not causes:
+        return None
+    rows = [
+        (*one.where.values(), *(str(one.not_counted.get(cause, NONE)) for cause in causes))
+        for one in summaries
+        if one.not_counted
+    ]
+    factors = tuple(summaries[0].where)
+    note = (
+        "Invalid: played, and says nothing about its agents. Crashed: not played to its end. `resume` plays them again."
+    )
+    return Table("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
+
+
+def beside(published: Sequence[Published], summaries: Sequence[Summary]) -> Table | None:
+    """Return published numbers beside ours; None if none was published."""
+    rows = [_row(one, ours) for one in published for ours in _matching(one, summaries)]
+    columns = ("published of", "source", "won there", "K/D there", "ours", "games", "won", "K/D")
+    return Table("Beside what was published", columns, tuple(rows), 2) if rows else None
+
+
+def _matching(one: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
+    """Return the cells that a published number belongs to; `model` may be one that was not played."""
+    ours = [other for other in summaries if all(other.where.get(name, value) == value or name == "model"
+            for name, value in one.where.items()) and _names_a_factor(one, other)]  # fmt: skip
+    exact = [other for other in ours if other.where.get("model") == one.where.get("model")]
+    return list(exact or ours) or [None]
+
+
+def _names_a_factor(one: Published, summary: Summary) -> bool:
+    return any(name in summary.where for name in one.where)
+
+
+def _row(one: Published, ours: Summary | None) -> tuple[str, ...]:
+    there = (", ".join(one.where.values()), one.source, share(one.win_rate), ratio(one.kd))
+    if ours is None:
+        return (*there, "not played", NONE, NONE, NONE)
+    return (*there, ", ".join(ours.where.values()), str(ours.games), share_with(ours.won), ratio_with(ours.kd))
+
+
+def _won_and_kd(one: Summary | None) -> tuple[str, str]:
+    return (share_with(one.won), ratio(one.kd.value)) if one is not None else (NONE, NONE)
+
+
+def _clock(seconds: float | None) -> str:
+    return NONE if seconds is None else f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def _expansion(seconds: float | None, expanded: int, games: int) -> str:
+    return NONE if seconds is None else f"{_clock(seconds)} ({expanded} of {games})"
+
+
+def _seconds(value: float | None) -> str:
+    return NONE if value is None else f"{number(value)} s"
+
+
+def _some(value: float | None) -> str:
+    """Return a number that is worth a column only if it is not 0 everywhere."""
+    return number(value) if value else NONE
+
+
+def _some_share(value: float | None) -> str:
+    return share(value, digits=1) if value else NONE
+
+
+def _hundredth(value: float | None) -> str:
+    return NONE if value is None else f"{value:.1f}"
+
+
+def _usd(value: float | None) -> str:
+    return NONE if value is None else f"{value:.4f}" if 0 < value < 0.1 else f"{value:.2f}"

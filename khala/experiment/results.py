@@ -1,0 +1,172 @@
+"""The commands that read what was played: `khala experiment compare`, `report` and `export`."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from rich.table import Table
+
+from khala.experiment.options import OUT, Directory, Out
+from khala_orchestrator.cli import Json
+from khala_orchestrator.console import stderr_console, stdout_console
+from khala_protocol.errors import ConfigError
+from khala_protocol.visible import visible_line
+
+if TYPE_CHECKING:
+    from khala.experiment.compare import Compared, Findings
+    from khala.experiment.store import Store
+
+COMPARE_EPILOG = """
+Examples:\n
+    khala experiment compare llm_pysc2:player=skilled llm_pysc2:player=focus\n
+    khala experiment compare monday tuesday --allow code\n
+    khala experiment compare pair:clock=frozen pair:clock=realtime --allow clock --measure win --measure tokens
+"""
+USUAL_MEASURES = ["win", "kd"]
+WIDE = 160
+"""Characters of a line that no terminal shows."""
+
+One = Annotated[str, typer.Argument(help="DIR, or DIR:factor=value,factor=value.", show_default=False)]
+Allow = Annotated[
+    list[str] | None, typer.Option(help="A field in which the two may differ, such as clock.", metavar="FIELD")
+]
+Measure = Annotated[list[str], typer.Option(help="What is compared: win, or a column of the export.", metavar="NAME")]
+Format = Annotated[
+    Literal["markdown", "latex", "html", "all"], typer.Option("--format", help="In what the report is written.")
+]
+Into = Annotated[
+    Path | None,
+    typer.Option("--into", help="Directory of the report.", show_default="report, in that of the experiment"),
+]
+By = Annotated[
+    str, typer.Option(help="Factors whose values get a line each, with commas between.", show_default="all factors")
+]
+Parquet = Annotated[Path | None, typer.Option(help="File to write; needs the extra `data`.", metavar="FILE")]
+Csv = Annotated[Path | None, typer.Option(help="File to write.", metavar="FILE")]
+
+
+def compare(
+    a: One,
+    b: One,
+    *,
+    allow: Allow = None,
+    measure: Measure = USUAL_MEASURES,
+    out: Out = OUT,
+    as_json: Json = False,
+) -> None:
+    """Compare two selections of matches, paired by seed. Unlike runs are refused, with the fields that differ."""
+    from khala.experiment.compare import compare as compared  # noqa: PLC0415  # scipy takes a second
+    from khala.experiment.numbers import plain  # noqa: PLC0415
+    from khala.experiment.selection import select  # noqa: PLC0415
+
+    findings = compared(select(a, out), select(b, out), measures=measure, allow=allow or ())
+    if as_json:
+        typer.echo(json.dumps(plain(findings)))
+        return
+    screen = stdout_console()
+    screen.width = screen.width if screen.is_terminal else WIDE
+    screen.print(_table(findings))
+    for line in _remarks(findings):
+        screen.print(visible_line(line), soft_wrap=True)
+
+
+def report(
+    directory: Directory,
+    *,
+    formats: Format = "all",
+    into: Into = None,
+    by: By = "",
+    out: Out = OUT,
+    as_json: Json = False,
+) -> None:
+    """Make tables and figures of an experiment, with how it was played."""
+    from khala.experiment.numbers import plain  # noqa: PLC0415
+    from khala.experiment.report import FORMATS, write  # noqa: PLC0415
+    from khala.experiment.report import report as reported  # noqa: PLC0415
+
+    store = _opened(directory, out)
+    made = reported(store, [name.strip() for name in by.split(",") if name.strip()])
+    files = write(made.document, into or store.directory / "report", list(FORMATS) if formats == "all" else [formats])
+    for warning in made.document.warnings:
+        stderr_console().print(visible_line(warning), style="yellow", soft_wrap=True)
+    if as_json:
+        typer.echo(json.dumps(plain(made.data()) | {"files": list(map(str, files))}))
+        return
+    for path in files:
+        typer.echo(path)
+
+
+def export(directory: Directory, *, parquet: Parquet = None, csv: Csv = None, out: Out = OUT) -> None:
+    """Write a row for each episode and side: its factors, and everything that was measured."""
+    from khala.experiment.export import write_csv, write_parquet  # noqa: PLC0415
+
+    if parquet is None and csv is None:
+        raise ConfigError("name a file to write: --parquet FILE or --csv FILE")
+    store = _opened(directory, out)
+    for path, write in ((parquet, write_parquet), (csv, write_csv)):
+        if path is not None:
+            stderr_console().print(f"{write(store, path)} rows are in {path}", soft_wrap=True)
+
+
+def _opened(directory: Path, out: Path) -> "Store":
+    from khala.experiment.store import Store  # noqa: PLC0415
+
+    return Store.opened(directory if directory.is_dir() else out / directory)
+
+
+# --- the comparison in words --------------------------------------------------------------------------
+
+
+def _table(findings: "Findings") -> Table:
+    table = Table(box=None, pad_edge=False, title=f"A {visible_line(findings.a)}, B {visible_line(findings.b)}")
+    for i, column in enumerate(("task", "measure", "A", "B", "A against B", "p", "corrected", "games")):
+        table.add_column(column, justify="left" if i < 2 else "right", no_wrap=i < 2)
+    for one in findings.compared:
+        table.add_row(*map(visible_line, _cells(one)))
+    return table
+
+
+def _cells(one: "Compared") -> tuple[str, ...]:
+    from khala.experiment import numbers  # noqa: PLC0415
+
+    estimate = {"win": numbers.share_with, "kd": numbers.ratio_with}.get(one.measure, numbers.number_with)
+    games = f"{one.games} {'pairs' if one.paired else 'each'}"
+    if one.test is None:
+        return (
+            one.task,
+            one.measure,
+            estimate(one.a),
+            estimate(one.b),
+            "needs pairs",
+            numbers.NONE,
+            numbers.NONE,
+            games,
+        )
+    effect = numbers.points_with(one.test.effect) if one.measure == "win" else numbers.difference_with(one.test.effect)
+    if one.measure == "kd":
+        effect = f"\N{MULTIPLICATION SIGN} {numbers.ratio_with(one.test.effect)}"
+    p = (numbers.p_value(one.test.p), numbers.p_value(one.p_holm))
+    return (one.task, one.measure, estimate(one.a), estimate(one.b), effect, *p, games)
+
+
+def _remarks(findings: "Findings") -> list[str]:
+    tests = list(dict.fromkeys(one.test.test for one in findings.compared if one.test))
+    lines = [f"Intervals of 95 %. {', '.join(tests)}; corrected for {len(findings.compared)} tests after Holm."]
+    lines += [_needs(one) for one in findings.compared if one.games_for_power]
+    if any(findings.unpaired):
+        lines.append(f"Games without a partner: {findings.unpaired[0]} of A, {findings.unpaired[1]} of B.")
+    for name, left_out in zip("AB", findings.left_out, strict=True):
+        lines += [f"Of {name}, {count} matches are {state} and not used." for state, count in left_out.items()]
+    if findings.not_shared:
+        lines.append(f"Only one of the two has {', '.join(findings.not_shared)}.")
+    return lines + [f"They differ, which was allowed: {one}." for one in findings.allowed]
+
+
+def _needs(one: "Compared") -> str:
+    assert one.games_for_power is not None
+    kind, more = "pairs" if one.paired else "games each", max(1, one.games_for_power - one.games)
+    return (
+        f"{one.task}: if the difference in wins is as large as it seems, about {one.games_for_power} {kind} would show "
+        f"it four times in five; that is {more} more."
+    )
