@@ -24,6 +24,10 @@ Examples:\n
     khala experiment compare pair:clock=frozen pair:clock=realtime --allow clock --measure win --measure tokens
 """
 USUAL_MEASURES = ["win", "kd"]
+TO_SHOW_IT = (
+    "To show it: with so many games more, a difference in wins that is as large as it seems here would be found in four"
+    " of five experiments."
+)
 WIDE = 160
 """Characters of a line that no terminal shows."""
 
@@ -120,7 +124,7 @@ def _opened(directory: Path, out: Path) -> "Store":
 
 def _table(findings: "Findings") -> Table:
     table = Table(box=None, pad_edge=False, title=f"A {visible_line(findings.a)}, B {visible_line(findings.b)}")
-    for i, column in enumerate(("task", "measure", "A", "B", "A against B", "p", "corrected", "games")):
+    for i, column in enumerate(("task", "measure", "A", "B", "A against B", "p", "corrected", "games", "to show it")):
         table.add_column(column, justify="left" if i < 2 else "right", no_wrap=i < 2)
     for one in findings.compared:
         table.add_row(*map(visible_line, _cells(one)))
@@ -132,41 +136,35 @@ def _cells(one: "Compared") -> tuple[str, ...]:
 
     estimate = {"win": numbers.share_with, "kd": numbers.ratio_with}.get(one.measure, numbers.number_with)
     games = f"{one.games} {'pairs' if one.paired else 'each'}"
+    p = (numbers.p_value(one.test.p if one.test else None), numbers.p_value(one.p_holm))
+    return (one.task, one.measure, estimate(one.a), estimate(one.b), _effect(one), *p, games, _more(one))
+
+
+def _effect(one: "Compared") -> str:
+    from khala.experiment import numbers  # noqa: PLC0415
+
     if one.test is None:
-        return (
-            one.task,
-            one.measure,
-            estimate(one.a),
-            estimate(one.b),
-            "needs pairs",
-            numbers.NONE,
-            numbers.NONE,
-            games,
-        )
-    effect = numbers.points_with(one.test.effect) if one.measure == "win" else numbers.difference_with(one.test.effect)
+        return "needs pairs"
     if one.measure == "kd":
-        effect = f"\N{MULTIPLICATION SIGN} {numbers.ratio_with(one.test.effect)}"
-    p = (numbers.p_value(one.test.p), numbers.p_value(one.p_holm))
-    return (one.task, one.measure, estimate(one.a), estimate(one.b), effect, *p, games)
+        return f"\N{MULTIPLICATION SIGN} {numbers.ratio_with(one.test.effect)}"
+    return (numbers.points_with if one.measure == "win" else numbers.difference_with)(one.test.effect)
+
+
+def _more(one: "Compared") -> str:
+    return f"{max(1, one.games_for_power - one.games)} more" if one.games_for_power else ""
 
 
 def _remarks(findings: "Findings") -> list[str]:
     tests = list(dict.fromkeys(one.test.test for one in findings.compared if one.test))
     lines = [f"Intervals of 95 %. {', '.join(tests)}; corrected for {len(findings.compared)} tests after Holm."]
-    lines += [_needs(one) for one in findings.compared if one.games_for_power]
+    if any(one.games_for_power for one in findings.compared):
+        lines.append(TO_SHOW_IT)
     if any(findings.unpaired):
         lines.append(f"Games without a partner: {findings.unpaired[0]} of A, {findings.unpaired[1]} of B.")
     for name, left_out in zip("AB", findings.left_out, strict=True):
-        lines += [f"Of {name}, {count} matches are {state} and not used." for state, count in left_out.items()]
+        if left_out:
+            counts = ", ".join(f"{number} {state}" for state, number in left_out.items())
+            lines.append(f"Matches of {name} that are not used: {counts}.")
     if findings.not_shared:
         lines.append(f"Only one of the two has {', '.join(findings.not_shared)}.")
     return lines + [f"They differ, which was allowed: {one}." for one in findings.allowed]
-
-
-def _needs(one: "Compared") -> str:
-    assert one.games_for_power is not None
-    kind, more = "pairs" if one.paired else "games each", max(1, one.games_for_power - one.games)
-    return (
-        f"{one.task}: if the difference in wins is as large as it seems, about {one.games_for_power} {kind} would show "
-        f"it four times in five; that is {more} more."
-    )

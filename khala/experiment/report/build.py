@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from khala.experiment.report.document import Figure
     from khala.experiment.report.summary import Summary
     from khala.experiment.spec import Experiment
     from khala.experiment.store import Store
@@ -31,13 +30,12 @@ class Format(NamedTuple):
     text: Callable[[Document], str]
     picture: str
     """Suffix of the pictures beside it; "" if it holds them."""
-    bytes_of: Callable[[Figure], bytes]
 
 
 FORMATS = {
-    "markdown": Format("md", markdown.text, "png", lambda figure: figure.png),
-    "latex": Format("tex", latex.text, "pdf", lambda figure: figure.pdf),
-    "html": Format("html", html.text, "", lambda figure: figure.svg.encode()),
+    "markdown": Format("md", markdown.text, "png"),
+    "latex": Format("tex", latex.text, "pdf"),
+    "html": Format("html", html.text, ""),
 }
 
 
@@ -91,7 +89,7 @@ def write(document: Document, directory: Path, formats: Sequence[str]) -> list[P
         texts[directory / f"report.{one.suffix}"] = one.text(document).encode()
         if one.picture:
             found = (figure for section in document.sections for figure in section.figures)
-            pictures |= {directory / f"{figure.name}.{one.picture}": one.bytes_of(figure) for figure in found}
+            pictures |= {directory / f"{figure.name}.{one.picture}": figure.draw(one.picture) for figure in found}
     for path, content in (texts | pictures).items():
         path.write_bytes(content)
     return [*texts, *pictures]

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,14 +23,13 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A picture in the forms that formats take."""
+    """A picture, drawn when a format takes it."""
 
     name: str
     """Of its files, without a suffix."""
     caption: str
-    svg: str
-    png: bytes
-    pdf: bytes
+    draw: Callable[[str], bytes]
+    """Returns it as `svg`, `png` or `pdf`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import io
 import itertools
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from khala.experiment.report.document import Figure
@@ -34,6 +35,7 @@ LONGEST = 40
 """Characters of a name."""
 LEAST_KD, MOST_KD = 1 / 32, 32
 """K/D outside of these stands at the edge, with an arrow."""
+WINS_CAPTION = "Games won, with Wilson intervals of 95 %."
 KD_CAPTION = (
     "K/D: value killed / value lost, with bootstrap intervals of 95 %. Dotted: nothing was killed or nothing lost, so "
     "that the games do not say how much more it might be."
@@ -67,23 +69,18 @@ class _Row:
 def figures(summaries: Sequence[Summary]) -> list[Figure]:
     """Return the pictures of cells that have games."""
     played = [one for one in summaries if one.games]
-    if not played:
-        return []
-    win_rates = _figure(
-        played, "win_rate", "Games won, with Wilson intervals of 95 %.", _win_rate_axis, lambda one: one.won
-    )
     killed = [one for one in played if one.kd.value is not None]
-    return [win_rates, _figure(killed, "kd", KD_CAPTION, _kd_axis,
-                               lambda one: one.kd)] if killed else [win_rates]  # fmt: skip
+    wins = Figure("win_rate", WINS_CAPTION, partial(_drawn, played, _win_rate_axis, lambda one: one.won))
+    kd = Figure("kd", KD_CAPTION, partial(_drawn, killed, _kd_axis, lambda one: one.kd))
+    return [figure for figure, cells in ((wins, played), (kd, killed)) if cells]
 
 
-def _figure(
+def _drawn(
     summaries: Sequence[Summary],
-    name: str,
-    caption: str,
     axis: Callable[[Axes, Sequence[Interval]], tuple[float, float]],
     value: Callable[[Summary], Interval],
-) -> Figure:
+    kind: str,
+) -> bytes:
     import matplotlib as mpl  # noqa: PLC0415  # half a second, for reports alone
     from matplotlib.figure import Figure as Canvas  # noqa: PLC0415
 
@@ -97,7 +94,7 @@ def _figure(
             _draw(axes, row, value, low, high, len(colours))
         _finish(axes, rows)
         _legend(canvas, colours)
-        return Figure(name, caption, _bytes(canvas, "svg").decode(), _bytes(canvas, "png"), _bytes(canvas, "pdf"))
+        return _bytes(canvas, kind)
 
 
 def _colours(summaries: Sequence[Summary]) -> list[str]:

@@ -109,7 +109,8 @@ def _cells(tag: str, cells: tuple[str, ...], words: int) -> Iterator[str]:
 
 def _svg(figure: Figure) -> str:
     """Return a picture as a part of the page: in its colours, under ids that no other picture has."""
-    svg = figure.svg[figure.svg.index("<svg") :].strip()
+    svg = figure.draw("svg").decode()
+    svg = svg[svg.index("<svg") :].strip()
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{figure.name}-", svg)
     svg = svg.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")

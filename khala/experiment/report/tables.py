@@ -38,7 +38,7 @@ class Kind(NamedTuple):
 
 KINDS = (
     Kind(
-        "Results",
+        "By cell",
         (
             Column("games", lambda one: str(one.games), always=True),
             Column("won", lambda one: share_with(one.won), always=True),
@@ -92,8 +92,8 @@ KINDS = (
             Column("answered", lambda one: _some(one.messages["messages_answered"])),
             Column("acted on", lambda one: _some(one.messages["messages_acted_on"])),
         ),
-        "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted on: "
-        "the reader gave a new order that names what the message names.",
+        "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted "
+        "on: the reader gave a new order that names what the message names.",
     ),
     Kind(
         "Economy",
@@ -162,8 +162,8 @@ def not_counted(summaries: Sequence[Summary]) -> Table | None:
 def beside(published: Sequence[Published], summaries: Sequence[Summary]) -> Table | None:
     """Return published numbers beside ours; None if none was published."""
     rows = [_row(one, ours) for one in published for ours in _matching(one, summaries)]
-    columns = ("published of", "source", "won there", "K/D there", "ours", "games", "won", "K/D")
-    return Table("Beside what was published", columns, tuple(rows), 2) if rows else None
+    columns = ("published of", "source", "ours", "won there", "won here", "K/D there", "K/D here", "games here")
+    return Table("Beside what was published", columns, tuple(rows), 3) if rows else None
 
 
 def _matching(one: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
@@ -179,10 +179,11 @@ def _names_a_factor(one: Published, summary: Summary) -> bool:
 
 
 def _row(one: Published, ours: Summary | None) -> tuple[str, ...]:
-    there = (", ".join(one.where.values()), one.source, share(one.win_rate), ratio(one.kd))
+    there = (", ".join(one.where.values()), one.source)
     if ours is None:
-        return (*there, "not played", NONE, NONE, NONE)
-    return (*there, ", ".join(ours.where.values()), str(ours.games), share_with(ours.won), ratio_with(ours.kd))
+        return (*there, "not played", share(one.win_rate), NONE, ratio(one.kd), NONE, NONE)
+    rates = (share(one.win_rate), share_with(ours.won), ratio(one.kd), ratio_with(ours.kd))
+    return (*there, ", ".join(ours.where.values()), *rates, str(ours.games))
 
 
 def _won_and_kd(one: Summary | None) -> tuple[str, str]:
@@ -198,7 +199,7 @@ def _expansion(seconds: float | None, expanded: int, games: int) -> str:
 
 
 def _seconds(value: float | None) -> str:
-    return NONE if value is None else f"{number(value)} s"
+    return NONE if value is None else f"{value:.2f} s"
 
 
 def _some(value: float | None) -> str:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import random
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
 from khala.experiment.measures import Measures
 from khala.experiment.store import Played, Store
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
 CARD: dict[str, Any] = {
@@ -28,7 +25,7 @@ CARD: dict[str, Any] = {
 }
 FILE = """
 name: made
-description: {description}
+description: {description!r}
 factors:
   task: {tasks}
   player: [{{name: skilled, model: scripted/skilled}}, {{name: focus, model: scripted/focus-fire}}]
@@ -75,6 +72,22 @@ class HandMade:
         rows = [measures(task=task, side="blue", seed=seed, outcome=outcome, **numbers)] if state != "crashed" else []
         self.store.add(played, rows)
 
+    def duel(self, cell: dict[str, str], seed: int, winner: str) -> None:
+        """Add a match of two sides."""
+        key = f"{'-'.join(cell.values())}-{seed}"
+        numbers: dict[str, Any] = {
+            "killed_value": 500.0,
+            "lost_value": 250.0,
+            "steps": 20,
+            "game_s": 20.0,
+            "seed": seed,
+        }
+        rows = [
+            measures(task=cell["task"], side=side, outcome="win" if side == winner else "loss", **numbers)
+            for side in ("blue", "red")
+        ]
+        self.store.add(Played(key, cell, seed, 0, "done", "", 1, "", 4.0, None, 0, CARD), rows)
+
     def fill(self, wins: dict[str, set[int]], seeds: int = 20, *, task: str = "2s3z", **values: Any) -> None:
         """Add matches of players in a task; `wins` has the seeds with which each wins."""
         for player, won in wins.items():
@@ -83,15 +96,3 @@ class HandMade:
                 killed = {"killed_value": drawn.randint(5, 12) * 50.0, "lost_value": drawn.randint(3, 12) * 50.0}
                 outcome = "win" if seed in won else "loss"
                 self.add({"task": task, "player": player}, seed, outcome, **killed | values)
-
-
-@pytest.fixture
-def made(tmp_path: Path) -> HandMade:
-    """An experiment of the task 2s3z and two players, without matches, in `tmp_path / "made"`."""
-    return HandMade(tmp_path / "made")
-
-
-@pytest.fixture
-def another(tmp_path: Path) -> Callable[[str], HandMade]:
-    """Return what begins experiments beside it."""
-    return lambda name: HandMade(tmp_path / name)
