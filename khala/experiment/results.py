@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COMPARE_EPILOG = """
 Examples:\n
-    khala experiment compare llm_pysc2:player=skilled llm_pysc2:player=focus\n
+    khala experiment compare smoke:player=skilled smoke:player=focus-fire\n
     khala experiment compare monday tuesday --allow code\n
     khala experiment compare pair:clock=frozen pair:clock=realtime --allow clock --measure win --measure tokens
 """

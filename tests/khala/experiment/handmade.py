@@ -47,6 +47,7 @@ class HandMade:
     def __init__(self, directory: Path) -> None:
         self.store = Store(directory)
         directory.mkdir(parents=True, exist_ok=True)
+        self.store._index.execute("pragma synchronous = off")
         self.describe()
 
     def describe(self, *, tasks: str = "[2s3z]", seeds: int = 20, description: str = "", more: str = "") -> None:

@@ -72,7 +72,15 @@ def test_by_pools_the_other_factors(made: HandMade) -> None:
 
 
 def test_what_agents_did_is_counted_per_game_and_per_hundred_calls(made: HandMade) -> None:
-    values = {"calls": 50, "fact_conflicting": 3, "accepted": 40, "rejected": 5, "decisions": 4, "fresh": 3, "stale": 1}
+    values: dict[str, Any] = {
+        "calls": 50,
+        "fact_conflicting": 3,
+        "accepted": 40,
+        "rejected": 5,
+        "decisions": 4,
+        "fresh": 3,
+        "stale": 1,
+    }
     for seed in (1, 2):
         made.add({"task": "3s5z", "player": "skilled"}, seed, **values)
     actions = row(table(made, "Actions"), "3s5z", "skilled")
@@ -82,7 +90,7 @@ def test_what_agents_did_is_counted_per_game_and_per_hundred_calls(made: HandMad
 
 
 def test_a_win_costs_what_all_games_cost(made: HandMade) -> None:
-    money = {"prompt_tokens": 900, "completion_tokens": 100, "cost_usd": 0.4, "paid_usd": 0.5}
+    money: dict[str, Any] = {"prompt_tokens": 900, "completion_tokens": 100, "cost_usd": 0.4, "paid_usd": 0.5}
     for seed, outcome in enumerate(("win", "loss", "loss", "win")):
         made.add({"task": "3s5z", "player": "skilled"}, seed, outcome, **money)
     found = row(table(made, "Tokens and money"), "3s5z", "skilled")
@@ -118,7 +126,7 @@ def test_the_sides_of_duels_have_lines_of_their_own(tmp_path: Path) -> None:
 
 
 def test_how_it_was_played_stands_there(made: HandMade) -> None:
-    facts = dict(table(made, "").rows)
+    facts = {row[0]: row[1] for row in table(made, "").rows}
     assert facts["game"] == "Khala simulator 0.1.0, as 4.10.0.75689"
     assert facts["maps"] == "2s3z (00000000)"
     assert facts["clock"] == "frozen: 22 loops a step, waits at most 15 s"
