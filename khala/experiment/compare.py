@@ -67,7 +67,7 @@ class Findings:
     b: str
     compared: tuple[Compared, ...]
     unpaired: tuple[int, int]
-    """Games that have no partner, of tasks that both played."""
+    """Games that have no partner."""
     left_out: tuple[dict[str, int], dict[str, int]]
     """Matches that say nothing, by state."""
     not_shared: tuple[str, ...]
@@ -96,7 +96,7 @@ def compare(a: Selection, b: Selection, *, measures: Sequence[str] = USUAL, allo
         for name in measures
     ]
     pairs = sum(len(games_a[group].keys() & games_b[group].keys()) for group in shared)
-    all_a, all_b = (sum(len(games[group]) for group in shared) for games in (games_a, games_b))
+    all_a, all_b = (sum(map(len, games.values())) for games in (games_a, games_b))
     either = sorted({group.task for group in games_a} ^ {group.task for group in games_b})
     return Findings(a.text, b.text, _corrected(found), (all_a - pairs, all_b - pairs), (a.left_out, b.left_out),
                   tuple(either), tuple(allowed))  # fmt: skip

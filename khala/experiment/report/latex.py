@@ -24,11 +24,12 @@ HEAD = r"""\documentclass[10pt,a4paper]{article}
 SPECIAL = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "_": r"\_", "%": r"\%",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "[": "{[}", "]": "{]}", "*": "{*}",  # would be options of the command before them, such as the end of a row
     "|": r"\textbar{}", '"': r"\textquotedbl{}", "\N{EN DASH}": "--", "—": "---", "\N{MINUS SIGN}": "$-$",
     "∞": r"$\infty$", "…": r"\ldots{}", "·": r"$\cdot$", "\N{MULTIPLICATION SIGN}": r"$\times$",
 }  # fmt: skip
 SIZE = r"width=0.9\textwidth,height=0.85\textheight,keepaspectratio"
-WIDE = 10
+WIDE = 9
 """With more columns a table stands across the page."""
 LONG_TEXT = 40
 """Characters; a column with longer words breaks lines."""

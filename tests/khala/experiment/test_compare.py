@@ -65,8 +65,9 @@ def test_kd_and_other_numbers_are_compared_too_and_all_tests_are_corrected(made:
 def test_games_without_a_partner_are_counted_and_not_used(made: HandMade) -> None:
     made.fill({"skilled": EARLY}, 20)
     made.fill({"focus": LATE}, 15)
+    made.fill({"focus": LATE}, 3, task="3s5z")
     findings = compared(made)
-    assert (one(findings).games, findings.unpaired) == (15, (5, 0))
+    assert (one(findings).games, findings.unpaired, findings.not_shared) == (15, (5, 3), ("3s5z",))
 
 
 def test_without_any_pair_all_games_are_compared(made: HandMade) -> None:

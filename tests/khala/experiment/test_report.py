@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from khala.cli import app
+from khala.experiment.plan import plan
 from khala.experiment.report import FORMATS, report, write
 from khala.experiment.report import html as as_html
 from khala.experiment.report import latex as as_latex
@@ -18,12 +19,13 @@ from khala.experiment.report import markdown as as_markdown
 from khala.experiment.report.document import Document, Section, Table
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.handmade import CARD, HandMade
+from tests.khala.experiment.made import record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 EARLY, LATE = set(range(1, 16)), set(range(9, 21))
-HOSTILE = "<script>alert('&')</script> | $x^2$ _a_ \\end{document} % {\x1b]0;x\x07 `b` 中\u202e"
+HOSTILE = "[1]* <script>alert('&')</script> | $x^2$ _a_ \\end{document} % {\x1b]0;x\x07 `b` 中\u202e"
 
 
 @pytest.fixture
@@ -134,6 +136,16 @@ def test_how_it_was_played_stands_there(made: HandMade) -> None:
     assert (facts["code"], facts["seeds"], facts["human advice"]) == ("c" * 12, "1 to 20", "none")
 
 
+def test_models_are_named_as_they_were_asked_and_as_they_answered(made: HandMade) -> None:
+    match = plan(made.store.experiment())[0]
+    path = made.store.recording_for(match.key)
+    path.parent.mkdir(parents=True)
+    record(path, match.config)
+    made.store.take(path, attempts=1)
+    facts = {row[0]: row[1] for row in table(made, "").rows}
+    assert (facts["models as asked"], facts["models as answered"], facts["endpoints"]) == ("m", "m", "e")
+
+
 @pytest.mark.parametrize(
     ("card", "words"),
     [
@@ -238,6 +250,7 @@ def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
     assert text.count(r"\end{document}") == 1
     assert r"\textless{}script\textgreater{}" in text
     assert r"\texttt{U+4E2D}" in text
+    assert not re.search(r"\\\\\s*[\[*]", text)
     assert all(ord(letter) < 0x180 for letter in text)
     rows = [line for line in text.splitlines() if line.endswith(r" \\") and "2s3z &" in line]
     assert rows
