@@ -71,7 +71,7 @@ class HandMade:
         played = Played(key, cell, seed, 0, state, cause, 1, "", 4.0, None, 0, CARD | (card or {}))
         numbers = {"killed_value": 500.0, "lost_value": 250.0, "kd": 2.0, "steps": 20, "game_s": 20.0} | values
         rows = [measures(task=task, side="blue", seed=seed, outcome=outcome, **numbers)] if state != "crashed" else []
-        self.store.add(played, rows)
+        self.store.add(played, [(row, []) for row in rows])
 
     def duel(self, cell: dict[str, str], seed: int, winner: str) -> None:
         """Add a match of two sides."""
@@ -87,7 +87,7 @@ class HandMade:
             measures(task=cell["task"], side=side, outcome="win" if side == winner else "loss", **numbers)
             for side in ("blue", "red")
         ]
-        self.store.add(Played(key, cell, seed, 0, "done", "", 1, "", 4.0, None, 0, CARD), rows)
+        self.store.add(Played(key, cell, seed, 0, "done", "", 1, "", 4.0, None, 0, CARD), [(row, []) for row in rows])
 
     def fill(self, wins: dict[str, set[int]], seeds: int = 20, *, task: str = "2s3z", **values: Any) -> None:
         """Add matches of players in a task; `wins` has the seeds with which each wins."""
