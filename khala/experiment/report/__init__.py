@@ -6,6 +6,7 @@
 summary      the numbers of a cell, with intervals
 conditions   how it was played, and what should be the same and is not
 tables       summaries as tables
+calls        what became of calls, by agent and action
 figures      summaries as pictures
 document     what a report consists of, in no format
 markdown, html, latex   a document in a format

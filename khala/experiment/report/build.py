@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from khala.experiment.plan import cells as planned_cells
 from khala.experiment.report import html, latex, markdown
+from khala.experiment.report.calls import calls
 from khala.experiment.report.conditions import conditions, warnings
 from khala.experiment.report.document import Document, Section
 from khala.experiment.report.figures import figures
@@ -64,13 +65,14 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
     if not known:
         raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
     played, rows = list(known.values()), store.results()
+    done = {one.key for one in played if one.state == "done"}
     groups = cells(played, rows, by)
     summaries = [summary(cell) for cell in groups]
     compared = beside(experiment.published, summaries)
     sections = [
         Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
         Section("Beside what was published", (experiment.differs,) if experiment.differs else (), _some(compared)),
-        Section("More", tables=_some(*tables(summaries)[1:])),
+        Section("More", tables=_some(*tables(summaries)[1:], calls(store.calls(), done))),
         Section("Not counted", tables=_some(not_counted(summaries))),
         Section("How it was played", tables=(conditions(store, played, rows),)),
     ]

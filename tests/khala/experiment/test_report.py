@@ -16,6 +16,7 @@ from khala.experiment.report import FORMATS, report, write
 from khala.experiment.report import html as as_html
 from khala.experiment.report import latex as as_latex
 from khala.experiment.report import markdown as as_markdown
+from khala.experiment.report.calls import calls
 from khala.experiment.report.document import Document, Section, Table
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.handmade import CARD, HandMade
@@ -293,3 +294,20 @@ def test_the_command_writes_the_formats_and_prints_numbers(made: HandMade, tmp_p
     cell = next(one for one in data["cells"] if one["where"] == {"task": "2s3z", "player": "skilled"})
     assert (cell["games"], cell["won"]["value"]) == (20, 0.75)
     assert "were not played yet" not in printed.stdout.partition('"warnings"')[0]
+
+
+def test_calls_are_counted_by_agent_and_action_where_they_count() -> None:
+    def row(match: str, agent: str, action: str, became: str, count: int) -> dict[str, Any]:
+        return {"match": match, "side": "blue", "agent": agent, "action": action, "became": became, "count": count}
+
+    rows = [
+        row("a", "Stalkers", "Attack_Unit", "accepted", 6), row("b", "Stalkers", "Attack_Unit", "dead_target", 2),
+        row("b", "Zealots", "Stop", "accepted", 1), row("crashed", "Zealots", "Stop", "accepted", 99),
+    ]  # fmt: skip
+    table = calls(rows, {"a", "b"})
+    assert table is not None
+    assert table.rows == (
+        ("Stalkers", "Attack_Unit", "8", "75.0 %", "dead target 2"),
+        ("Zealots", "Stop", "1", "100.0 %", ""),
+    )
+    assert calls(rows, set()) is None
