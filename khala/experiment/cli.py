@@ -246,11 +246,17 @@ async def _until_done(
 
 def _goes_on(runner: "Runner", matches: "list[PlannedMatch]", *, yes: bool) -> bool:
     estimate = runner.estimate(matches)
+    if not runner.knows_anything:
+        runner.stopped = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
+        return False
     stderr_console().print(words_of(estimate), soft_wrap=True)
     limit = runner.budget.usd
     if limit is not None and estimate.usd is not None and runner.spent.usd + estimate.usd > limit:
-        runner.stopped = f"the rest would exceed the budget of {limit:g} USD"
-        return yes
+        runner.stopped = (
+            f"with the rest it would cost more than the budget of {limit:g} USD: raise it, or leave out --pilot to "
+            f"play as much as it allows"
+        )
+        return False
     if yes or not estimate.matches or not sys.stdin.isatty():
         return True
     if typer.confirm("Play them?", default=True, err=True):

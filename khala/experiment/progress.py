@@ -64,7 +64,8 @@ class Watcher:
         state = event.played.state
         if event.what == "ends":
             self._counts[state] += 1
-        because = f": {event.words or event.played.cause}" if state != "done" else ""
+        why = " · ".join(dict.fromkeys(filter(None, (event.played.cause, event.words))))
+        because = f": {why}" if state != "done" else ""
         again = "; it is played again" if event.what == "again" else ""
         if state != "done" or not self._console.is_terminal:
             took = "" if event.played.wall_s is None else f" in {event.played.wall_s:.0f} s"

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from khala.experiment.spec import Budget, Experiment
     from khala.experiment.store import Played, Store
 
+LEAST_USD = 1e-6
+"""Less is nothing: sums of money are not exact."""
 ROOM = 2.0
 """A match may spend this many times what the dearest one of its cell has cost."""
 _CRASHES = {"lost": "crash", "error": "crash", "timeout": "timeout"}
@@ -81,6 +83,8 @@ class Runner:
     _played: dict[str, Played] = field(default_factory=dict)
     _waiting: deque[PlannedMatch] = field(default_factory=deque)
     _tries: Counter[str] = field(default_factory=Counter)
+    _short_usd: dict[str, float] = field(default_factory=dict)
+    """By cell, the most that was not enough for one of its matches."""
 
     def __post_init__(self) -> None:
         """Count what was spent before, also by a runner that was killed."""
@@ -88,6 +92,8 @@ class Runner:
         self._played = self.store.played()
         for played in self._played.values():
             self._count(played)
+            if played.cause == "budget":
+                self._was_short(played.cell, played.cost_usd or 0.0)
 
     async def play(self, matches: Sequence[PlannedMatch]) -> None:
         """Play those of the matches that are missing, several at a time."""
@@ -130,6 +136,8 @@ class Runner:
             self.spent.usd += part_usd or 0.0  # nobody knows what it has cost: a node that died took the recording
         self.store.add(*found)
         self.spent.held_usd -= part_usd or 0.0
+        if found[0].cause == "budget" and part_usd is not None:
+            self._was_short(match.cell, part_usd)
         self._end(match, done, found[0])
 
     def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:
@@ -158,10 +166,16 @@ class Runner:
         if self.budget.tokens is not None and self.spent.tokens + tokens > self.budget.tokens:
             return f"the budget of {self.budget.tokens} tokens is used up ({self.spent.tokens} were read and written)"
         usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
-        left = self._left_usd()
-        if left is not None and (left <= 0 or left < usual_usd):
+        left, short = self._left_usd(), self._short_usd.get(str(match.cell))
+        if left is not None and (left < LEAST_USD or left < usual_usd):
             return f"the budget of {self.budget.usd:g} USD is used up ({self.spent.usd:.4f} were spent)"
+        if left is not None and short is not None and left <= short:
+            return f"{left:.4f} USD are left, and {short:.4f} were not enough for {', '.join(match.cell.values())}"
         return ""
+
+    def _was_short(self, cell: dict[str, str], usd: float) -> None:
+        """Note that so much money was not enough for a match of a cell."""
+        self._short_usd[str(cell)] = max(usd, self._short_usd.get(str(cell), 0.0))
 
     def _left_usd(self) -> float | None:
         if self.budget.usd is None:
@@ -173,14 +187,18 @@ class Runner:
         left = self._left_usd()
         if left is None or not any(mind.policy is None for mind in match.minds.values()):
             return None
-        costs = self._numbers(match, "cost_usd")
-        if costs:
-            return min(left, ROOM * max(costs)) if max(costs) else left / self.engine.slots
-        return left / self.engine.slots
+        usual = max(self._numbers(match, "cost_usd"), default=0.0)
+        wanted = ROOM * max(usual, self._short_usd.get(str(match.cell), 0.0))
+        return min(left, wanted) if wanted else left / max(1, min(self.engine.slots, len(self._waiting) + 1))
 
     def _numbers(self, match: PlannedMatch, name: str) -> list[float]:
         """Return what matches of the same cell have taken; of all if none of them was played."""
         return numbers_of(self._played.values(), match.cell, name)
+
+    @property
+    def knows_anything(self) -> bool:
+        """Whether a match was played from which others can be estimated."""
+        return any(played.state == "done" for played in self._played.values())
 
     def estimate(self, matches: Sequence[PlannedMatch]) -> Estimate:
         """Return what those of the matches that are missing will take."""

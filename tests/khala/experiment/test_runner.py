@@ -102,13 +102,29 @@ async def test_the_budget_is_never_exceeded(store: Store, slots: int, price: flo
     assert 0 < sum(one.cost_usd or 0.0 for one in store.played().values()) <= 1.9 + 1e-9
     assert runner.spent.usd == pytest.approx(sum(one.cost_usd or 0.0 for one in store.played().values()))
     assert runner.spent.held_usd == pytest.approx(0.0)
-    if runner.stopped:
-        assert "the budget of 1.9 USD is used up" in runner.stopped
+    assert not runner.stopped or "USD" in runner.stopped
 
 
 async def test_a_match_whose_money_went_is_not_valid(store: Store) -> None:
     await run(store, MadeEngine(slots=1, cost_usd=lambda _: 1.0), experiment(seeds=1), usd=0.5)
     assert [(one.state, one.cause) for one in store.played().values()] == [("invalid", "budget")]
+
+
+async def test_no_further_match_is_begun_with_less_than_was_not_enough(store: Store) -> None:
+    engine = MadeEngine(slots=1, cost_usd=lambda _: 1.0)
+    runner = await run(store, engine, usd=0.5)
+    assert len(engine.jobs) == 1
+    assert "the budget of 0.5 USD is used up" in runner.stopped
+
+
+async def test_a_match_gets_more_where_its_part_was_not_enough(store: Store) -> None:
+    found = experiment(factors={"task": ["2s3z_pair"]}, seeds=2)
+    engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)  # each of two gets 0.2
+    await run(store, engine, found, usd=0.4)
+    assert states(store) == ["invalid"] * 2
+    await run(store, engine, found, usd=2.0)
+    assert states(store) == ["done"] * 2
+    assert [job.minds["blue"].budget_usd for job in engine.jobs] == [0.2, 0.2, 0.4, 0.4]
 
 
 async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
