@@ -114,11 +114,8 @@ async def kills(
         found, calm = Store(Path(place) / "killed" / "attacked"), Store(Path(place) / "calm" / "attacked")
         ours, theirs = numbers(found), numbers(calm)
         differ = [key for key in {**ours, **theirs} if ours.get(key) != theirs.get(key)]
-        whole = [
-            path
-            for path in found.directory.glob("matches/*/*.mcap")
-            if (read := found.read(path, attempts=1)) and read[1]
-        ]
+        tries = [found.read(path, attempts=1) for path in found.directory.glob("matches/*/*.mcap")]
+        whole = [read for read in tries if read is not None and read[0].state == "done"]
         return Killed(killed, len(ours), differ, len(whole) - len(found.played()))
 
 
