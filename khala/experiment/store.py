@@ -15,6 +15,7 @@ import fcntl
 import json
 import shutil
 import sqlite3
+import weakref
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -133,7 +134,8 @@ class Store:
     def _index(self) -> sqlite3.Connection:
         path = self.directory / INDEX
         new = not path.exists()
-        index = sqlite3.connect(path, timeout=30)
+        index = sqlite3.connect(path, timeout=30, check_same_thread=False)  # whichever thread drops the store closes it
+        weakref.finalize(self, index.close)
         index.row_factory = sqlite3.Row
         if new:
             self._create(index)

@@ -54,7 +54,7 @@ def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bo
 
 @dataclass
 class MadeEngine:
-    """An engine whose matches take a second each, and end as it is told."""
+    """An engine whose matches take a moment each, and end as it is told."""
 
     slots: int = 2
     ends: Callable[[Job, int], str] = lambda _job, _try: "done"
@@ -78,7 +78,8 @@ class MadeEngine:
         self.jobs.append(job)
         self._now += 1
         self.most_at_once = max(self.most_at_once, self._now)
-        await asyncio.sleep(1.0)
+        for _ in range(self.slots):
+            await asyncio.sleep(0)
         self._now -= 1
         if how == "nothing":
             return Done(state="lost", words="killed")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import signal
@@ -85,7 +86,7 @@ def test_an_experiment_from_the_command_line(tmp_path: Path) -> None:
     assert told.exit_code == 0, told.output
     line = next(line for line in told.output.splitlines() if line.startswith("{"))
     assert json.loads(line)["matches"] == {"done": 4}
-    with sqlite3.connect(tmp_path / "attacked" / "index.sqlite") as index:
+    with contextlib.closing(sqlite3.connect(tmp_path / "attacked" / "index.sqlite")) as index:
         assert index.execute("select count(*) from results").fetchone() == (4,)
     again = CliRunner().invoke(app, ["experiment", "resume", "attacked", "--out", str(tmp_path)])
     assert "4 of 4 matches were played before" in again.output

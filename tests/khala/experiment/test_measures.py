@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import dataclasses
 import sqlite3
 from pathlib import Path
@@ -221,7 +222,7 @@ def test_a_row_is_flat_its_columns_are_in_the_order_of_the_groups_and_a_database
     assert fields == [field.name for group in GROUPS for field in dataclasses.fields(group)]
     plain = {str, int, float, bool, str | None, int | None, float | None}
     assert set(get_type_hints(Measures).values()) <= plain
-    with sqlite3.connect(":memory:") as database:
+    with contextlib.closing(sqlite3.connect(":memory:")) as database:
         database.execute(f"CREATE TABLE measures ({', '.join(fields)})")
         database.execute(f"INSERT INTO measures VALUES ({', '.join('?' * len(fields))})", dataclasses.astuple(row))
         assert database.execute("SELECT * FROM measures").fetchone() == dataclasses.astuple(row)

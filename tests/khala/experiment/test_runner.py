@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from khala.experiment.job import Job
     from khala.experiment.plan import PlannedMatch
 
-CLOCK = "jumps"
-
 
 def experiment(**fields: Any) -> Experiment:
     given = {"name": "e", "fixed": {"model": "scripted"}, "factors": {"task": ["2s3z_pair", "3s5z"]}, "seeds": 3}
