@@ -67,7 +67,7 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
     played, rows = list(known.values()), store.results()
     done = {one.key for one in played if one.state == "done"}
     groups = cells(played, rows, by)
-    summaries = [summary(cell) for cell in groups]
+    summaries = sorted((summary(cell) for cell in groups), key=lambda one: _place(experiment, one))
     compared = beside(experiment.published, summaries)
     sections = [
         Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
@@ -99,6 +99,15 @@ def write(document: Document, directory: Path, formats: Sequence[str]) -> list[P
 
 def _some(*tables: Any) -> tuple[Any, ...]:
     return tuple(table for table in tables if table is not None)
+
+
+def _place(experiment: Experiment, one: Summary) -> list[int]:
+    """Return the place of a cell in the grid: an index that was made again has matches in the order of their keys."""
+    names = {factor: [level.name for level in levels] for factor, levels in experiment.factors.items()}
+    return [
+        names[factor].index(value) if value in names.get(factor, ()) else len(names.get(factor, ()))
+        for factor, value in one.where.items()
+    ]
 
 
 def _planned(experiment: Experiment) -> int:
