@@ -1,6 +1,6 @@
 """Key expressions of the bus, built and parsed in this one place.
 
-    khala/<run>/<topic>                          topic: run, report, result
+    khala/<run>/<topic>                          topic: run, report, result, terrain, scene
     khala/<run>/host                             liveliness token of the host
     khala/<run>/<side>/<agent>/<topic>           topic: briefing, observation, reply, message, exchange
     khala/<run>/<side>/<adviser>/advice          what somebody outside the match writes to agents
@@ -39,6 +39,8 @@ class Topic(StrEnum):
     RUN = "run"
     REPORT = "report"
     RESULT = "result"
+    TERRAIN = "terrain"
+    SCENE = "scene"
     BRIEFING = "briefing"
     OBSERVATION = "observation"
     IMAGE = "image"
@@ -49,7 +51,7 @@ class Topic(StrEnum):
     ALIVE = "alive"
 
 
-RUN_TOPICS = frozenset({Topic.RUN, Topic.REPORT, Topic.RESULT})
+RUN_TOPICS = frozenset({Topic.RUN, Topic.REPORT, Topic.RESULT, Topic.TERRAIN, Topic.SCENE})
 AGENT_TOPICS = frozenset(Topic) - RUN_TOPICS
 NUMBERED_TOPICS = frozenset({Topic.ALIVE, Topic.IMAGE})
 """Topics of an agent that have one more part in their keys."""

@@ -10,7 +10,8 @@ Lengths are counted in game loops (22.4 per second at the speed called "faster")
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from enum import IntFlag
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -1035,10 +1036,163 @@ class Result(Wire):
     latency_p95_s: float | None = None
 
 
+# --- the whole map, for those who watch ----------------------------------------------------------------
+
+
+class GridView(Frozen):
+    """A grid of cells over the whole map, seen from above."""
+
+    width: int = Field(ge=0)
+    """Cells from west to east."""
+    height: int = Field(ge=0)
+    """Cells from north to south."""
+    data: str
+    """A byte for each cell, row after row from the north-west, deflated (zlib), in base64."""
+
+
+class ResourceMark(NamedTuple):
+    """A mineral field, a geyser or a rock of the map."""
+
+    tag: int
+    type: str
+    x: float
+    y: float
+    radius: float
+    """In cells of the minimap frame."""
+
+
+class Terrain(Wire):
+    """Host → all but agents: the ground of an episode, once at its beginning."""
+
+    kind: Literal["terrain"] = "terrain"
+    episode: Count
+    size: tuple[int, int]
+    """Width and height of the map, in world units."""
+    bounds: tuple[float, float, float, float]
+    """The playable part of the minimap frame: x0, y0, x1, y1."""
+    minimap: float = 64.0
+    """Size of the minimap frame, which holds the longer side of the map."""
+    height: GridView
+    """Height of the ground, 0 to 255 for -16 to 16 world units."""
+    walkable: GridView
+    """1 where ground units can walk."""
+    resources: tuple[ResourceMark, ...] = ()
+    starts: tuple[Point, ...] = ()
+    """Places where a player may begin, as far as the game says."""
+
+
+class UnitFlag(IntFlag):
+    """Properties of a unit of a scene."""
+
+    STRUCTURE = 1
+    WORKER = 2
+    ARMY = 4
+    FLYING = 8
+    BURROWED = 16
+    CLOAKED = 32
+    HALLUCINATION = 64
+    UNPOWERED = 128
+    REMEMBERED = 256
+    """Nobody sees it now: its values are those of the last look."""
+    FIRES = 512
+    """It has fired since the scene before."""
+
+
+class UnitMark(NamedTuple):
+    """One unit of a scene; positions and lengths in the minimap frame."""
+
+    tag: int
+    type: str
+    player: int
+    """Number of its player, from 1; 16 for nobody."""
+    x: float
+    y: float
+    radius: float
+    facing: float
+    """Direction in radians from east, clockwise as seen on the screen."""
+    health: float
+    health_max: float
+    shield: float
+    shield_max: float
+    energy: float
+    progress: float
+    """Of its construction, 0 to 1."""
+    flags: int
+    """Sum of `UnitFlag`."""
+    seen_by: int
+    """Bit i is set if side i of the scene's `sides` sees it now."""
+    order: str
+    """Name of its current order; "" if it has none, or if nobody may know."""
+    target: int
+    """Tag of the unit that its order or its weapon is aimed at; 0 for none."""
+    to_x: float
+    """Where its order leads; -1 for nowhere."""
+    to_y: float
+
+
+class EffectMark(NamedTuple):
+    """An effect on the ground: a storm, a bile, a cloud."""
+
+    name: str
+    player: int
+    """Number of the player whose it is; 0 if unknown."""
+    x: float
+    y: float
+    radius: float
+
+
+class PlayerMark(Frozen):
+    """One player of a scene."""
+
+    player: int
+    """Its number, from 1."""
+    side: str = ""
+    """The side that Khala plays; "" for an opponent."""
+    race: str = ""
+    units: int = 0
+    """Units and structures that this scene has of it."""
+    workers: int = 0
+    army_value: int = 0
+    """Minerals and vespene of its army."""
+    minerals: int | None = None
+    """None for a player whose resources Khala does not see."""
+    vespene: int | None = None
+    supply_used: float | None = None
+    supply_cap: float | None = None
+    income: tuple[float, float] | None = None
+    """Minerals and vespene per minute."""
+    upgrades: tuple[str, ...] = ()
+
+
+class Scene(Wire):
+    """Host → all but agents: the whole map at one step, before its decisions take effect. Never for agents."""
+
+    kind: Literal["scene"] = "scene"
+    episode: Count
+    step: Count
+    game_loop: Count
+    sides: tuple[str, ...]
+    """The sides that Khala plays, in the order of the bits of `UnitMark.seen_by`."""
+    whole: bool
+    """Whether the game was asked for the map without fog; otherwise it is what the sides know together."""
+    players: tuple[PlayerMark, ...]
+    units: tuple[UnitMark, ...]
+    """Units and structures, without the resources of the map."""
+    effects: tuple[EffectMark, ...] = ()
+    power: tuple[tuple[int, float, float, float], ...] = ()
+    """Power fields: player, x, y, radius."""
+    gone: tuple[int, ...] = ()
+    """Tags of the terrain's resources that are no longer there, as far as anybody knows."""
+    creep: GridView | None = None
+    """1 where creep is; None if there is none."""
+    fog: dict[str, GridView] = {}
+    """By side: 2 where it sees now, 1 where it once saw, 0 elsewhere."""
+
+
 AnyMessage = Annotated[
-    Run | Briefing | Observation | Reply | Advice | Message | ModelCall | Report | Result,
+    Run | Briefing | Observation | Reply | Advice | Message | ModelCall | Report | Result | Terrain | Scene,
     Field(discriminator="kind"),
 ]
 MESSAGE_TYPES: tuple[type[Wire], ...] = (
-    Run, Briefing, Observation, Reply, Advice, Message, ModelCall, Report, Result,
+    Run, Briefing, Observation, Reply, Advice, Message, ModelCall, Report, Result, Terrain, Scene,
 )  # fmt: skip
