@@ -48,19 +48,19 @@ class Memory:
     """Whether the scenes show the map without fog."""
     sums: dict[str, float] = field(default_factory=dict)
     """Of the curves that add up, so far."""
+    fallen: dict[str, float] = field(default_factory=dict)
+    """What each side lost since the last report, for reports of older versions, which do not say."""
 
     def begin(self, episode: int) -> None:
         """Forget what belongs to another episode."""
         if episode != self.episode:
             self.episode, self.step, self.scenes = episode, 0, False
-            self.places, self.dead, self.made, self.sums = {}, set(), set(), {}
+            self.places, self.dead, self.made, self.sums, self.fallen = {}, set(), set(), {}, {}
 
     def dump(self) -> Json:
         """Return it as JSON data."""
-        return {
-            "episode": self.episode, "scenes": self.scenes, "places": self.places, "dead": sorted(self.dead),
-            "made": sorted(self.made), "step": self.step, "sums": self.sums, "whole": self.whole,
-        }  # fmt: skip
+        plain = {name: getattr(self, name) for name in self.__slots__}
+        return plain | {"dead": sorted(self.dead), "made": sorted(self.made)}
 
     @classmethod
     def load(cls, data: Json) -> Memory:
@@ -104,8 +104,8 @@ class Digest:
         row |= {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
         row |= {f"latency_s/{side}": max(latencies, default=None)}
         row |= self._sums(side, {
-            "killed_value": said.get("killed_value"),
-            "lost_value": said.get("lost_value"),
+            "killed_value": self._killed(said, side),
+            "lost_value": self._lost(said, side),
             "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
             "cost_usd": sum(costs) if costs else None,
             "refused": sum(len(agent.get("rejections", ())) for agent in agents),
@@ -114,6 +114,14 @@ class Digest:
             self._agent(said, side, agent)
         for incident in said.get("incidents", ()):
             self.mark(said, "incident", incident, side=side)
+
+    def _killed(self, said: Json, side: str) -> float | None:
+        value: float | None = said.get("killed_value")
+        return value if value is not None else self.memory.fallen.pop(self._other(side), None)
+
+    def _lost(self, said: Json, side: str) -> float | None:
+        value: float | None = said.get("lost_value")
+        return value if value is not None else self.memory.fallen.pop(side, None)
 
     def _sums(self, side: str, more: Json) -> Json:
         """Add to the sums of a side; return them as far as any number was known."""
@@ -140,7 +148,12 @@ class Digest:
 
     def result(self, said: Json) -> None:
         """Take in the result of an episode for a side."""
-        self.mark(said | {"step": self.memory.step}, "end", f"{said['outcome']}: {said['cause']}", side=said.get("side", "blue"))
+        self.mark(
+            said | {"step": self.memory.step},
+            "end",
+            f"{said['outcome']}: {said['cause']}",
+            side=said.get("side", "blue"),
+        )
 
     # --- observations -------------------------------------------------------------------------------
 
@@ -181,7 +194,9 @@ class Digest:
 
     def loss(self, episode: int, step: int, side: str, kind: str, at: tuple[float | None, float | None]) -> None:
         """Note that a unit died."""
-        self.losses.append((episode, step, side, kind, value_of(kind), *at))
+        value = value_of(kind)
+        self.losses.append((episode, step, side, kind, value, *at))
+        self.memory.fallen[side] = self.memory.fallen.get(side, 0.0) + value
 
     def _other(self, side: str) -> str:
         return next((other for other in self.sides if other != side), OPPONENT)
@@ -253,7 +268,9 @@ def _from_view(view: Json, side: str, *, alone: bool) -> Json:
 
 def counted(kinds: Iterable[str]) -> str:
     """Return what there is of several: `2 Stalkers, 1 Probe`."""
-    return ", ".join(f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common())
+    return ", ".join(
+        f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common()
+    )
 
 
 def _several(kind: str) -> str:

@@ -30,7 +30,6 @@ from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from khala.view.index import Index
     from khala_protocol.keys import Address
@@ -128,7 +127,7 @@ class Scanner:
         return True
 
     def _resumed(self, file: BinaryIO) -> Scan:
-        """Return the scan at the place where the index ends, of this file as it was then; otherwise at its beginning."""
+        """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
         with contextlib.suppress(*WRONG):  # of another version, or of somebody else
             state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
             if state["fingerprint"] == fingerprint(file, state["offset"]):
@@ -204,7 +203,9 @@ class Scanner:
         db.executemany("insert or ignore into decision values (?, ?, ?, ?, ?)", digest.decisions)
         db.executemany("insert into loss values (?, ?, ?, ?, ?, ?, ?)", digest.losses)
         db.executemany("insert into mark values (?, ?, ?, ?, ?, ?)", digest.marks)
-        db.executemany("insert or replace into model values (?, ?, ?)", [(*who, name) for who, name in batch.models.items()])
+        db.executemany(
+            "insert or replace into model values (?, ?, ?)", [(*who, name) for who, name in batch.models.items()]
+        )
         for (episode, step), row in digest.steps.items():
             known = db.execute("select data from step where episode = ? and step = ?", (episode, step)).fetchone()
             whole = (json.loads(known[0]) if known else {}) | row
@@ -286,12 +287,13 @@ def _address(key: str) -> Address | None:
         return None
 
 
-def whole(path: Path, index: Index) -> None:
-    """Index a recording up to its end, in this thread; for exports and tests.
+def whole(index: Index) -> None:
+    """Index a recording up to its end, in this thread; another viewer that does it already is waited for.
 
     Raises:
         OSError: it cannot be read.
     """
     with contextlib.closing(Scanner(index)) as scanner:
-        while scanner.advance() or (not scanner.done and scanner.advance() is None):
-            pass
+        while (found := scanner.advance()) is not False:
+            if found is None:
+                time.sleep(POLL_S)

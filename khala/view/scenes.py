@@ -41,11 +41,7 @@ def recorded(index: Index, episode: int, first: int, last: int) -> bytes:
 def from_views(
     index: Index, run: str, sides: Sequence[str], episode: int, first: int, last: int, scale: float
 ) -> Iterator[Scene]:
-    """Yield scenes made of observations.
-
-    Args:
-        scale: cells of the minimap per world unit.
-    """
+    """Yield scenes made of observations, from step to step; `scale` is cells of the minimap per world unit."""
     memory = _Sighted(sides, scale)
     by_step: dict[int, list[Found]] = {}
     for found in index.at(Topic.OBSERVATION, episode, first - EARLIER, last):
@@ -137,7 +133,7 @@ class _Sighted:
         tag, kind = int(unit["tag"], 16), unit["type"]
         at, known = self._units.get(tag, (-1, None))
         seen_by = 1 << self._sides.index(side) | (known.seen_by if known and at == self._loop else 0)
-        order = next(iter(unit.get("orders") or ()), {})
+        order: dict[str, Any] = next(iter(unit.get("orders") or ()), {})
         to = order.get("minimap") or (-1.0, -1.0)
         facts = knowledge().get(kind)
         mark = UnitMark(

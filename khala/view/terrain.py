@@ -52,13 +52,15 @@ def from_views(index: Index, run: str, episode: int) -> Terrain:
     """Return a terrain without heights: its size, its bounds, and the resources that were seen."""
     scale = scale_of(index, episode)
     side = round(MINIMAP / scale)
-    bounds, resources = (0.0, 0.0, MINIMAP, MINIMAP), {}
+    bounds = (0.0, 0.0, MINIMAP, MINIMAP)
+    resources: dict[str, Any] = {}
     for view in _views(index, episode):
         bounds = tuple(view.get("bounds") or bounds)
         for team in view["teams"]:
             resources |= {unit["tag"]: unit for unit in team.get("resources", ())}
+    radius = round(_RESOURCE_RADIUS * scale, 2)
     marks = tuple(
-        ResourceMark(int(tag, 16), unit["type"], *unit["minimap"], round(_RESOURCE_RADIUS * scale, 2))
+        ResourceMark(int(tag, 16), unit["type"], unit["minimap"][0], unit["minimap"][1], radius)
         for tag, unit in resources.items()
     )
     return Terrain(

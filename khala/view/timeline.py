@@ -103,7 +103,7 @@ def _curves(rows: Sequence[dict[str, Any]]) -> Iterator[Curve]:
     for name, side in sorted((one for one in values if one[0] in order), key=lambda one: (order[one[0]], one[1])):
         column = values[name, side]
         if any(value is not None for value in column):
-            yield Curve(name=name, side=side, values=tuple(column))  # type: ignore[arg-type]  # one of its names
+            yield Curve(name=name, side=side, values=tuple(column))
 
 
 def _marks(index: Index, episode: int, times_s: dict[int, float]) -> Iterator[Mark]:

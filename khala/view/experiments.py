@@ -1,0 +1,101 @@
+"""Experiments as a view lists them and shows their tables: those of their reports, with a way to each recording.
+
+Nothing is computed here that a report does not compute: see `khala.experiment.report`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from khala.experiment.report.build import planned, report
+from khala.experiment.store import FILE, INDEX, Store
+from khala.view.library import lines, run_id
+from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
+from khala_protocol.errors import KhalaError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
+
+    from khala.experiment.report.document import Table
+    from khala.experiment.report.summary import Summary
+    from khala.experiment.statistics import Interval
+    from khala.experiment.store import Played
+
+
+def found_in(directories: Iterable[Path]) -> list[ExperimentLine]:
+    """Return the experiments in these directories; what cannot be read is not among them."""
+    found = []
+    for directory in directories:
+        with contextlib.suppress(KhalaError, OSError):
+            found.append(_line(directory, *(_changed_ns(directory / name) for name in (FILE, INDEX))))
+    return found
+
+
+def is_experiment(directory: Path) -> bool:
+    """Return True if a directory holds an experiment."""
+    return (directory / FILE).is_file()
+
+
+def experiment_view(directory: Path, below: Path) -> ExperimentView:
+    """Return the table of an experiment.
+
+    Raises:
+        KhalaError: it cannot be read, or no match of it was played.
+    """
+    store = Store.opened(directory)
+    made, played = report(store), list(store.played().values())
+    table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
+    recordings = [directory / one.recording for one in played if one.recording]
+    return ExperimentView(
+        line=found_in([directory])[0],
+        factors=table.columns[: table.words],
+        columns=table.columns[table.words :],
+        rows=tuple(_rows(table, made.summaries, played, directory)),
+        notes=(*made.document.paragraphs, *made.document.warnings, table.note),
+        runs=tuple(lines(recordings, below)),
+    )
+
+
+def _rows(table: Table, summaries: list[Summary], played: list[Played], directory: Path) -> Iterator[Row]:
+    columns = table.columns[table.words :]
+    for texts, one in zip(table.rows, summaries, strict=True):
+        cells = zip(columns, texts[table.words :], strict=True)
+        mine = [match for match in played if match.recording and match.cell.items() <= one.where.items()]
+        yield Row(
+            names=texts[: table.words],
+            games=one.games,
+            cells=tuple(_cell(column, text, one) for column, text in cells),
+            runs=tuple(run_id(directory / match.recording) for match in mine),
+        )
+
+
+def _cell(column: str, text: str, one: Summary) -> Cell:
+    intervals: dict[str, Interval] = {"won": one.won, "K/D": one.kd}
+    if (interval := intervals.get(column)) is None or interval.value is None:
+        return Cell(text=text)
+    return Cell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+@lru_cache(maxsize=256)
+def _line(directory: Path, file_ns: int, index_ns: int) -> ExperimentLine:  # noqa: ARG001  # changed files are others
+    store = Store(directory)
+    experiment = store.experiment()
+    return ExperimentLine(
+        id=run_id(directory),
+        name=experiment.name,
+        description=experiment.description,
+        played=len(store.played()),
+        matches=planned(experiment),
+    )
+
+
+def _changed_ns(path: Path) -> int:
+    return path.stat().st_mtime_ns if path.exists() else 0
