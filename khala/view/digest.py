@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from khala_bridge.knowledge import knowledge
-from khala_protocol.messages import UnitFlag
+from khala_protocol.messages import MOST, UnitFlag
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -24,7 +24,7 @@ OPPONENT = "opponent"
 """The side of an opponent that Khala does not play."""
 LATE = {"late": "late", "gone": "late", "malformed": "late", "fallback": "fallback"}
 """The kind of mark of an agent's status."""
-_WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
+WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
 
 
 @dataclass(slots=True)
@@ -82,13 +82,14 @@ class Digest:
     marks: list[tuple[Any, ...]] = field(default_factory=list)
     decisions: list[tuple[Any, ...]] = field(default_factory=list)
 
-    def step(self, episode: int, step: int) -> Json:
-        """Return the row of a step, which is merged with what is known of it."""
-        return self.steps.setdefault((episode, step), {})
+    def note(self, said: Json, values: Json) -> None:
+        """Note numbers of a step; what is no number counts as unknown."""
+        row = self.steps.setdefault((said["episode"], said["step"]), {})
+        row |= {name: number(value) for name, value in values.items()}
 
     def mark(self, said: Json, kind: str, text: str, *, side: str = "", agent: str = "") -> None:
         """Note that something happened."""
-        self.marks.append((said["episode"], said["step"], kind, side, agent, text[:200]))
+        self.marks.append((said["episode"], said["step"], kind, str(side), str(agent), str(text)[:200]))
 
     # --- reports ------------------------------------------------------------------------------------
 
@@ -100,16 +101,15 @@ class Digest:
         usages = [agent.get("usage", {}) for agent in agents]
         costs = [usage["cost_usd"] for usage in usages if usage.get("cost_usd") is not None]
         latencies = [agent["latency_s"] for agent in agents if agent.get("latency_s") is not None]
-        row = self.step(said["episode"], said["step"])
-        row |= {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
-        row |= {f"latency_s/{side}": max(latencies, default=None)}
-        row |= self._sums(side, {
+        known = {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
+        sums = self._sums(side, {
             "killed_value": self._killed(said, side),
             "lost_value": self._lost(said, side),
             "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
             "cost_usd": sum(costs) if costs else None,
             "refused": sum(len(agent.get("rejections", ())) for agent in agents),
         })  # fmt: skip
+        self.note(said, known | sums | {f"latency_s/{side}": max(latencies, default=None)})
         for agent in agents:
             self._agent(said, side, agent)
         for incident in said.get("incidents", ()):
@@ -160,11 +160,10 @@ class Digest:
     def observation(self, said: Json) -> None:
         """Take in what an agent saw; of a match with scenes only what these do not say."""
         self.memory.begin(said["episode"])
-        row = self.step(said["episode"], said["step"])
-        row["loop"] = said["game_loop"]
+        self.note(said, {"loop": said["game_loop"]})
         view, side = said["view"], said["side"]
         if not self.memory.scenes:
-            row |= _from_view(view, side, alone=len(self.sides) == 1)
+            self.note(said, _from_view(view, side, alone=len(self.sides) == 1))
             self._remember(view, side)
         events = [*view.get("events", ()), *(event for team in view["teams"] for event in team.get("events", ()))]
         for event in events:
@@ -194,8 +193,8 @@ class Digest:
 
     def loss(self, episode: int, step: int, side: str, kind: str, at: tuple[float | None, float | None]) -> None:
         """Note that a unit died."""
-        value = value_of(kind)
-        self.losses.append((episode, step, side, kind, value, *at))
+        value, (x, y) = value_of(kind), at
+        self.losses.append((episode, step, side, str(kind), value, number(x), number(y)))
         self.memory.fallen[side] = self.memory.fallen.get(side, 0.0) + value
 
     def _other(self, side: str) -> str:
@@ -208,10 +207,9 @@ class Digest:
         memory = self.memory
         memory.begin(said["episode"])
         names = {player["player"]: player.get("side") or OPPONENT for player in said["players"]}
-        row = self.step(said["episode"], said["step"])
-        row["loop"] = said["game_loop"]
+        self.note(said, {"loop": said["game_loop"]})
         for player in said["players"]:
-            row |= _from_player(player, names[player["player"]])
+            self.note(said, _from_player(player, names[player["player"]]))
         self._structures(said, names, first=not memory.scenes)
         memory.scenes, memory.whole = True, bool(said["whole"])
         for unit in said["units"]:
@@ -225,6 +223,11 @@ class Digest:
                 self.memory.made.add(tag)
                 if not first:
                     self.mark(said, "building", unit[1], side=names[unit[2]])
+
+
+def number(value: object) -> float | None:
+    """Return a value if it is a number."""
+    return value if isinstance(value, int | float) and abs(value) <= MOST else None
 
 
 def value_of(kind: str) -> float:
@@ -256,7 +259,7 @@ def _from_player(player: Json, side: str) -> Json:
 def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     found = {f"{name}/{side}": value for name, value in view["resources"].items() if name != "promised"}
     if counts := view.get("counts"):
-        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in _WORKERS)
+        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in WORKERS)
     if army := view.get("army"):
         found[f"army_value/{side}"] = army["value"]
         if alone:

@@ -97,13 +97,17 @@ class Index:
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._size = 0
         self._lock = threading.Lock()
+        self.is_broken = False
+        """Whether it must be removed, so that it is made again."""
         prepare(self.path)
         self._db = connect(self.path)
 
     def close(self) -> None:
-        """Close it; who still asks gets an error."""
+        """Close it, and remove it if it is broken; who still asks gets an error."""
         with self._lock:
             self._db.close()
+        if self.is_broken:
+            remove(self.path)
 
     def rows(self, query: str, *values: object) -> list[tuple[Any, ...]]:
         """Return the rows of a query.
@@ -114,8 +118,11 @@ class Index:
         try:
             with self._lock:  # a connection that is closed while another thread uses it takes the process with it
                 return self._db.execute(query, values).fetchall()
+        except sqlite3.ProgrammingError:
+            raise RecordingError("the recording was closed meanwhile: ask again") from None
         except sqlite3.Error as error:
-            raise RecordingError(f"the index {self.path} cannot be read: {error}; remove it") from error
+            self.is_broken = True
+            raise RecordingError(f"the index {self.path} is broken, and is made again: {error}") from error
 
     def meta(self, name: str, default: Any = None) -> Any:
         """Return a noted value."""
@@ -215,14 +222,19 @@ def prepare(path: Path, schema: str = SCHEMA, version: int = VERSION) -> None:
             with contextlib.closing(connect(path, schema)) as db:
                 if db.execute("pragma user_version").fetchone()[0] == version:
                     return
-    for name in (path, path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")):
-        name.unlink(missing_ok=True)
+    remove(path)
     descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)  # prompts and replies are for its user alone
     os.close(descriptor)
     with contextlib.closing(sqlite3.connect(path, timeout=BUSY_S)) as db:
         script = f"begin immediate; {schema}; pragma user_version = {version}; commit; pragma journal_mode = wal;"
         with contextlib.suppress(sqlite3.OperationalError):  # another viewer was quicker
             db.executescript(script)
+
+
+def remove(path: Path) -> None:
+    """Remove an index, and what SQLite keeps beside it."""
+    for name in (path, path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")):
+        name.unlink(missing_ok=True)
 
 
 def _tables(db: sqlite3.Connection) -> list[str]:

@@ -25,6 +25,7 @@ from khala.view.digest import Digest, Memory
 from khala.view.index import SCHEMA, connect
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic, parse
+from khala_protocol.messages import MOST
 from khala_protocol.recording.chunks import Scan
 from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
 
@@ -53,7 +54,7 @@ _HEAD = re.compile(
 _PLAIN = frozenset({Topic.REPLY, Topic.SCENE, Topic.OBSERVATION, Topic.EXCHANGE, Topic.MESSAGE, Topic.REPORT})
 """Topics whose messages belong to a step."""
 _KEPT = _PLAIN | {Topic.RUN, Topic.RESULT, Topic.BRIEFING, Topic.TERRAIN}
-WRONG = (ValueError, LookupError, TypeError, AttributeError)
+WRONG = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError)
 """Errors of reading data that is not as our messages are."""
 
 
@@ -177,7 +178,7 @@ class Scanner:
         if head and not self._is_read(batch, address):
             return int(head[1]), int(head[2])
         said = from_json(payload, allow_inf_nan=False, cache_strings="none")
-        place = int(said.get("episode", 0)), int(said.get("step", 0))
+        place = _count(said.get("episode", 0)), _count(said.get("step", 0))
         match address.topic:
             case Topic.RUN:
                 self._sides = batch.digest.sides = tuple(dict.fromkeys(agent["side"] for agent in said["agents"]))
@@ -240,7 +241,6 @@ class Scanning:
         self._index, self._changed = index, changed
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"index {index.recording.name}", daemon=True)
-        self.failed = ""
 
     def start(self) -> None:
         """Begin."""
@@ -266,9 +266,15 @@ class Scanning:
                         self._changed()
                 self._changed()
         except (OSError, sqlite3.Error) as error:
-            self.failed = f"the index of {self._index.recording} cannot be written: {error}"
-            log.warning("%s", self.failed)
+            self._index.is_broken = isinstance(error, sqlite3.DatabaseError)
+            log.warning("the index %s cannot be written: %s", self._index.path, error)
             self._changed()
+
+
+def _count(value: object) -> int:
+    if not isinstance(value, int) or not 0 <= value <= MOST:
+        raise ValueError(f"{value} counts nothing")
+    return value
 
 
 def fingerprint(file: BinaryIO, offset: int) -> str:

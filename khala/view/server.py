@@ -175,9 +175,11 @@ class Server:
     async def _run(self, request: web.Request) -> Opened:
         """Return the recording that a path names, and begin to index one that is new."""
         name = request.match_info["run"]
-        if (opened := self._opened.get(name)) is not None:
+        if (known := self._opened.get(name)) is not None and not known.index.is_broken:
             self._opened.move_to_end(name)
-            return opened
+            return known
+        if known is not None:
+            await self._forget(name)
         opened: Opened = await self._made(lambda: self._sources.open(name, lambda: self._notice(name)))
         if name in self._opened:  # two requests at once
             await asyncio.to_thread(opened.index.close)
@@ -192,9 +194,12 @@ class Server:
 
     async def _close_oldest(self) -> None:
         while len(self._opened) > MOST_OPEN:
-            name, oldest = self._opened.popitem(last=False)
-            del self._changed[name]
-            await asyncio.to_thread(oldest.close)
+            await self._forget(next(iter(self._opened)))
+
+    async def _forget(self, name: str) -> None:
+        oldest = self._opened.pop(name)
+        del self._changed[name]
+        await asyncio.to_thread(oldest.close)
 
     def _notice(self, name: str) -> None:
         """Note in another thread that there is more in an index."""

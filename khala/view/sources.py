@@ -67,12 +67,12 @@ class Sources:
             NotThere: there is none of this id.
             KhalaError: it cannot be read, or no match of it was played.
         """
-        from khala.view.experiments import experiment_view  # noqa: PLC0415  # SciPy takes a second
-
         if id not in self._experiments:
             self.library()
         if (path := self._experiments.get(id)) is None:
             raise NotThere("there is no such experiment here")
+        from khala.view.experiments import experiment_view  # noqa: PLC0415  # SciPy takes a second
+
         return experiment_view(path, self._directory or path)
 
     def _lines(self, experiments: list[Path]) -> list[ExperimentLine]:

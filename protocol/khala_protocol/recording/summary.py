@@ -16,6 +16,7 @@ from mcap.records import Channel, ChunkIndex, Statistics, SummaryOffset
 
 from khala_protocol.errors import RecordingError
 from khala_protocol.recording.chunks import Scan, chunk_at, footer, record_at, samples_of
+from khala_protocol.recording.reader import require_recording
 from khala_protocol.recording.unpack import BROKEN
 
 if TYPE_CHECKING:
@@ -55,8 +56,9 @@ class Summary:
         """Return the summary of a recording.
 
         Raises:
-            RecordingError: it cannot be read.
+            RecordingError: there is no such file, or it is not a recording.
         """
+        require_recording(path)
         try:
             with path.open("rb") as file:
                 size = file.seek(0, 2)
