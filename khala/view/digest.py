@@ -15,9 +15,7 @@ from khala_bridge.knowledge import knowledge
 from khala_protocol.messages import MOST, UnitFlag
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from khala_protocol.messages import Point
+    from collections.abc import Iterable
 
 Json = dict[str, Any]
 OPPONENT = "opponent"
@@ -278,18 +276,3 @@ def counted(kinds: Iterable[str]) -> str:
 
 def _several(kind: str) -> str:
     return f"{kind}es" if kind.endswith(("ch", "sh", "s", "x")) else f"{kind}s"
-
-
-def centre(points: Iterable[tuple[float, float, float]]) -> Point | None:
-    """Return the middle of places with weights: x, y, weight."""
-    found = [(x, y, weight or 1.0) for x, y, weight in points]
-    whole = sum(weight for _, _, weight in found)
-    return (sum(x * w for x, _, w in found) / whole, sum(y * w for _, y, w in found) / whole) if found else None
-
-
-def pairs(row: Json) -> Iterator[tuple[str, str, Any]]:
-    """Yield the values of a step: curve, side, value."""
-    for key, value in row.items():
-        name, slash, side = key.partition("/")
-        if slash:
-            yield name, side, value

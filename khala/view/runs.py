@@ -64,6 +64,8 @@ class Opened:
         self.index = Index(path)
         self.scanning = Scanning(self.index, changed)
         self._scales: dict[int, float] = {}
+        self._timelines: dict[int, tuple[int, bytes]] = {}
+        """By episode, with the offset of the index at which it was made."""
         self._known: tuple[int, tuple[AgentLine, ...]] = (-1, ())
         """The agents as they were known at an offset of the index."""
 
@@ -95,7 +97,10 @@ class Opened:
     def timeline(self, episode: int) -> bytes:
         """Return the `Timeline` of an episode."""
         self._require(episode)
-        return timeline(self.index, episode).model_dump_json().encode()
+        offset = self.index.meta("offset", 0)
+        if self._timelines.get(episode, (-1, b""))[0] != offset:
+            self._timelines[episode] = offset, timeline(self.index, episode).model_dump_json().encode()
+        return self._timelines[episode][1]
 
     def terrain(self, episode: int) -> bytes:
         """Return the `Terrain` of an episode."""
