@@ -30,7 +30,9 @@ DELIVERIES = {
 FLUSH_S = 0.1
 """What has arrived can be read after this time."""
 FIND_S = 3.0
-"""How long to wait for the run card, which every running match has published."""
+"""How long to collect run cards, which every running match has published."""
+BEGIN_S = 60.0
+"""How long to wait for a match that is named: one that was just ordered may be about to begin."""
 LAST_S = 1.0
 """After the last result, how long to wait for what is still on its way."""
 
@@ -96,13 +98,14 @@ class Following:
                 self._recorder.flush()
 
 
-async def running_match(bus: Bus, run: str | None, *, within_s: float = FIND_S) -> Run:
+async def running_match(bus: Bus, run: str | None) -> Run:
     """Return the card of a running match; if none is named, of the only one there is.
 
     Raises:
         ConfigError: there is none, or there are several.
     """
     cards: dict[str, Run] = {}
+    within_s = BEGIN_S if run else FIND_S
     subscription = await bus.subscribe(run_key(run, Topic.RUN) if run else every_run(Topic.RUN), Delivery.STATE)
     try:
         async with asyncio.timeout(within_s):

@@ -159,7 +159,9 @@ async def _sources(look: Look) -> AsyncIterator[Sources]:
     bus = await open_bus(client_config(look.connect, tls=look.tls, names=names, insecure=look.insecure))
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(bus.close)
-        card = await running_match(bus, look.given[0] if look.given else None)
+        name = look.given[0] if look.given else None
+        stderr_console().print(f"looking for {name or 'a match'} at {', '.join(bus.endpoints)}", soft_wrap=True)
+        card = await running_match(bus, name)
         directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="khala-view-", ignore_cleanup_errors=True))
         path = Path(directory) / f"{card.run}.mcap"
         recorder = Recorder(path)

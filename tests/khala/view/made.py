@@ -58,7 +58,7 @@ def card(**changes: object) -> Run:
         "agents": (AgentCard(name=AGENT, side=SIDE, teams=("Stalker-1",)),), "advisers": ("Coach",),
         "catalogue_sha256": "0" * 64, "versions": {"khala": "0.1.0"},
     }  # fmt: skip
-    return Run(**values | changes)  # type: ignore[arg-type]
+    return Run(**values | changes)
 
 
 def key_of(message: Wire) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import pytest
 
@@ -13,7 +13,8 @@ from khala.view.library import found_in, lines, read_head, run_id
 from khala.view.serve import Look, guard_of, is_loopback
 from khala.view.sources import Sources, find
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.recording import Recording
+from khala_protocol.recording import Recording, summary
+from khala_protocol.recording.chunks import chunk_at
 from khala_protocol.recording.summary import Summary
 from tests.khala.view.made import AGENT, RUN, STEPS, make
 
@@ -36,10 +37,12 @@ def test_a_line_says_what_a_scan_of_the_whole_file_would(tmp_path: Path) -> None
 def test_a_summary_reads_the_begin_and_the_end_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = make(tmp_path / "made.mcap")
     seen: list[int] = []
-    real = library.Summary.payloads.__globals__["chunk_at"]
-    monkeypatch.setitem(
-        library.Summary.payloads.__globals__, "chunk_at", lambda file, at: seen.append(at) or real(file, at)
-    )
+
+    def noted(file: BinaryIO, at: int) -> bytes:
+        seen.append(at)
+        return chunk_at(file, at)
+
+    monkeypatch.setattr(summary, "chunk_at", noted)
     read_head(path)
     assert len(set(seen)) == 2  # the chunk of the run card, and that of the result
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator
     from pathlib import Path
 
+    from pydantic import BaseModel
+
     from khala.view.wire import AdviceNote
 
 
@@ -81,7 +83,7 @@ async def test_every_answer_is_what_its_model_says(path: Path) -> None:
         await page.enter()
         await page.whole()
         run = f"/api/runs/{page.run}"
-        models = {
+        models: dict[str, type[BaseModel]] = {
             "/api/library": Library, run: RunView, f"{run}/episodes/0/timeline": Timeline,
             f"{run}/episodes/0/terrain": Terrain, f"{run}/episodes/0/scenes?from=0&to=15": Scenes,
             f"{run}/episodes/0/steps/7": Moment, f"{run}/episodes/0/steps/7/agents/blue/{AGENT}": Asked,
@@ -124,7 +126,7 @@ async def test_without_the_token_nothing_is_answered(path: Path) -> None:
 
 async def test_the_token_leaves_the_address_for_a_cookie_that_scripts_cannot_read(path: Path) -> None:
     async with browser(path) as page:
-        options = {"params": {"token": page.guard.token, "run": "x"}, "allow_redirects": False}
+        options: dict[str, Any] = {"params": {"token": page.guard.token, "run": "x"}, "allow_redirects": False}
         async with page.session.get(f"{page.base}/", **options) as answer:
             assert (answer.status, answer.headers["Location"]) == (303, "/?run=x")
             cookie = answer.headers["Set-Cookie"]
