@@ -5,7 +5,6 @@ Nothing is computed here that a report does not compute: see `khala.experiment.r
 
 from __future__ import annotations
 
-import contextlib
 import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -14,10 +13,9 @@ from khala.experiment.report.build import planned, report
 from khala.experiment.store import FILE, INDEX, Store
 from khala.view.library import lines, run_id
 from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
-from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
     from khala.experiment.report.document import Table
@@ -26,32 +24,40 @@ if TYPE_CHECKING:
     from khala.experiment.store import Played
 
 
-def found_in(directories: Iterable[Path]) -> list[ExperimentLine]:
-    """Return the experiments in these directories; what cannot be read is not among them."""
-    found = []
-    for directory in directories:
-        with contextlib.suppress(KhalaError, OSError):
-            found.append(_line(directory, *(_changed_ns(directory / name) for name in (FILE, INDEX))))
-    return found
+def line_of(directory: Path) -> ExperimentLine:
+    """Return an experiment as a list shows it.
 
-
-def is_experiment(directory: Path) -> bool:
-    """Return True if a directory holds an experiment."""
-    return (directory / FILE).is_file()
+    Raises:
+        KhalaError: it cannot be read.
+    """
+    store = Store(directory)
+    experiment = store.experiment()
+    return ExperimentLine(
+        id=run_id(directory),
+        name=experiment.name,
+        description=experiment.description,
+        played=len(store.played()),
+        matches=planned(experiment),
+    )
 
 
 def experiment_view(directory: Path, below: Path) -> ExperimentView:
-    """Return the table of an experiment.
+    """Return the table of an experiment; its intervals are computed again only if a match was played since.
 
     Raises:
         KhalaError: it cannot be read, or no match of it was played.
     """
+    return _view(directory, below, *((directory / name).stat().st_mtime_ns for name in (FILE, INDEX)))
+
+
+@lru_cache(maxsize=8)
+def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> ExperimentView:  # noqa: ARG001  # as they were
     store = Store.opened(directory)
     made, played = report(store), list(store.played().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
     recordings = [directory / one.recording for one in played if one.recording]
     return ExperimentView(
-        line=found_in([directory])[0],
+        line=line_of(directory),
         factors=table.columns[: table.words],
         columns=table.columns[table.words :],
         rows=tuple(_rows(table, made.summaries, played, directory)),
@@ -82,20 +88,3 @@ def _cell(column: str, text: str, one: Summary) -> Cell:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-@lru_cache(maxsize=256)
-def _line(directory: Path, file_ns: int, index_ns: int) -> ExperimentLine:  # noqa: ARG001  # changed files are others
-    store = Store(directory)
-    experiment = store.experiment()
-    return ExperimentLine(
-        id=run_id(directory),
-        name=experiment.name,
-        description=experiment.description,
-        played=len(store.played()),
-        matches=planned(experiment),
-    )
-
-
-def _changed_ns(path: Path) -> int:
-    return path.stat().st_mtime_ns if path.exists() else 0

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from khala.view.index import cache_directory, connect, prepare
-from khala.view.wire import RunLine
+from khala.view.wire import ExperimentLine, RunLine
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.keys import Topic, run_key
@@ -181,6 +181,36 @@ def lines(paths: Sequence[Path], below: Path) -> list[RunLine]:
             db.executemany("insert or replace into line values (?, ?, ?, ?)", new)
             db.execute("commit")
         return found
+
+
+def experiments(directories: Sequence[Path]) -> list[ExperimentLine]:
+    """Return the lines of experiments; how many matches each plans is known until its file changes."""
+    with contextlib.closing(_cache()) as db:
+        return [line for path in directories if (line := _experiment(path, db)) is not None]
+
+
+def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | None:
+    try:
+        changed, key = (directory / EXPERIMENT).stat().st_mtime_ns, str(directory.absolute())
+        known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
+        if known:
+            return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
+        from khala.view.experiments import line_of as counted  # noqa: PLC0415  # it loads all that experiments need
+
+        line = counted(directory)
+        db.execute("insert or replace into line values (?, 0, ?, ?)", (key, changed, line.model_dump_json()))
+    except (KhalaError, OSError, ValueError, sqlite3.Error):
+        return None
+    return line
+
+
+def _played(directory: Path) -> int:
+    path = directory / "index.sqlite"
+    if not path.exists():
+        return 0
+    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        count: int = db.execute("select count(*) from matches").fetchone()[0]
+        return count
 
 
 def _line(

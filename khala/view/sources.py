@@ -76,11 +76,7 @@ class Sources:
         return experiment_view(path, self._directory or path)
 
     def _lines(self, experiments: list[Path]) -> list[ExperimentLine]:
-        if not experiments:
-            return []
-        from khala.view.experiments import found_in  # noqa: PLC0415
-
-        return found_in(experiments)
+        return library.experiments(experiments)
 
 
 def find(given: Sequence[str], runs: Path, *, adviser: str = "") -> Sources:
