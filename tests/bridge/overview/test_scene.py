@@ -39,7 +39,7 @@ def shown(
 ) -> Scene:
     """Return the scene of what blue, and red if there are two, see; the episode began with `first`, or now."""
     terrain = terrain_of(first or sides, whole, FRAMES, run="r", episode=0)
-    earlier = before or [None] * len(sides)
+    earlier: Sequence[Snapshot | None] = before or [None] * len(sides)
     watched = [Watched(*one) for one in zip(("blue", "red"), sides, earlier, strict=False)]
     return scene_of(watched, whole, terrain, FRAMES, step=3)
 
@@ -76,11 +76,10 @@ def test_every_position_and_every_value_is_that_of_the_snapshot(
     frame, found = now.info.frame(FRAMES), marks(shown(now))
     assert len(found) == len(places)
     for tag, mark in found.items():
-        unit = now.known[tag]
-        x, y = frame.minimap(*unit.pos)
-        assert math.dist((mark.x, mark.y), (x, y)) < 0.001
-        assert (mark.type, mark.health_max, mark.shield_max) == (unit.name, unit.health_max, unit.shield_max)
-        assert (mark.health, mark.shield) == (round(unit.health, 1), round(unit.shield, 1))
+        known = now.known[tag]
+        assert math.dist((mark.x, mark.y), frame.minimap(*known.pos)) < 0.001
+        assert (mark.type, mark.health_max, mark.shield_max) == (known.name, known.health_max, known.shield_max)
+        assert (mark.health, mark.shield) == (round(known.health, 1), round(known.shield, 1))
 
 
 def test_it_is_read_back_as_it_was_made(battle: list[raw_pb2.Unit], snapshot: MakeSnapshot) -> None:
