@@ -129,3 +129,17 @@ async def test_agents_are_sent_nothing_else_than_without_scenes(hall: Hall, conf
 
 async def _attack(peer: Peer, seen: Any) -> None:
     await peer.answer(seen, "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xb)>")
+
+
+async def test_who_follows_the_file_finds_the_map_while_agents_think(
+    hall: Hall, config: MakeConfig, tmp_path: Path
+) -> None:
+    path, found = tmp_path / "r.mcap", list[list[int]]()
+
+    async def slow(peer: Peer, seen: Any) -> None:
+        await asyncio.sleep(1)
+        found.append([scene.step for scene in Recording.open(path).of(Scene)])
+        await peer.answer(seen)
+
+    await hall.play(config(record=path), Stalkers=slow)
+    assert found == [[0], [0, 1], [0, 1, 2]]
