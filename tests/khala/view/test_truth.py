@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 import random
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala.view.wire import MOST_SCENES
 from khala_protocol.messages import Observation, Reply, Report, Scene, UnitFlag
 from khala_protocol.recording import Recording
+from tests.khala.view.made import opened
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from pathlib import Path
 
     from khala.view.runs import Opened
-
-    Fixture = Callable[[str], Opened]
 
 MOMENTS = 200
 
@@ -31,20 +33,26 @@ def told(recording: Recording, kind: type[Any]) -> dict[tuple[int, str, str], An
 
 @pytest.mark.parametrize("name", ["made", "golden"])
 def test_two_hundred_random_moments_are_as_recorded(name: str, request: pytest.FixtureRequest) -> None:
-    opened: Opened = request.getfixturevalue(name)
-    recording = Recording.open(opened.path)
+    check_moments(request.getfixturevalue(name), MOMENTS)
+
+
+def check_moments(shown: Opened, count: int) -> None:
+    """Compare random moments with what a reading of the whole recording says."""
+    recording = Recording.open(shown.path)
     seen, replies, reports = (told(recording, kind) for kind in (Observation, Reply, Report))
     steps = sorted({step for step, _, _ in reports})
     chance = random.Random(14)
-    for _ in range(MOMENTS):
+    for _ in range(count):
         step = chance.choice(steps)
-        moment = json.loads(opened.moment(0, step))
+        moment = json.loads(shown.moment(0, step))
         for decision in moment["decisions"]:
             who = decision["side"], decision["agent"]
             asked = max(other for other, *whose in seen if tuple(whose) == who and other <= step)
             assert decision["step"] == asked
-            assert decision["reply"] == replies[asked, *who].text
+            assert decision["reply"] == (replies[asked, *who].text if (asked, *who) in replies else "")
             assert decision["game_loop"] == seen[asked, *who].game_loop
+            if decision["effect_step"] is None:
+                continue
             report = reports[decision["effect_step"], who[0], ""]
             mine = next(agent for agent in report.agents if agent.agent == who[1])
             assert (decision["fate"], decision["status"]) == (mine.fate, mine.status)
@@ -99,3 +107,19 @@ def test_every_death_of_the_result_is_on_the_time_line(golden: Opened) -> None:
     # the deaths of the last step are in its report, and no observation follows that would name them
     assert result.lost.units - 1 <= lost <= result.lost.units
     assert result.killed.units - 1 <= killed <= result.killed.units
+
+
+@pytest.mark.slow
+@pytest.mark.game
+@pytest.mark.parametrize("task", ["2s3z_pair", "simple64_duel"])
+def test_a_match_that_is_played_now_is_shown_as_it_was(task: str, tmp_path: Path) -> None:
+    arguments = ["run", task, "--policy", "skilled", "--max-steps", "40", "--out", str(tmp_path), "--run", "now"]
+    subprocess.run([sys.executable, "-m", "khala", *arguments], check=False, capture_output=True)
+    played = opened(tmp_path / "now" / "recording.mcap")
+    recorded = {scene.step: scene for scene in Recording.open(played.path).of(Scene)}
+    assert recorded
+    for begin in range(0, max(recorded) + 1, MOST_SCENES):
+        shown = json.loads(played.scenes(0, begin, begin + MOST_SCENES - 1))["scenes"]
+        for one in shown:
+            assert Scene.model_validate(one) == recorded[one["step"]]
+    check_moments(played, 200)
