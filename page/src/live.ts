@@ -36,7 +36,7 @@ export class Live {
     this.socket = socket;
     socket.onmessage = (event) => this.hear(JSON.parse(String(event.data)) as Progress | Note);
     socket.onclose = () => {
-      if (!this.ended && this.match.isLive()) setTimeout(() => this.ended || this.connect(), AGAIN_S * 1000);
+      if (!this.ended && this.match.grows()) setTimeout(() => this.ended || this.connect(), AGAIN_S * 1000);
     };
   }
 

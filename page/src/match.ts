@@ -35,7 +35,7 @@ export class Match {
 
   constructor(readonly id: string, readonly episode: number) {
     this.path = `runs/${id}/episodes/${episode}`;
-    this.scenes = new SceneStore(this.path, () => this.isLive());
+    this.scenes = new SceneStore(this.path, () => this.grows());
     this.place = computed(() => (this.timeline.value ? locate(this.timeline.value, clock.axis.value, clock.at.value) : { index: 0, fraction: 0 }));
     this.index = computed(() => this.place.value.index);
     this.step = computed(() => this.timeline.value?.steps[this.index.value] ?? 0);
@@ -44,27 +44,29 @@ export class Match {
 
   /** Ask for what the page begins with. */
   async open(): Promise<void> {
-    await Promise.all([
-      this.take(this.run, `runs/${this.id}`),
-      this.take(this.timeline, `${this.path}/timeline`),
-      this.take(this.terrain, `${this.path}/terrain`).catch(() => undefined), // recordings of early versions have none
-    ]).catch((error: Error) => (this.trouble.value = error.message));
+    try {
+      await this.take(this.run, `runs/${this.id}`);
+      await Promise.all([this.take(this.timeline, `${this.path}/timeline`), this.takeTerrain()]);
+    } catch (error) {
+      if (!this.grows()) this.trouble.value = (error as Error).message;
+    }
   }
 
   /** Take what is new in a recording that grows. */
   async grow(progress: Progress): Promise<void> {
     this.lag.value = progress.live ? progress.lag_s : null;
     const known = this.timeline.value;
-    if (progress.episode !== this.episode || (known && known.steps.length >= progress.steps && this.isLive() === progress.live)) return;
-    await this.take(this.timeline, `${this.path}/timeline`);
-    if (!this.terrain.value) await this.take(this.terrain, `${this.path}/terrain`).catch(() => undefined);
-    if (!progress.live || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
+    const ended = this.isLive() && !progress.live;
+    if (ended || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
+    if (known && !ended && progress.episode === this.episode && known.steps.length >= progress.steps) return;
+    await this.take(this.timeline, `${this.path}/timeline`).catch(() => undefined); // its first step is not read yet
+    if (!this.terrain.value) await this.takeTerrain();
   }
 
   /** Return the long texts of what an agent was asked last up to a step. */
   async asked(side: string, agent: string, step: number): Promise<Asked> {
     const path = `${this.path}/steps/${step}/agents/${side}/${agent}`;
-    const held = this.isLive() ? undefined : this.askedOf.get(path);
+    const held = this.grows() ? undefined : this.askedOf.get(path);
     const answer = held ?? (await get<Asked>(path));
     this.askedOf.set(path, answer);
     return answer;
@@ -73,6 +75,9 @@ export class Match {
   close(): void {
     for (const end of this.endings) end();
   }
+
+  /** Whether more of it is to come: it is played, or not yet read to its end. */
+  grows = () => this.isLive() || (this.run.value?.indexed ?? 1) < 1;
 
   isLive = () => this.run.value?.line.live ?? false;
 
@@ -102,7 +107,7 @@ export class Match {
 
   private watch(): void {
     const loadMoment = newest<Moment>(
-      async (path) => (this.isLive() ? undefined : this.moments.get(path)) ?? (await get<Moment>(path)),
+      async (path) => (this.grows() ? undefined : this.moments.get(path)) ?? (await get<Moment>(path)),
       (moment, path) => {
         this.moments.set(path, moment);
         this.moment.value = moment;
@@ -120,6 +125,10 @@ export class Match {
         before = step;
       }),
     );
+  }
+
+  private async takeTerrain(): Promise<void> {
+    await this.take(this.terrain, `${this.path}/terrain`).catch(() => undefined); // recordings of early versions have none
   }
 
   private async take<T>(place: { value: T | null }, path: string): Promise<void> {

@@ -46,6 +46,7 @@ export function begin(): void {
   read();
   clock.run();
   effect(keepSpan);
+  effect(goToPending);
   effect(keepAddress);
 }
 
@@ -61,8 +62,21 @@ export async function visit(to: Link): Promise<void> {
     clock.axis.value = to.by;
   });
   if (wanted !== open) await openMatches(to);
-  const timeline = first.value?.timeline.value;
-  if (timeline && to.s !== null) clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, to.s)));
+  pending = to.s;
+  goToPending();
+}
+
+/** The step of a link that is not there yet: its recording is still read. */
+let pending: number | null = null;
+
+function goToPending(): void {
+  const match = first.value;
+  const timeline = match?.timeline.value;
+  if (pending === null || !match || !timeline?.steps.length) return;
+  const there = timeline.steps[timeline.steps.length - 1] >= pending;
+  if (!there && match.grows()) return;
+  clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, pending)));
+  pending = null;
 }
 
 async function openMatches(to: Link): Promise<void> {
@@ -81,7 +95,7 @@ async function openMatches(to: Link): Promise<void> {
   await Promise.all(opened.map((m) => m.open()));
   if (matches.value !== opened) return;
   keepSpan();
-  lives.value = opened.filter((m) => m.isLive() || (m.run.value?.indexed ?? 1) < 1).map((m) => new Live(m));
+  lives.value = opened.filter((m) => m.grows()).map((m) => new Live(m));
   if (to.s === null && opened.some((m) => m.isLive())) clock.follow(true);
 }
 
@@ -107,6 +121,7 @@ let writing: ReturnType<typeof setTimeout> | undefined;
 /** Write the moment into the address, a few times a second at most: browsers refuse more than a hundred in 30 s. */
 function keepAddress(): void {
   const [a, b] = matches.value;
+  if (pending !== null) return;
   const to: Partial<Link> = a
     ? { a: a.id, e: a.episode, b: b?.id ?? "", eb: b?.episode ?? 0, s: clock.following.value ? null : a.step.value }
     : { x: link.value.x };

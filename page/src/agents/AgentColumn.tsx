@@ -64,7 +64,7 @@ function Header({ line, decision, step, toggle }: { line: AgentLine; decision: D
       {decision && (
         <p class="agent-figures">
           <Status decision={decision} />
-          <span title="Time until the reply">⏱ {seconds(decision.latency_s)}</span>
+          <span title="Time until the reply">{seconds(decision.latency_s)}</span>
           <span title={`Tokens read and written, in ${decision.usage.requests} requests`}>
             {short(decision.usage.prompt_tokens)}→{short(decision.usage.completion_tokens)} tok
           </span>

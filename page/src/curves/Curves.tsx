@@ -11,7 +11,7 @@ import { GUTTER, MARGIN } from "../timeline/Plots";
 import { capital } from "../words";
 import { CHARTS, charts, linesOf, type Chart, type Line } from "./series";
 
-const HEIGHT = 74;
+const HEIGHT = 82;
 
 export function Curves({ matches }: { matches: readonly Match[] }) {
   return (
@@ -87,7 +87,7 @@ function options(chart: Chart, lines: readonly Line[], width: number): uPlot.Opt
   return {
     width,
     height: HEIGHT,
-    padding: [6, MARGIN, 4, 0],
+    padding: [16, MARGIN, 4, 0],
     legend: { show: false },
     cursor: { show: false },
     scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1e-6) * 1.08] } },

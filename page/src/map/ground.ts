@@ -25,8 +25,9 @@ export async function groundOf(terrain: Terrain, colours: Colours): Promise<HTML
     const level = (sample(height, x / width, y / tall) - range[0]) / range[1];
     const slope = sample(height, (x + 2) / width, (y + 2) / tall) - sample(height, (x - 2) / width, (y - 2) / tall);
     const base = open > 0.5 ? mix(low, high, level) : wall;
+    const shade = open > 0.5 ? Math.min(Math.abs(slope) / 120, 0.16) : 0;
     const outlined = mix(base, edge, Math.max(0, 1 - Math.abs(open - 0.5) / 0.22) * 0.9);
-    return mix(outlined, slope > 0 ? [0, 0, 0] : [255, 255, 255], Math.min(Math.abs(slope) / 120, 0.16));
+    return mix(outlined, slope > 0 ? [0, 0, 0] : [255, 255, 255], shade);
   });
 }
 

@@ -111,7 +111,7 @@ function hasBar(spot: Spot, view: View): boolean {
   const { unit, health, shield } = spot;
   if (!unit.healthMax || unit.progress < 1 || is(unit, "REMEMBERED")) return false;
   const hurt = health + shield < (unit.healthMax + unit.shieldMax) * 0.995;
-  return hurt ? radius(spot, view) > 3.2 : role(spot) === "army" && radius(spot, view) > 7;
+  return hurt ? radius(spot, view) > 3.2 : role(spot) === "army" && radius(spot, view) > 14;
 }
 
 function drawLetters(context: CanvasRenderingContext2D, spots: readonly Spot[], view: View, colours: Colours): void {
