@@ -44,6 +44,8 @@ class Memory:
     dead: set[str] = field(default_factory=set)
     made: set[str] = field(default_factory=set)
     scenes: bool = False
+    whole: bool = False
+    """Whether the scenes show the map without fog."""
     sums: dict[str, float] = field(default_factory=dict)
     """Of the curves that add up, so far."""
 
@@ -57,14 +59,15 @@ class Memory:
         """Return it as JSON data."""
         return {
             "episode": self.episode, "scenes": self.scenes, "places": self.places, "dead": sorted(self.dead),
-            "made": sorted(self.made), "step": self.step, "sums": self.sums,
+            "made": sorted(self.made), "step": self.step, "sums": self.sums, "whole": self.whole,
         }  # fmt: skip
 
     @classmethod
     def load(cls, data: Json) -> Memory:
         """Return what `dump` returned."""
         places = {tag: (side, kind, x, y) for tag, (side, kind, x, y) in data["places"].items()}
-        return cls(data["episode"], data["step"], places, set(data["dead"]), set(data["made"]), data["scenes"], data["sums"])
+        sets = {"dead": set(data["dead"]), "made": set(data["made"])}
+        return cls(**data | sets | {"places": places})
 
 
 @dataclass(slots=True)
@@ -195,7 +198,7 @@ class Digest:
         for player in said["players"]:
             row |= _from_player(player, names[player["player"]])
         self._structures(said, names, first=not memory.scenes)
-        memory.scenes = True
+        memory.scenes, memory.whole = True, bool(said["whole"])
         for unit in said["units"]:
             memory.places[hex(unit[0])] = (names.get(unit[2], ""), unit[1], unit[3], unit[4])
 
@@ -250,7 +253,11 @@ def _from_view(view: Json, side: str, *, alone: bool) -> Json:
 
 def counted(kinds: Iterable[str]) -> str:
     """Return what there is of several: `2 Stalkers, 1 Probe`."""
-    return ", ".join(f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in Counter(kinds).most_common())
+    return ", ".join(f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common())
+
+
+def _several(kind: str) -> str:
+    return f"{kind}es" if kind.endswith(("ch", "sh", "s", "x")) else f"{kind}s"
 
 
 def centre(points: Iterable[tuple[float, float, float]]) -> Point | None:

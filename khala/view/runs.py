@@ -225,9 +225,8 @@ class Opened:
             raise NotThere(f"this recording has no episode {episode} yet")
 
     def _drawn_from(self) -> Literal["whole", "seen", "views"]:
-        if not self.index.meta("scenes"):
-            return "views"
-        return "whole" if self.index.meta("whole") else "seen"
+        found: Literal["whole", "seen", "views"] = self.index.meta("scenes", "views")
+        return found
 
     def _scale(self, episode: int) -> float:
         if episode not in self._scales:

@@ -219,7 +219,7 @@ class Scanner:
         self._note("broken", scan.broken)
         self._note("fingerprint", fingerprint(file, scan.offset))
         if self._memory.scenes:
-            self._note("scenes", value=True)
+            self._note("scenes", "whole" if self._memory.whole else "seen")
         if newest is not None:
             self._note("reported_ns", newest)
 

@@ -35,6 +35,8 @@ PROGRESS_S = 0.2
 """Between two lines of progress to a page at most; lag is counted anew in each."""
 MOST_MESSAGE_BYTES = 16_384
 """Of what a page may send."""
+FIRST_LOOK_S = 0.5
+"""How long the first question about a recording waits for the begin of its index."""
 MOST_OPEN = 8
 """Recordings that stay open; of more, the one that was not asked about for longest is closed."""
 _JSON = "application/json"
@@ -185,8 +187,10 @@ class Server:
             await asyncio.to_thread(opened.index.close)
             return self._opened[name]
         self._opened[name] = opened
-        self._changed[name] = asyncio.Event()
+        self._changed[name] = begun = asyncio.Event()
         opened.start()
+        with contextlib.suppress(TimeoutError):  # so that the first answers are not empty
+            await asyncio.wait_for(begun.wait(), FIRST_LOOK_S)
         await self._close_oldest()
         return opened
 
