@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import re
 
-from khala_bridge.compat import actions, buffs, units, upgrades
+from khala_bridge.compat import actions, buffs, features, units, upgrades
 
 _UNITS: dict[int, str] = {
     int(member): member.name for race in (units.Neutral, units.Protoss, units.Terran, units.Zerg) for member in race
@@ -18,6 +18,7 @@ _COPIES = ("Colossus", "Stalker", "Zealot", "Marauder", "Marine", "Medivac", "Ba
 _UNITS |= dict(enumerate(_COPIES, start=1962))  # on SMAC's maps, in the simulator's numbers; PySC2's end there
 _BUFFS: dict[int, str] = {int(member): member.name for member in buffs.Buffs}
 _UPGRADES: dict[int, str] = {int(member): member.name for member in upgrades.Upgrades}
+_EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
 _FORM = re.compile(r"_(pt|unit|quick|autocast)$")  # how a raw function takes its target
 
 
@@ -34,6 +35,11 @@ def buff_name(buff: int) -> str:
 def upgrade_name(upgrade: int) -> str:
     """Return the name of an upgrade, `Blink`."""
     return _UPGRADES.get(upgrade) or f"Upgrade{upgrade}"
+
+
+def effect_name(effect: int) -> str:
+    """Return the name of an effect on the ground, `PsiStorm`."""
+    return _EFFECTS.get(effect) or f"Effect{effect}"
 
 
 @functools.cache

@@ -299,6 +299,10 @@ def _state(rows: list[Measures], crash: str) -> tuple[State, str]:
     return "done", ""
 
 
+_OTHERWISE = frozenset({"clock", "executor", "opponent", "map", "scenes"})
+"""Fields of a task that are compared by themselves, or that no agent notices."""
+
+
 def comparable(card: Run) -> dict[str, Any]:
     """Return what of a run card must be the same in runs that are compared, by the names that `--allow` takes."""
     task = dict(card.config)
@@ -312,7 +316,7 @@ def comparable(card: Run) -> dict[str, Any]:
         "code": card.code_sha256,
         "versions": card.versions,
         "hardware": card.hardware,
-        "task": {name: value for name, value in task.items() if name not in ("clock", "executor", "opponent", "map")},
+        "task": {name: value for name, value in task.items() if name not in _OTHERWISE},
     }
 
 

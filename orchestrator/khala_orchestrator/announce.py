@@ -1,4 +1,4 @@
-"""Say that the host is there, and publish its run card, briefings, messages between agents, reports and results.
+"""Say that the host is there, and publish its run card, briefings, messages, reports, results, terrain and scenes.
 
 Below it: the bus. Above it: `khala_orchestrator.match`, which decides what is published, and this module where.
 """
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from khala_protocol.bus import Bus, Publisher, Token
-    from khala_protocol.messages import Briefing, Message, Report, Result, Run
+    from khala_protocol.messages import Briefing, Message, Report, Result, Run, Scene, Terrain
 
-_DELIVERY = {Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT: Delivery.STATE}
+_DELIVERY = {
+    Topic.RUN: Delivery.STATE, Topic.REPORT: Delivery.LOG, Topic.RESULT: Delivery.STATE,
+    Topic.TERRAIN: Delivery.STATE, Topic.SCENE: Delivery.STATE,
+}  # fmt: skip
 
 
 class Announcer:
@@ -78,3 +81,11 @@ class Announcer:
     async def result(self, result: Result) -> None:
         """Publish the result of an episode."""
         await self._topics[Topic.RESULT].put(encode(result))
+
+    async def terrain(self, terrain: Terrain) -> None:
+        """Publish the ground of an episode."""
+        await self._topics[Topic.TERRAIN].put(encode(terrain))
+
+    async def scene(self, scene: Scene) -> None:
+        """Publish the map at a step."""
+        await self._topics[Topic.SCENE].put(encode(scene))

@@ -18,6 +18,7 @@ from khala_orchestrator.pacing import AtOnce, pacing_of
 from khala_orchestrator.record import BestEffort, Listener, RecordingBus
 from khala_orchestrator.resume import ResumedTurn
 from khala_orchestrator.roster import Roster
+from khala_orchestrator.scenery import Scenery
 from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Turn
 from khala_protocol.recording import Recorder
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.resume import Unfinished
     from khala_orchestrator.roster import Seat
     from khala_protocol.bus import Bus
-    from khala_protocol.messages import Briefing, Message, Report, Result, Wire
+    from khala_protocol.messages import Briefing, Message, Report, Result, Scene, Terrain, Wire
 
 
 async def host(
@@ -77,7 +78,8 @@ async def host(
         flush()  # a host that is killed before its first report can be resumed, too
         watch(card)
         observer = _PublishingObserver(announcer, watch, flush)
-        match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock))
+        scenery = Scenery(config.task, config.run, game, observer)
+        match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock), scenery)
         for briefing in match.briefings(past.episode if past else 0):  # by which agents know that the host is there
             await announcer.brief(briefing)
         await roster.assemble(required, config.assemble_s)
@@ -130,7 +132,7 @@ class _PublishingObserver:
     """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
 
     Attributes:
-        live: False while a recording is played again: then it only keeps the briefings.
+        live: False while a recording is played again: then it only keeps the briefings, and the map of the open step.
     """
 
     def __init__(self, announcer: Announcer, watch: Callable[[Wire], None], flush: Callable[[], None]) -> None:
@@ -138,19 +140,37 @@ class _PublishingObserver:
         self._watch = watch
         self._flush = flush
         self._held: list[Briefing] = []
+        self._terrain: Terrain | None = None
+        self._scene: Scene | None = None
         self.live = True
 
     async def go_live(self) -> None:
-        """Publish from now on, beginning with the briefings of the episode."""
+        """Publish from now on, beginning with the briefings of the episode and its map."""
         self.live = True
         for briefing in self._held:
             await self._announcer.brief(briefing)
+        if self._terrain is not None:
+            await self._announcer.terrain(self._terrain)
+        if self._scene is not None:
+            await self._announcer.scene(self._scene)
 
     async def brief(self, briefing: Briefing) -> None:
         if self.live:
             await self._announcer.brief(briefing)
         else:
             self._held.append(briefing)
+
+    async def terrain(self, terrain: Terrain) -> None:
+        if self.live:
+            await self._announcer.terrain(terrain)
+        else:
+            self._terrain = terrain
+
+    async def scene(self, scene: Scene) -> None:
+        if self.live:
+            await self._announcer.scene(scene)
+        else:
+            self._scene = scene
 
     async def message(self, message: Message) -> None:
         if self.live:
@@ -161,6 +181,8 @@ class _PublishingObserver:
             await self._announcer.report(report)
             self._flush()
             self._watch(report)
+        else:
+            self._scene = None
 
     async def result(self, result: Result) -> None:
         await self._announcer.result(result)

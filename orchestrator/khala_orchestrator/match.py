@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.pacing import Pacing
     from khala_orchestrator.roster import Seat
+    from khala_orchestrator.scenery import Scenery
     from khala_orchestrator.schedule import Asked, Decision
     from khala_orchestrator.side import Side
     from khala_orchestrator.turn import AgentPool, Answers, Question
@@ -91,6 +92,8 @@ class Match:
     agents: AgentPool
     match_observer: MatchObserver
     pacing: Pacing = field(default_factory=AtOnce)
+    scenery: Scenery | None = None
+    """Shows the map to those who watch; None if nobody does."""
     schedule: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
@@ -140,7 +143,8 @@ class Match:
             for side, snapshot in zip(self.sides, snapshots, strict=True):
                 side.look(snapshot)
             asked = self._ask(at, loop)
-        answers = await self.agents.ask(self._questions(at, asked.seats, watch), wait=self.config.task.clock.waits)
+        async with self.scenery.shown(at, snapshots) if self.scenery else nullcontext():
+            answers = await self.agents.ask(self._questions(at, asked.seats, watch), wait=self.config.task.clock.waits)
         self.schedule.decide(answers.by_seat, loop)
         with watch.phase("act"):
             due = self.schedule.due(loop)

@@ -70,6 +70,9 @@ class FakeGame:
             return (StepResult(after, done.value, 1),)
         raise AssertionError
 
+    def whole(self) -> None:
+        self._note("whole")
+
     def kill(self) -> None:
         self.calls.append("kill")
         self._killed.set()

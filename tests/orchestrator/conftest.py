@@ -213,6 +213,9 @@ class StillGame:
             return (StepResult(after, done.value, env_steps=1),)
         raise AssertionError("the raw executor plays a plan in one step")
 
+    def whole(self) -> None:
+        """Show no more than the side sees."""
+
     def kill(self) -> None:
         self.calls.append("kill")
 

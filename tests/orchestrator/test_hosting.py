@@ -54,6 +54,9 @@ class Mortal:
         self._live()
         return self.game.act(plans)
 
+    def whole(self) -> Snapshot | None:
+        return self.game.whole()
+
     def kill(self) -> None:
         self.game.kill()
 

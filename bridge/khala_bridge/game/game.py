@@ -117,6 +117,12 @@ class Game(Protocol):
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Play one plan of each player to its end, or to the end of the episode, which must not be over yet."""
 
+    def whole(self) -> Snapshot | None:
+        """Return the whole map as it is now, from the first player's place; None if the game does not show it.
+
+        It is for those who watch. What the game tells a player only once must be in the snapshots before.
+        """
+
     def kill(self) -> None:
         """End the game at once; the only method that another thread may call."""
 
@@ -230,6 +236,10 @@ class GameThread:
         self._slowest_s = max(self._slowest_s or 0.0, loop.time() - began_s)
         return played
 
+    async def whole(self) -> Snapshot | None:
+        """Return the whole map as it is now; None if the game does not show it."""
+        return await self._run(self._playing.whole, self._patience.limit_s(self._slowest_s))
+
     @property
     def _playing(self) -> Game:
         assert self._game is not None, "the game is entered before it is used"
@@ -286,6 +296,10 @@ class Sides:
             executor.begin()
         self._now = await self._thread.reset()
         return self._now
+
+    async def whole(self) -> Snapshot | None:
+        """Return the whole map as it is now, for those who watch; None if the game does not show it."""
+        return await self._thread.whole()
 
     async def act(self, commands: Sequence[Sequence[Command]], loops: int) -> tuple[StepResult, ...]:
         """Play the commands of each side for a number of game loops."""

@@ -10,10 +10,14 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+import logging
 from typing import TYPE_CHECKING, Any
+
+from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.act.plan import PlanStep, Played
 from khala_bridge.catalogue.functions import check_against_pysc2
+from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError, GameMissing
 from khala_bridge.game.env import explained
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
@@ -27,13 +31,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from s2clientprotocol import sc2api_pb2 as sc_pb
-
     from khala_bridge.act.plan import GameAction, Plan
     from khala_bridge.game.env import Launched
     from khala_bridge.game.invitation import Invitation
     from khala_bridge.state import EpisodeInfo, Snapshot
     from khala_bridge.state.grid import Grid
+
+log = logging.getLogger(__name__)
 
 _PLACING_LOOPS = 16
 """Loops that a map's script may take until it places the first unit; the battles need none or one."""
@@ -65,6 +69,8 @@ class PySC2Game:
         """
         self._config = config
         self._asks = config.abilities
+        self._lifts_fog = config.opponent.kind != "lan"  # its clock may go on, and its host agreed to no such look
+        self._met_enemy = False
         self._episode = 0
         self._ended = True
         self._maps: tuple[EpisodeInfo, ...] = ()
@@ -123,6 +129,31 @@ class PySC2Game:
         for player in players:
             player.close()
         return tuple(StepResult(s, p.played, env_steps) for s, p in zip(snapshots, players, strict=True))
+
+    def whole(self) -> Snapshot | None:
+        """Return the whole map as it is now, from the first player's place; None if the game does not show it.
+
+        The request does not go through PySC2's `observe`, which keeps the last observation of a game that ends.
+        """
+        if self._ended or not self._lifts_fog:
+            return None
+        client = self._env._controllers[0]._client  # noqa: SLF001  # see above
+        with explained("the game died when it was asked for the whole map"):
+            try:
+                answer = client.send(observation=sc_pb.RequestObservation(disable_fog=True))
+            except protocol.ProtocolError as error:
+                log.warning("the game does not show the whole map; scenes have what the sides see: %s", error)
+                self._lifts_fog = False
+                return None
+        seen = read_snapshot(answer, self._maps[0], through_fog=True)
+        return seen if self._is_whole(seen) else None
+
+    def _is_whole(self, seen: Snapshot) -> bool:
+        """Return whether the game took the fog away: nothing is remembered, and an opponent had something at least."""
+        units = seen.known.values()
+        self._met_enemy = self._met_enemy or any(unit.is_enemy for unit in units)
+        nobody_there = self._config.map.opponent is not None and not self._met_enemy
+        return not nobody_there and not any(unit.is_remembered for unit in units)
 
     def kill(self) -> None:
         """Kill the game's processes; a call that waits for them fails then."""

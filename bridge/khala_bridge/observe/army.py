@@ -5,6 +5,7 @@ Functions of a scene, of the episode's places and of its chronicle; for agents t
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -66,12 +67,17 @@ def toll(chronicle: Chronicle, log: Sequence[Entry], since_loop: int) -> Toll:
     )
 
 
-def _fights(unit: Unit) -> bool:
-    """Return True if a unit is of an army: it moves, and is no worker; also casters and transports."""
-    known = knowledge().get(unit.name)
+@functools.cache
+def is_of_army(name: str) -> bool:
+    """Return True if units of a type are an army: they move, and do not gather; also casters and transports."""
+    known = knowledge().get(name)
     if known is None or known.structure or known.worker:
         return False
-    return unit.name not in PASSING | LIVES_OF_ITS_OWN and not unit.is_hallucination
+    return name not in PASSING | LIVES_OF_ITS_OWN
+
+
+def _fights(unit: Unit) -> bool:
+    return is_of_army(unit.name) and not unit.is_hallucination
 
 
 def _value(unit: Unit) -> float:

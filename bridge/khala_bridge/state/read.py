@@ -82,6 +82,7 @@ def read_snapshot(
     ended: bool = False,
     outcome: Outcome | None = None,
     creep: Grid | None = None,
+    through_fog: bool = False,
 ) -> Snapshot:
     """Return the snapshot of an observation.
 
@@ -95,13 +96,14 @@ def read_snapshot(
         ended: whether the episode is over.
         outcome: the player's result, if the response does not have it.
         creep: of the snapshot before, `NO_GRID` for the first one; None if nobody remembers what was seen.
+        through_fog: whether the game was asked for the map without fog: then creep is as it is.
     """
     observation = response.observation
     raw = observation.raw_data
     known = _units(raw.units)
     units = {tag: unit for tag, unit in known.items() if unit.display_type is not _REMEMBERED}
     player = _player(observation.player_common)
-    camera, visibility = raw.player.camera, _grid(raw.map_state.visibility)
+    camera, visibility, real = raw.player.camera, _grid(raw.map_state.visibility), _grid(raw.map_state.creep)
     return Snapshot(
         info=info,
         game_loop=observation.game_loop,
@@ -115,7 +117,7 @@ def read_snapshot(
         effects=tuple([_effect(effect) for effect in raw.effects]),
         alerts=tuple(map(_alert, observation.alerts)),
         camera=WorldPoint(camera.x, camera.y),
-        creep=known_creep(_grid(raw.map_state.creep), visibility, creep),
+        creep=real if through_fog else known_creep(real, visibility, creep),
         visibility=visibility,
         pictures=GamePictures(observation),
         abilities=abilities,
@@ -226,7 +228,8 @@ def _total(category: score_pb2.CategoryScoreDetails) -> float:
 
 
 def _effect(effect: raw_pb2.Effect) -> Effect:
-    return Effect(effect.effect_id, _ALLIANCES[effect.alliance], effect.radius, tuple(map(_point, effect.pos)))
+    places = tuple(map(_point, effect.pos))
+    return Effect(effect.effect_id, _ALLIANCES[effect.alliance], effect.radius, places, effect.owner)
 
 
 def _alert(alert: sc_pb.Alert.ValueType) -> str:

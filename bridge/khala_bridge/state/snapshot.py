@@ -75,6 +75,8 @@ class Effect(NamedTuple):
     radius: float
     """In world units; 0 if the game has none for it."""
     places: tuple[WorldPoint, ...]
+    owner: int = 0
+    """Number of the player that it belongs to; 16 for neutral ones, 0 if the game does not say."""
 
 
 class ActionError(NamedTuple):

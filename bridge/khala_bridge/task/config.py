@@ -317,6 +317,9 @@ class TaskConfig(Frozen):
     advisers: tuple[AdviserConfig, ...] = (AdviserConfig(name="Adviser"),)
     """People or programs who may write to agents in the match; `[]` if nobody may. The recording marks what they
     write, and the result counts it."""
+    scenes: Literal["whole", "seen", "none"] = "whole"
+    """What the host tells those who watch of the map in each step, never agents: the whole map without fog, where the
+    game shows it; what the sides see together; or nothing. See [scenes](../how-to/read-a-recording.md#the-map)."""
     executor: Literal["raw", "screen"] = "raw"
     rhythm: Rhythm = "own"
     """`paper`: at most one decision in a second of the game, and workers that gather and are trained by the host, as in

@@ -21,7 +21,7 @@ from khala_simulator.api.layers import Frame
 from khala_simulator.api.raw import Units, write_image
 from khala_simulator.api.raw_effects import write_effects, write_power, write_radar
 from khala_simulator.api.score import Holdings
-from khala_simulator.api.sight import Alliance
+from khala_simulator.api.sight import Alliance, Display
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,16 +70,19 @@ def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) ->
             images += wire.embed(_LAYERS, seat.layers.encode(frame))
         if seat.renders is not None:
             images += wire.embed(_RENDERS, seat.renders.encode(frame))
-    _told(seat, sight)
+    _told(seat, sight, through_fog=disable_fog)
     return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *images])]
 
 
-def _told(seat: PlayerSeat, sight: Sight) -> None:
+def _told(seat: PlayerSeat, sight: Sight, *, through_fog: bool) -> None:
     seat.hands.forget()
     seat.deaths_told = len(seat.world.deaths)
     seat.mishaps_told = len(seat.world.mishaps)
     seat.alerts_told = len(seat.world.alerts)
-    seat.known = frozenset(sight.tag.tolist())
+    if through_fog:  # a look without fog tells of no deaths in it later
+        seat.known |= frozenset(sight.tag[sight.display == Display.VISIBLE.value].tolist())
+    else:
+        seat.known = frozenset(sight.tag.tolist())
     seat.observed_loop = seat.world.loop
 
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from khala_bridge.compat import features
 from khala_bridge.knowledge import knowledge
-from khala_bridge.names import unit_name
+from khala_bridge.names import effect_name, unit_name
 from khala_bridge.observe.image.codes import code_of
 from khala_bridge.observe.image.painting import Painting, Veil, upright
 from khala_bridge.state import Alliance
@@ -36,7 +35,6 @@ _SIDES: dict[Alliance, Side] = {
     Alliance.ENEMY: "enemy",
     Alliance.NEUTRAL: "neutral",
 }
-_EFFECTS: dict[int, str] = {int(effect): effect.name for effect in features.Effects}
 _STRUCTURE_RADIUS = 1.0
 """An unknown type counts as a structure if it is this large and does not fly."""
 _LEVELS: dict[Shape, int] = {
@@ -134,7 +132,7 @@ class Moment:
         """Effects on the ground: storms, biles, clouds."""
         return tuple(
             Patch(
-                _EFFECTS.get(effect.effect_id, f"Effect{effect.effect_id}"),
+                effect_name(effect.effect_id),
                 _SIDES[effect.alliance],
                 effect.radius or 0.5,
                 effect.places,
