@@ -1,15 +1,15 @@
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bench.browser import CHROMIUM, Viewer, browsing, viewing
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report, Scene
 from khala_protocol.recording import Recorder, Recording
@@ -19,13 +19,16 @@ if TYPE_CHECKING:
 
     from playwright.sync_api import Browser, BrowserContext, Page
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 GOLDEN = Path(__file__).parents[1] / "golden.mcap"
 HOSTILE = (
-    "<img src=x onerror=\"window.taken=1\"><script>window.taken=1</script>"
+    '<img src=x onerror="window.taken=1"><script>window.taken=1</script>'
     "<svg onload=window.taken=1> javascript:window.taken=1 </script></textarea>\u202e<b>bold</b>"
 )
 WAIT_MS = 20_000
+NAME_OF_FOCUS = """() => {
+    const it = document.activeElement
+    return it.getAttribute('aria-label') || it.labels?.[0]?.firstChild.textContent.trim() || it.innerText
+}"""
 
 pytestmark = [
     pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium; Debian has it as the package chromium"),
@@ -33,48 +36,17 @@ pytestmark = [
 ]
 
 
-class Viewer:
-    """A `khala view` that was started, and its address."""
-
-    def __init__(self, process: subprocess.Popen[str], address: str) -> None:
-        self.process, self.address = process, address
-
-    @property
-    def origin(self) -> str:
-        return self.address.partition("/?")[0]
-
-
 @pytest.fixture(scope="module")
 def view() -> Iterator[Callable[..., Viewer]]:
     """Start `khala view` with some arguments; end all of them."""
-    started: list[subprocess.Popen[str]] = []
-
-    def start(*arguments: Path | str) -> Viewer:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "khala", "view", *map(str, arguments), "--no-open"],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-        started.append(process)
-        assert process.stdout is not None
-        for line in process.stdout:
-            if found := re.search(r"http://\S+", line):
-                return Viewer(process, found.group())
-        raise AssertionError("khala view ended before it printed an address")
-
-    yield start
-    for process in started:
-        process.terminate()
-        process.communicate(timeout=20)
+    with contextlib.ExitStack() as stack:
+        yield lambda *arguments: stack.enter_context(viewing(*arguments))
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    with browsing() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +78,11 @@ def opened(context: BrowserContext, address: str, wait_for: str = "text=Army val
     page.wait_for_selector(wait_for)
     page.asked, page.failed = asked, failed  # type: ignore[attr-defined]
     return page
+
+
+def asked_hosts(page: Page) -> set[str]:
+    """Return whom the page has asked for anything."""
+    return {url.partition("/api")[0].partition("/?")[0].rstrip("/") for url in page.asked}  # type: ignore[attr-defined]
 
 
 def answer(page: Page, path: str) -> Any:
@@ -141,7 +118,7 @@ def test_a_stranger_sees_who_plays_and_who_wins(context: BrowserContext, golden:
     )
     assert colours > 20
     assert not page.failed  # type: ignore[attr-defined]
-    assert {url.partition("/api")[0].partition("/?")[0].rstrip("/") for url in page.asked} == {golden.origin}  # type: ignore[attr-defined]
+    assert asked_hosts(page) == {golden.origin}
 
 
 def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: BrowserContext, golden: Viewer) -> None:
@@ -178,25 +155,16 @@ def test_what_stands_on_the_page_is_what_the_recording_says(context: BrowserCont
         for agent in reports[step].agents:
             column = page.get_by_role("region", name=re.compile(f"^Agent {agent.agent} "))
             said = replies[agent.asked_step if agent.asked_step is not None else step, agent.agent]
-            page.wait_for_function(
-                "([name, wanted]) => document.querySelector(`[aria-label^='Agent ${name} ']`)?.innerText.includes(wanted)",
-                arg=[agent.agent, str(agent.fate or agent.status)],
-            )
+            column.get_by_text(str(agent.fate or agent.status), exact=True).wait_for()
             column.get_by_role("tab", name="Reply").click()
-            page.wait_for_function(
-                "([name, said]) => document.querySelector(`[aria-label^='Agent ${name} ']`).innerText"
-                ".replace(/\\s+/g, ' ').includes(said)",
-                arg=[agent.agent, " ".join(said.text.split())[:80]],
-            )
+            column.get_by_text(" ".join(said.text.split())[:80]).first.wait_for()
             column.get_by_role("tab", name="Decision").click()
             assert column.get_by_role("img", name="accepted").count() == len(agent.accepted)
         units = answer(page, f"{_episode(page)}/scenes?from={step}&to={step}")["scenes"][0]["units"]
         assert units == json.loads(scenes[step].model_dump_json())["units"]
 
 
-def test_two_runs_stand_on_one_clock(
-    context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path
-) -> None:
+def test_two_runs_stand_on_one_clock(context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path) -> None:
     for name in ("a", "b"):
         shutil.copy(GOLDEN, tmp_path / f"{name}.mcap")
     page = opened(context, view(tmp_path / "a.mcap", tmp_path / "b.mcap").address)
@@ -261,13 +229,14 @@ def test_hostile_texts_stay_texts(context: BrowserContext, view: Callable[..., V
     assert "onerror" in page.inner_text("main")
     assert page.evaluate("() => window.taken") is None
     assert page.locator("main img[src], main script, main svg[onload]").count() == 0
-    assert {url.partition("/api")[0].partition("/?")[0].rstrip("/") for url in page.asked} == {page.evaluate("location.origin")}  # type: ignore[attr-defined]
+    assert asked_hosts(page) == {page.evaluate("location.origin")}
 
 
 def _made_hostile(message: object, payload: bytes) -> bytes:
     match message:
         case Reply():
-            return message.but(text=f"{HOSTILE}\n{message.text}\n<MessageTo(everyone, '''{HOSTILE}''')>").model_dump_json().encode()
+            said = f"{HOSTILE}\n{message.text}\n<MessageTo(everyone, '''{HOSTILE}''')>"
+            return message.but(text=said).model_dump_json().encode()
         case Observation():
             return message.but(text=HOSTILE + message.text).model_dump_json().encode()
         case Report():
@@ -280,9 +249,11 @@ def _made_hostile(message: object, payload: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, pytest.param(820, marks=pytest.mark.slow), pytest.param(390, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "width", [1280, pytest.param(820, marks=pytest.mark.slow), pytest.param(390, marks=pytest.mark.slow)]
+)
 def test_everybody_can_read_and_reach_it(browser: Browser, golden: Viewer, scheme: Any, width: int) -> None:
-    from axe_playwright_python.sync_playwright import Axe
+    from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]  # it has no types
 
     context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, bypass_csp=True)
     page = opened(context, golden.address)
@@ -297,17 +268,12 @@ def test_the_keyboard_alone_reaches_everything(context: BrowserContext, golden: 
     reached = set()
     for _ in range(60):
         page.keyboard.press("Tab")
-        reached.add(page.evaluate("() => document.activeElement.getAttribute('aria-label') || document.activeElement.innerText"))
-    assert {"Moment", "Play", "Eyes", "Speed"} <= {name for name in reached if name} | _labels(page, reached)
+        reached.add(page.evaluate(NAME_OF_FOCUS))
+    assert {"Moment", "Play", "Eyes", "Speed", "Layers", "Help"} <= reached
     page.keyboard.press("?")
     page.get_by_role("dialog").wait_for()
     page.keyboard.press("Escape")
-    page.wait_for_function("() => !document.querySelector('dialog[open]')")
-
-
-def _labels(page: Page, reached: set[str]) -> set[str]:
-    """Return the words beside the fields that have the focus by their labels."""
-    return set(page.evaluate("() => [...document.querySelectorAll('label')].map(label => label.firstChild.textContent.trim())"))
+    page.get_by_role("dialog").wait_for(state="detached")
 
 
 def _episode(page: Page) -> str:
