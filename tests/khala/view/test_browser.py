@@ -65,7 +65,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     made.close()
 
 
-def opened(context: BrowserContext, address: str, wait_for: str = "text=Army value >> nth=0") -> Page:
+def opened(context: BrowserContext, address: str, wait_for: str = "main h2 >> nth=0") -> Page:
     """Open an address; wait until something is there."""
     page = context.new_page()
     page.set_default_timeout(WAIT_MS)
