@@ -31,7 +31,7 @@ help: ## List the targets
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments --group page
 	@touch $@
 
 install: .venv/.ready ## Install what is needed to play into .venv

@@ -60,6 +60,7 @@ from khala.options import (
     ThinkingLoops,
 )
 from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
+from khala.view.cli import VIEW_EPILOG, view
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls, access_rules
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.console import Progress, stderr_console
@@ -302,6 +303,7 @@ for command, epilog in (
     (matches, None),
     (watch, None),
     (stop, None),
+    (view, VIEW_EPILOG),
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)

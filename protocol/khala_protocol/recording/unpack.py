@@ -40,20 +40,48 @@ def unpacked(file: BinaryIO) -> Iterator[McapRecord]:
     Raises:
         BROKEN: the file is torn or damaged here.
     """
-    allowed = FREE
+    budget = Budget()
     for record in StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD).records:
         if not isinstance(record, Chunk):
             yield record
             continue
-        allowed += RATIO * len(record.data) - _unpacked_size(record)
-        if allowed < 0:
-            raise McapError(_TOO_MUCH)
+        budget.take(record)
         stream, size = get_chunk_data_stream(record, validate_crc=True)
         while stream.count < size:
-            if (allowed := allowed - RECORD_COST) < 0:
-                raise McapError(_TOO_MUCH)
+            budget.take_record()
             if (inner := _inner(stream)) is not None:
                 yield inner
+
+
+class Budget:
+    """How much the chunks of one file may still unpack to."""
+
+    def __init__(self) -> None:
+        self._left = FREE
+
+    def take(self, chunk: Chunk) -> None:
+        """Count a chunk; raise `McapError` if it is too much."""
+        self._left += RATIO * len(chunk.data) - _unpacked_size(chunk)
+        self._check()
+
+    def take_record(self) -> None:
+        """Count a record of a chunk; raise `McapError` if it is too much."""
+        self._left -= RECORD_COST
+        self._check()
+
+    def _check(self) -> None:
+        if self._left < 0:
+            raise McapError(_TOO_MUCH)
+
+
+def chunk_bytes(chunk: Chunk) -> bytes:
+    """Return the records of a chunk that a budget has taken.
+
+    Raises:
+        BROKEN: it is damaged.
+    """
+    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+    return stream.read(size)
 
 
 def _unpacked_size(chunk: Chunk) -> int:

@@ -63,6 +63,7 @@ These are the rules of tolerance, in addition to those of headings (H, `khala_pr
 from khala_protocol.speech.arguments import render, written
 from khala_protocol.speech.reader import MAX_REPLY_CHARACTERS, parse
 from khala_protocol.speech.said import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing
+from khala_protocol.speech.thoughts import thought_of
 
 __all__ = [
     "MAX_REPLY_CHARACTERS",
@@ -75,5 +76,6 @@ __all__ = [
     "Standing",
     "parse",
     "render",
+    "thought_of",
     "written",
 ]

@@ -1,0 +1,275 @@
+"""A recording's messages → rows of the index: curves, losses and marks, from one message after the other.
+
+What it must remember from one message to the next is in `Memory`, which the index keeps, so that an index goes on where
+it was left. Scenes say most of it; of a recording without scenes, the agents' observations do. It reads plain JSON, for
+a hundred thousand messages are too many to be checked field by field; what is not as it should be counts for nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from khala_bridge.knowledge import knowledge
+from khala_protocol.messages import UnitFlag
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala_protocol.messages import Point
+
+Json = dict[str, Any]
+OPPONENT = "opponent"
+"""The side of an opponent that Khala does not play."""
+LATE = {"late": "late", "gone": "late", "malformed": "late", "fallback": "fallback"}
+"""The kind of mark of an agent's status."""
+_WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
+
+
+@dataclass(slots=True)
+class Memory:
+    """What is known of an episode up to a message.
+
+    Attributes:
+        places: where units were last seen, and whose they are, by tag: side, type, x, y.
+        dead: tags of units whose death is noted.
+        made: tags of structures, and names of upgrades, that are noted as finished.
+        step: the last one that was reported.
+    """
+
+    episode: int = -1
+    step: int = 0
+    places: dict[str, tuple[str, str, float | None, float | None]] = field(default_factory=dict)
+    dead: set[str] = field(default_factory=set)
+    made: set[str] = field(default_factory=set)
+    scenes: bool = False
+    whole: bool = False
+    """Whether the scenes show the map without fog."""
+    sums: dict[str, float] = field(default_factory=dict)
+    """Of the curves that add up, so far."""
+
+    def begin(self, episode: int) -> None:
+        """Forget what belongs to another episode."""
+        if episode != self.episode:
+            self.episode, self.step, self.scenes = episode, 0, False
+            self.places, self.dead, self.made, self.sums = {}, set(), set(), {}
+
+    def dump(self) -> Json:
+        """Return it as JSON data."""
+        return {
+            "episode": self.episode, "scenes": self.scenes, "places": self.places, "dead": sorted(self.dead),
+            "made": sorted(self.made), "step": self.step, "sums": self.sums, "whole": self.whole,
+        }  # fmt: skip
+
+    @classmethod
+    def load(cls, data: Json) -> Memory:
+        """Return what `dump` returned."""
+        places = {tag: (side, kind, x, y) for tag, (side, kind, x, y) in data["places"].items()}
+        sets = {"dead": set(data["dead"]), "made": set(data["made"])}
+        return cls(**data | sets | {"places": places})
+
+
+@dataclass(slots=True)
+class Digest:
+    """Rows to be written: what the messages since the last time add."""
+
+    memory: Memory
+    sides: tuple[str, ...] = ()
+    """That Khala plays."""
+    steps: dict[tuple[int, int], Json] = field(default_factory=dict)
+    losses: list[tuple[Any, ...]] = field(default_factory=list)
+    marks: list[tuple[Any, ...]] = field(default_factory=list)
+    decisions: list[tuple[Any, ...]] = field(default_factory=list)
+
+    def step(self, episode: int, step: int) -> Json:
+        """Return the row of a step, which is merged with what is known of it."""
+        return self.steps.setdefault((episode, step), {})
+
+    def mark(self, said: Json, kind: str, text: str, *, side: str = "", agent: str = "") -> None:
+        """Note that something happened."""
+        self.marks.append((said["episode"], said["step"], kind, side, agent, text[:200]))
+
+    # --- reports ------------------------------------------------------------------------------------
+
+    def report(self, said: Json) -> None:
+        """Take in the report of a side's step."""
+        side, agents = said.get("side", "blue"), said["agents"]
+        self.memory.begin(said["episode"])
+        self.memory.step = said["step"]
+        usages = [agent.get("usage", {}) for agent in agents]
+        costs = [usage["cost_usd"] for usage in usages if usage.get("cost_usd") is not None]
+        latencies = [agent["latency_s"] for agent in agents if agent.get("latency_s") is not None]
+        row = self.step(said["episode"], said["step"])
+        row |= {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
+        row |= {f"latency_s/{side}": max(latencies, default=None)}
+        row |= self._sums(side, {
+            "killed_value": said.get("killed_value"),
+            "lost_value": said.get("lost_value"),
+            "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
+            "cost_usd": sum(costs) if costs else None,
+            "refused": sum(len(agent.get("rejections", ())) for agent in agents),
+        })  # fmt: skip
+        for agent in agents:
+            self._agent(said, side, agent)
+        for incident in said.get("incidents", ()):
+            self.mark(said, "incident", incident, side=side)
+
+    def _sums(self, side: str, more: Json) -> Json:
+        """Add to the sums of a side; return them as far as any number was known."""
+        for name, value in more.items():
+            if value is not None:
+                key = f"{name}/{side}"
+                self.memory.sums[key] = round(self.memory.sums.get(key, 0) + value, 6)
+        return {key: value for key, value in self.memory.sums.items() if key.endswith(f"/{side}")}
+
+    def _agent(self, said: Json, side: str, agent: Json) -> None:
+        name, asked = agent["agent"], agent.get("asked_step")
+        asked = said["step"] if asked is None else asked
+        self.decisions.append((said["episode"], side, name, asked, said["step"]))
+        if kind := LATE.get(agent["status"]):
+            self.mark(said, kind, agent.get("detail") or agent["status"], side=side, agent=name)
+        elif agent.get("fate") == "refused":
+            why = next((refused["message"] for refused in agent["rejections"]), "")
+            self.mark(said, "refused", why, side=side, agent=name)
+
+    def message(self, said: Json) -> None:
+        """Take in a message between agents, or an advice."""
+        kind = "advice" if said.get("human") else "message"
+        self.mark(said, kind, f"→ {said['recipient']}: {said['text']}", side=said["side"], agent=said["agent"])
+
+    def result(self, said: Json) -> None:
+        """Take in the result of an episode for a side."""
+        self.mark(said | {"step": self.memory.step}, "end", f"{said['outcome']}: {said['cause']}", side=said.get("side", "blue"))
+
+    # --- observations -------------------------------------------------------------------------------
+
+    def observation(self, said: Json) -> None:
+        """Take in what an agent saw; of a match with scenes only what these do not say."""
+        self.memory.begin(said["episode"])
+        row = self.step(said["episode"], said["step"])
+        row["loop"] = said["game_loop"]
+        view, side = said["view"], said["side"]
+        if not self.memory.scenes:
+            row |= _from_view(view, side, alone=len(self.sides) == 1)
+            self._remember(view, side)
+        events = [*view.get("events", ()), *(event for team in view["teams"] for event in team.get("events", ()))]
+        for event in events:
+            self._event(said, event)
+
+    def _remember(self, view: Json, side: str) -> None:
+        for team in view["teams"]:
+            for group in ("units", "allies", "enemies"):
+                whose = self._other(side) if group == "enemies" else side
+                for unit in team.get(group, ()):
+                    self.memory.places[unit["tag"]] = (whose, unit["type"], *unit["minimap"])
+
+    def _event(self, said: Json, event: Json) -> None:
+        what, tag, side = event["what"], event["tag"], said["side"]
+        memory = self.memory
+        if what == "died" and tag not in memory.dead and event["alliance"] != "neutral":
+            memory.dead.add(tag)
+            whose = self._other(side) if event["alliance"] == "enemy" else side
+            _, _, x, y = memory.places.get(tag, ("", "", None, None))
+            self.loss(said["episode"], said["step"], whose, event["type"], (x, y))
+        elif what == "finished" and tag not in memory.made and is_structure(event["type"]):
+            memory.made.add(tag)
+            self.mark(said, "building", event["type"], side=side)
+        elif what == "researched" and (name := f"{side}/{event['type']}") not in memory.made:
+            memory.made.add(name)
+            self.mark(said, "upgrade", event["type"], side=side)
+
+    def loss(self, episode: int, step: int, side: str, kind: str, at: tuple[float | None, float | None]) -> None:
+        """Note that a unit died."""
+        self.losses.append((episode, step, side, kind, value_of(kind), *at))
+
+    def _other(self, side: str) -> str:
+        return next((other for other in self.sides if other != side), OPPONENT)
+
+    # --- scenes -------------------------------------------------------------------------------------
+
+    def scene(self, said: Json) -> None:
+        """Take in the whole map."""
+        memory = self.memory
+        memory.begin(said["episode"])
+        names = {player["player"]: player.get("side") or OPPONENT for player in said["players"]}
+        row = self.step(said["episode"], said["step"])
+        row["loop"] = said["game_loop"]
+        for player in said["players"]:
+            row |= _from_player(player, names[player["player"]])
+        self._structures(said, names, first=not memory.scenes)
+        memory.scenes, memory.whole = True, bool(said["whole"])
+        for unit in said["units"]:
+            memory.places[hex(unit[0])] = (names.get(unit[2], ""), unit[1], unit[3], unit[4])
+
+    def _structures(self, said: Json, names: dict[int, str], *, first: bool) -> None:
+        """Note structures that are finished now, but not those of the beginning."""
+        for unit in said["units"]:
+            tag = hex(unit[0])
+            if unit[13] & UnitFlag.STRUCTURE and unit[12] >= 1.0 and unit[2] in names and tag not in self.memory.made:
+                self.memory.made.add(tag)
+                if not first:
+                    self.mark(said, "building", unit[1], side=names[unit[2]])
+
+
+def value_of(kind: str) -> float:
+    """Return the minerals and vespene that a type of unit costs; 0 for an unknown one."""
+    facts = knowledge().get(kind)
+    return facts.value if facts else 0.0
+
+
+def is_structure(kind: str) -> bool:
+    """Return True if it is a type of structures."""
+    facts = knowledge().get(kind)
+    return facts is not None and facts.structure
+
+
+def _from_player(player: Json, side: str) -> Json:
+    income = player.get("income") or (None, None)
+    return {
+        f"army_value/{side}": player.get("army_value"),
+        f"workers/{side}": player.get("workers"),
+        f"minerals/{side}": player.get("minerals"),
+        f"vespene/{side}": player.get("vespene"),
+        f"supply_used/{side}": player.get("supply_used"),
+        f"supply_cap/{side}": player.get("supply_cap"),
+        f"income_minerals/{side}": income[0],
+        f"income_vespene/{side}": income[1],
+    }
+
+
+def _from_view(view: Json, side: str, *, alone: bool) -> Json:
+    found = {f"{name}/{side}": value for name, value in view["resources"].items() if name != "promised"}
+    if counts := view.get("counts"):
+        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in _WORKERS)
+    if army := view.get("army"):
+        found[f"army_value/{side}"] = army["value"]
+        if alone:
+            found[f"army_value/{OPPONENT}"] = sum(part["value"] for part in army["enemies"])
+    if economy := view.get("economy"):
+        found[f"income_minerals/{side}"], found[f"income_vespene/{side}"] = economy["income"]
+    return found
+
+
+def counted(kinds: Iterable[str]) -> str:
+    """Return what there is of several: `2 Stalkers, 1 Probe`."""
+    return ", ".join(f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common())
+
+
+def _several(kind: str) -> str:
+    return f"{kind}es" if kind.endswith(("ch", "sh", "s", "x")) else f"{kind}s"
+
+
+def centre(points: Iterable[tuple[float, float, float]]) -> Point | None:
+    """Return the middle of places with weights: x, y, weight."""
+    found = [(x, y, weight or 1.0) for x, y, weight in points]
+    whole = sum(weight for _, _, weight in found)
+    return (sum(x * w for x, _, w in found) / whole, sum(y * w for _, y, w in found) / whole) if found else None
+
+
+def pairs(row: Json) -> Iterator[tuple[str, str, Any]]:
+    """Yield the values of a step: curve, side, value."""
+    for key, value in row.items():
+        name, slash, side = key.partition("/")
+        if slash:
+            yield name, side, value

@@ -1,0 +1,247 @@
+"""A recording that was opened: its index, the thread that keeps that up to date, and every answer of its paths.
+
+Answers are bytes of JSON, made in threads: `khala.view.server` sends them, `khala.view.export` keeps them in a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, TypeVar
+
+from khala.view import scenes, terrain
+from khala.view.index import Index, Spot
+from khala.view.library import line_of, read_head
+from khala.view.moments import Moments
+from khala.view.scan import Scanning
+from khala.view.timeline import timeline
+from khala.view.wire import MOST_SCENES, AgentLine, EpisodeLine, Progress, RunView, Scenes
+from khala_protocol.codec import decode_as
+from khala_protocol.errors import PeerError
+from khala_protocol.keys import Topic
+from khala_protocol.messages import LOOPS_PER_S, Briefing, Result, Run, Wire
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from khala.view.wire import RunLine
+
+W = TypeVar("W", bound=Wire)
+
+PLAYER_LABELS = ("factor.model", "factor.player", "factor.policy")
+"""Labels of an experiment that say who decided, if no model was asked."""
+
+
+class NotThere(LookupError):
+    """There is no such episode, step, agent or picture; the text says which."""
+
+
+class Opened:
+    """One recording, for as long as it is looked at.
+
+    Args:
+        id: its name in paths.
+        path: of the recording.
+        shown: its path as it is shown.
+        changed: is called in another thread when there is more in the index.
+        can_advise: whether advice can be sent to its agents.
+    """
+
+    def __init__(
+        self,
+        id: str,  # noqa: A002  # as in the paths
+        path: Path,
+        shown: str = "",
+        *,
+        changed: Callable[[], None] = lambda: None,
+        can_advise: bool = False,
+    ) -> None:
+        self.id, self.path, self.shown = id, path, shown or path.name
+        self.can_advise = can_advise
+        self.index = Index(path)
+        self.scanning = Scanning(self.index, changed)
+        self._scales: dict[int, float] = {}
+
+    def start(self) -> None:
+        """Begin to index."""
+        self.scanning.start()
+
+    def close(self) -> None:
+        """End the thread, and close the index."""
+        self.scanning.stop()
+        self.index.close()
+
+    # --- answers ------------------------------------------------------------------------------------
+
+    def view(self) -> bytes:
+        """Return the `RunView`."""
+        card, line = self._card, self.line()
+        return RunView(
+            line=line,
+            sides=self.sides,
+            agents=tuple(self.agents()),
+            episodes=tuple(self.episodes()),
+            indexed=self.indexed(),
+            scenes=self._drawn_from(),
+            can_advise=self.can_advise and line.live,
+            card=card.model_dump(mode="json") if card else {},
+        ).model_dump_json().encode()  # fmt: skip
+
+    def timeline(self, episode: int) -> bytes:
+        """Return the `Timeline` of an episode."""
+        self._require(episode)
+        return timeline(self.index, episode).model_dump_json().encode()
+
+    def terrain(self, episode: int) -> bytes:
+        """Return the `Terrain` of an episode."""
+        self._require(episode)
+        if (spot := terrain.recorded(self.index, episode)) is not None:
+            return self.index.payload(spot)
+        return terrain.from_views(self.index, self._name, episode).model_dump_json().encode()
+
+    def scenes(self, episode: int, first: int, last: int) -> bytes:
+        """Return the `Scenes` from step to step, both included."""
+        self._require(episode)
+        last = min(last, first + MOST_SCENES - 1)
+        if self._drawn_from() != "views":
+            return scenes.recorded(self.index, episode, first, last)
+        found = scenes.from_views(self.index, self._name, self.sides, episode, first, last, self._scale(episode))
+        return Scenes(scenes=tuple(found)).model_dump_json().encode()
+
+    def moment(self, episode: int, step: int) -> bytes:
+        """Return the `Moment` of a step."""
+        found = self._moments(episode).moment(episode, step)
+        if found is None:
+            raise NotThere(f"episode {episode} has no step {step} yet")
+        return found.model_dump_json().encode()
+
+    def asked(self, episode: int, step: int, side: str, agent: str) -> bytes:
+        """Return what an agent was `Asked`."""
+        found = self._moments(episode).asked(episode, step, side, agent)
+        if found is None:
+            raise NotThere(f"{side}/{agent} was not asked up to step {step} of episode {episode}")
+        return found.model_dump_json().encode()
+
+    def image(self, sha256: str) -> bytes:
+        """Return the bytes of a picture."""
+        found = self.index.rows("select chunk, place from image where sha256 = ?", sha256)
+        if not found:
+            raise NotThere("there is no such picture in this recording")
+        return self.index.payload(Spot(*found[0]))
+
+    def progress(self) -> Progress:
+        """Return how far the match, and the index, are."""
+        newest = self.index.rows("select episode, count(*) from step group by episode order by episode desc limit 1")
+        episode, steps = newest[0] if newest else (0, 0)
+        live = self.line().live
+        reported_ns = self.index.meta("reported_ns")
+        lag_s = max(0.0, time.time() - reported_ns / 1e9) if live and reported_ns else None
+        return Progress(episode=episode, steps=steps, indexed=self.indexed(), live=live, lag_s=lag_s)
+
+    # --- parts --------------------------------------------------------------------------------------
+
+    def indexed(self) -> float:
+        """Return the part of the recording that is indexed."""
+        if self.index.meta("ended") or self.index.meta("broken"):
+            return 1.0
+        with contextlib.suppress(OSError):
+            return round(min(1.0, self.index.meta("offset", 0) / max(1, self.path.stat().st_size)), 4)
+        return 0.0
+
+    def line(self) -> RunLine:
+        """Return the recording as a list shows it."""
+        found = line_of(read_head(self.path), self.id, self.shown)
+        models = tuple(dict.fromkeys(name for (name,) in self.index.rows("select name from model order by name")))
+        episodes = list(self.episodes())
+        outcomes = {
+            side: tuple(one.outcomes[side] for one in episodes if side in one.outcomes)
+            for side in self.sides
+        }  # fmt: skip
+        return found.but(
+            models=models or found.models,
+            outcomes={side: those for side, those in outcomes.items() if those},
+            episodes=max(len(episodes), found.episodes),
+            steps=sum(one.steps for one in episodes),
+            game_s=sum(one.game_s for one in episodes),
+        )
+
+    def agents(self) -> Iterator[AgentLine]:
+        """Yield the agents of the match."""
+        names = {(side, agent): name for side, agent, name in self.index.rows("select * from model")}
+        card = self._card
+        labels = card.labels if card else {}
+        player = next((labels[name] for name in PLAYER_LABELS if name in labels), "")
+        for agent in card.agents if card else ():
+            found = self.index.newest(Topic.BRIEFING, 0, agent.side, agent.name, 0)
+            briefing = self._read(Briefing, found.spot if found else None)
+            yield AgentLine(
+                side=agent.side,
+                name=agent.name,
+                kind=briefing.agent_kind if briefing else "combat_group",
+                model=names.get((agent.side, agent.name), player),
+                teams=agent.teams,
+                role=briefing.role if briefing else "",
+            )
+
+    def episodes(self) -> Iterator[EpisodeLine]:
+        """Yield the episodes so far."""
+        results: dict[int, list[Result]] = {}
+        for found in self.index.rows("select episode, chunk, place from sample where topic = ?", Topic.RESULT):
+            if (result := self._read(Result, Spot(*found[1:]))) is not None:
+                results.setdefault(found[0], []).append(result)
+        counts = self.index.rows(
+            "select episode, count(*), max(step), max(json_extract(data, '$.after')) from step group by episode"
+        )
+        for episode, steps, _, loop in counts:
+            ended = results.get(episode, [])
+            yield EpisodeLine(
+                episode=episode,
+                steps=steps,
+                game_s=ended[0].game_s if ended else round((loop or 0) / LOOPS_PER_S, 2),
+                wall_s=ended[0].wall_s if ended else None,
+                outcomes={result.side: result.outcome for result in ended},
+                causes={result.side: result.cause for result in ended},
+                kd={result.side: result.kd for result in ended},
+                invalid_because=next((result.invalid_because for result in ended if not result.valid), ""),
+            )
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The sides that Khala plays."""
+        return tuple(dict.fromkeys(agent.side for agent in self._card.agents)) if self._card else ()
+
+    @property
+    def _name(self) -> str:
+        return self._card.run if self._card else self.id
+
+    @cached_property
+    def _card(self) -> Run | None:
+        return read_head(self.path).card
+
+    def _require(self, episode: int) -> None:
+        if not self.index.rows("select 1 from step where episode = ? limit 1", episode):
+            raise NotThere(f"this recording has no episode {episode} yet")
+
+    def _drawn_from(self) -> Literal["whole", "seen", "views"]:
+        found: Literal["whole", "seen", "views"] = self.index.meta("scenes", "views")
+        return found
+
+    def _scale(self, episode: int) -> float:
+        if episode not in self._scales:
+            scale = terrain.scale_of(self.index, episode)
+            if self.indexed() < 1.0:
+                return scale
+            self._scales[episode] = scale
+        return self._scales[episode]
+
+    def _moments(self, episode: int) -> Moments:
+        return Moments(self.index, list(self.agents()), self._scale(episode))
+
+    def _read(self, kind: type[W], spot: Spot | None) -> W | None:
+        try:
+            return decode_as(kind, self.index.payload(spot)) if spot else None
+        except PeerError:
+            return None
+

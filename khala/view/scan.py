@@ -1,0 +1,297 @@
+"""Read a recording once, from chunk to chunk, and write its index: in a thread of its own, and further as it grows.
+
+Each step of the work is a transaction that also notes how far it came, so that another viewer, or this one tomorrow,
+goes on there. Who writes has a lease in the index; the lease of a viewer that was killed runs out.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import logging
+import re
+import secrets
+import sqlite3
+import threading
+import time
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from pydantic_core import from_json
+
+from khala.view.digest import Digest, Memory
+from khala.view.index import SCHEMA, connect
+from khala_protocol.errors import PeerError
+from khala_protocol.keys import Topic, parse
+from khala_protocol.recording.chunks import Scan
+from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from khala.view.index import Index
+    from khala_protocol.keys import Address
+    from khala_protocol.recording.chunks import Placed, PlacedChunk
+
+log = logging.getLogger(__name__)
+
+POLL_S = 0.1
+"""Between two looks at a file that grows."""
+BATCH_S = 0.25
+"""Work between two transactions; the first one is shorter, so that the first answers come at once."""
+FIRST_BATCH_S = 0.05
+LEASE_S = 5.0
+BUSY_S = 0.5
+"""Between two tries to get the lease that another viewer has."""
+_HEAD = re.compile(
+    rb'\{"v":1,"run":"[\w.-]+","kind":"\w+",(?:"agent":"[\w.-]+",)?(?:"side":"[\w.-]+",)?'
+    rb'"episode":(\d{1,15}),"step":(\d{1,15}),'
+)
+"""The beginning of a message of a step, as `khala_protocol.codec` writes it: most need not be read further."""
+_PLAIN = frozenset({Topic.REPLY, Topic.SCENE, Topic.OBSERVATION, Topic.EXCHANGE, Topic.MESSAGE, Topic.REPORT})
+"""Topics whose messages belong to a step."""
+_KEPT = _PLAIN | {Topic.RUN, Topic.RESULT, Topic.BRIEFING, Topic.TERRAIN}
+WRONG = (ValueError, LookupError, TypeError, AttributeError)
+"""Errors of reading data that is not as our messages are."""
+
+
+@dataclass(slots=True)
+class _Batch:
+    """Rows of one transaction."""
+
+    digest: Digest
+    samples: list[tuple[Any, ...]] = field(default_factory=list)
+    images: list[tuple[Any, ...]] = field(default_factory=list)
+    models: dict[tuple[str, str], str] = field(default_factory=dict)
+
+
+class Scanner:
+    """The writer of an index.
+
+    Args:
+        index: to be written.
+        stopped: is asked between chunks.
+    """
+
+    def __init__(self, index: Index, stopped: Callable[[], bool] = lambda: False) -> None:
+        self._index, self._stopped = index, stopped
+        self._name = secrets.token_hex(8)
+        self._scan: Scan | None = None
+        self._memory = Memory()
+        self._sides: tuple[str, ...] = ()
+        self._db = connect(index.path, SCHEMA)
+
+    def close(self) -> None:
+        """Give the lease up."""
+        with contextlib.suppress(sqlite3.Error):
+            self._db.execute("delete from meta where name = 'writer' and value like ?", (f'%"{self._name}"%',))
+        self._db.close()
+
+    def advance(self, within_s: float = BATCH_S) -> bool | None:
+        """Index what follows; return whether there was anything, or None while another viewer does it."""
+        with self._index.recording.open("rb") as file:
+            self._db.execute("begin immediate")
+            try:
+                if not self._claim():
+                    self._db.execute("rollback")
+                    return None
+                scan = self._scan or self._resumed(file)
+                before = scan.offset
+                batch = self._read(scan, file, within_s)
+                self._write(batch, scan, file)
+                self._db.execute("commit")
+            except BaseException:
+                self._scan = None  # what is in the index counts
+                with contextlib.suppress(sqlite3.Error):
+                    self._db.execute("rollback")
+                raise
+        self._scan = scan
+        return scan.offset > before
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing can follow."""
+        return self._scan is not None and (self._scan.ended or self._scan.broken)
+
+    def _claim(self) -> bool:
+        """Take or renew the lease; return False if another viewer has it."""
+        found = self._db.execute("select value from meta where name = 'writer'").fetchone()
+        owner, until_s = json.loads(found[0]) if found else ("", 0.0)
+        if owner != self._name:
+            if until_s > time.time():
+                return False
+            self._scan = None
+        self._note("writer", [self._name, time.time() + LEASE_S])
+        return True
+
+    def _resumed(self, file: BinaryIO) -> Scan:
+        """Return the scan at the place where the index ends, of this file as it was then; otherwise at its beginning."""
+        with contextlib.suppress(*WRONG):  # of another version, or of somebody else
+            state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
+            if state["fingerprint"] == fingerprint(file, state["offset"]):
+                keys = {int(number): key for number, key in state["keys"].items()}
+                scan = Scan(state["offset"], keys=keys, expected=state["expected"])
+                scan.ended, scan.broken = state["ended"], state["broken"]
+                self._memory, self._sides = Memory.load(state["memory"]), tuple(state["sides"])
+                return scan
+        for table in ("sample", "image", "step", "decision", "loss", "mark", "model", "meta"):
+            self._db.execute(f"delete from {table} where true")  # noqa: S608  # our own names
+        self._memory, self._sides = Memory(), ()
+        self._note("writer", [self._name, time.time() + LEASE_S])
+        return Scan()
+
+    # --- reading ------------------------------------------------------------------------------------
+
+    def _read(self, scan: Scan, file: BinaryIO, within_s: float) -> _Batch:
+        until_s = time.monotonic() + within_s
+        batch = _Batch(Digest(self._memory, self._sides))
+        for chunk in scan.chunks(file):
+            for sample in scan.samples(chunk):
+                if (address := _address(scan.keys.get(sample.channel, ""))) is not None:
+                    self._take(batch, chunk, sample, address)
+            if scan.broken or time.monotonic() > until_s or self._stopped():
+                if not scan.broken:
+                    scan.offset = chunk.end
+                break
+        return batch
+
+    def _take(self, batch: _Batch, chunk: PlacedChunk, sample: Placed, address: Address) -> None:
+        if address.topic is Topic.IMAGE:
+            batch.images.append((hashlib.sha256(sample.payload).hexdigest(), chunk.offset, sample.place))
+        elif address.topic in _KEPT and len(sample.payload) <= MAX_MESSAGE_BYTES:
+            with contextlib.suppress(*WRONG):
+                episode, step = self._digested(batch, sample.payload, address)
+                side, agent = address.side or "", address.agent or ""
+                where = (chunk.offset, sample.place, sample.log_time_ns)
+                batch.samples.append((str(address.topic), episode, side, agent, step, *where))
+
+    def _digested(self, batch: _Batch, payload: bytes, address: Address) -> tuple[int, int]:
+        """Take in a message, and return its episode and step.
+
+        Raises:
+            WRONG: it is not as our messages are.
+        """
+        head = _HEAD.match(payload) if address.topic in _PLAIN else None
+        if head and not self._is_read(batch, address):
+            return int(head[1]), int(head[2])
+        said = from_json(payload, allow_inf_nan=False, cache_strings="none")
+        place = int(said.get("episode", 0)), int(said.get("step", 0))
+        match address.topic:
+            case Topic.RUN:
+                self._sides = batch.digest.sides = tuple(dict.fromkeys(agent["side"] for agent in said["agents"]))
+            case Topic.EXCHANGE:
+                name = said.get("answered_by") or said["model"]
+                batch.models[address.side or "", address.agent or ""] = str(name)[:100]
+            case Topic.OBSERVATION | Topic.SCENE | Topic.REPORT | Topic.MESSAGE | Topic.RESULT:
+                getattr(batch.digest, address.topic.value)(said)
+        return place
+
+    def _is_read(self, batch: _Batch, address: Address) -> bool:
+        """Return whether more is wanted of a message than its step."""
+        if address.topic is Topic.EXCHANGE:
+            return (address.side or "", address.agent or "") not in batch.models
+        return address.topic is not Topic.REPLY
+
+    # --- writing ------------------------------------------------------------------------------------
+
+    def _write(self, batch: _Batch, scan: Scan, file: BinaryIO) -> None:
+        db, digest = self._db, batch.digest
+        db.executemany("insert into sample values (?, ?, ?, ?, ?, ?, ?, ?)", batch.samples)
+        db.executemany("insert or ignore into image values (?, ?, ?)", batch.images)
+        db.executemany("insert or ignore into decision values (?, ?, ?, ?, ?)", digest.decisions)
+        db.executemany("insert into loss values (?, ?, ?, ?, ?, ?, ?)", digest.losses)
+        db.executemany("insert into mark values (?, ?, ?, ?, ?, ?)", digest.marks)
+        db.executemany("insert or replace into model values (?, ?, ?)", [(*who, name) for who, name in batch.models.items()])
+        for (episode, step), row in digest.steps.items():
+            known = db.execute("select data from step where episode = ? and step = ?", (episode, step)).fetchone()
+            whole = (json.loads(known[0]) if known else {}) | row
+            db.execute("insert or replace into step values (?, ?, ?)", (episode, step, json.dumps(whole)))
+        newest = max((sample[-1] for sample in batch.samples if sample[0] == Topic.REPORT), default=None)
+        self._note("memory", self._memory.dump())
+        self._note("sides", self._sides)
+        self._note("keys", scan.keys)
+        self._note("offset", scan.offset)
+        self._note("expected", scan.expected)
+        self._note("ended", scan.ended)
+        self._note("broken", scan.broken)
+        self._note("fingerprint", fingerprint(file, scan.offset))
+        if self._memory.scenes:
+            self._note("scenes", "whole" if self._memory.whole else "seen")
+        if newest is not None:
+            self._note("reported_ns", newest)
+
+    def _note(self, name: str, value: object) -> None:
+        self._db.execute("insert or replace into meta values (?, ?)", (name, json.dumps(value)))
+
+
+class Scanning:
+    """A thread that keeps the index of a recording up to date.
+
+    Args:
+        index: to be written.
+        changed: is called in the thread when there is more in the index.
+    """
+
+    def __init__(self, index: Index, changed: Callable[[], None] = lambda: None) -> None:
+        self._index, self._changed = index, changed
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"index {index.recording.name}", daemon=True)
+        self.failed = ""
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End after the chunk at hand."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        within_s = FIRST_BATCH_S
+        try:
+            with contextlib.closing(Scanner(self._index, self._stop.is_set)) as scanner:
+                while not self._stop.is_set() and not scanner.done:
+                    found = scanner.advance(within_s)
+                    within_s = BATCH_S
+                    if found:
+                        self._changed()
+                    else:
+                        self._stop.wait(BUSY_S if found is None else POLL_S)
+                    if found is None:
+                        self._changed()
+                self._changed()
+        except (OSError, sqlite3.Error) as error:
+            self.failed = f"the index of {self._index.recording} cannot be written: {error}"
+            log.warning("%s", self.failed)
+            self._changed()
+
+
+def fingerprint(file: BinaryIO, offset: int) -> str:
+    """Return a hash by which a file is known as the one that was read up to this offset."""
+    file.seek(0)
+    head = file.read(min(offset, 4096))
+    file.seek(max(0, offset - 4096))
+    return hashlib.sha256(head + file.read(min(offset, 4096)) + str(offset).encode()).hexdigest()
+
+
+@cache
+def _address(key: str) -> Address | None:
+    try:
+        return parse(key)
+    except PeerError:
+        return None
+
+
+def whole(path: Path, index: Index) -> None:
+    """Index a recording up to its end, in this thread; for exports and tests.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with contextlib.closing(Scanner(index)) as scanner:
+        while scanner.advance() or (not scanner.done and scanner.advance() is None):
+            pass

@@ -1,0 +1,36 @@
+"""The part of a reply in which an agent thinks: what stands before its first orders or messages.
+
+Below it: `khala_protocol.speech.headings`, which knows what begins them.
+"""
+
+from __future__ import annotations
+
+import re
+
+from khala_protocol.speech.headings import ReplySection, heading_at
+from khala_protocol.speech.marks import to_ascii
+
+MAX_THOUGHT_CHARACTERS = 65_536
+"""As much of a reply as is read at all."""
+_REASONED = re.compile(r"</\s*+(?:think(?:ing)?|thoughts?|reasoning)\s*+>|\[/THINK\]|◁/think▷", re.IGNORECASE)
+_LINE = re.compile(r"^", re.MULTILINE)
+
+
+def thought_of(reply: str) -> str:
+    """Return what a reply says before the first heading of orders, messages or a team, without its own heading.
+
+    A reasoning block belongs to it. It is all of the reply if there is no such heading.
+    """
+    text = to_ascii(reply[:MAX_THOUGHT_CHARACTERS])
+    reasoned = _REASONED.search(text)
+    begin, end = 0, len(text)
+    for line in _LINE.finditer(text, reasoned.end() if reasoned else 0):
+        heading = heading_at(text, line.start(), line_start=True)
+        if heading is None:
+            continue
+        if heading.section is not ReplySection.ANALYSIS:
+            end = line.start()
+            break
+        if not text[begin : line.start()].strip():
+            begin = heading.end
+    return reply[begin:end].strip()
