@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from khala_protocol.messages import AgentReport, Call, Point, Rejection
 
 
-
 class Screen(NamedTuple):
     """The screen of a team: where it is on the minimap, and how large."""
 
@@ -139,4 +138,3 @@ def _place(call: Call, kinds: Sequence[str], screen: Screen | None) -> Point | N
 
 def _only(screens: Mapping[str, Screen]) -> Screen | None:
     return next(iter(screens.values())) if len(screens) == 1 else None
-

@@ -131,7 +131,7 @@ class Recording:
             RecordingError: there is no such file, or it is not a recording.
         """
         path = Path(path)
-        _require_recording(path)
+        require_recording(path)
         counts: Counter[str] = Counter()
         cards: list[Run] = []
         results: list[Result] = []
@@ -213,7 +213,7 @@ def read(path: Path | str) -> Iterator[Recorded]:
         RecordingError: there is no such file, or it is not a recording.
     """
     path = Path(path)
-    _require_recording(path)
+    require_recording(path)
     return (record for record in _records(path) if isinstance(record, Recorded))
 
 
@@ -230,7 +230,8 @@ def recover(path: Path | str, new_path: Path | str) -> Recording:
     return Recording.open(new_path)
 
 
-def _require_recording(path: Path) -> None:
+def require_recording(path: Path) -> None:
+    """Raise `RecordingError` unless there is a file at `path` that begins as a recording does."""
     try:
         check_regular(path)
         with path.open("rb") as file:
