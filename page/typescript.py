@@ -31,7 +31,8 @@ def typescript() -> str:
     """Return the text of the file."""
     classes = [c for _, c in inspect.getmembers(wire, inspect.isclass) if c.__module__ == wire.__name__]
     models: list[type[BaseModel]] = [c for c in classes if issubclass(c, BaseModel)]
-    _, schema = models_json_schema([(model, "serialization") for model in (*models, Terrain)])
+    models.append(Terrain)
+    _, schema = models_json_schema([(model, "serialization") for model in models])
     parts = [_declared(name, definition) for name, definition in schema["$defs"].items()]
     return "\n".join([_HEAD, *parts, _flags(), _number("SCENES_AT_ONCE", wire.SCENES_AT_ONCE)])
 
