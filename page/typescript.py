@@ -29,9 +29,10 @@ Schema = dict[str, Any]
 
 def typescript() -> str:
     """Return the text of the file."""
-    models = [m for _, m in inspect.getmembers(wire, inspect.isclass) if issubclass(m, BaseModel)]
-    told = [m for m in models if m.__module__ == wire.__name__]
-    _, schema = models_json_schema([(m, "serialization") for m in (*told, Terrain)])
+    classes = [c for _, c in inspect.getmembers(wire, inspect.isclass) if c.__module__ == wire.__name__]
+    models: list[type[BaseModel]] = [c for c in classes if issubclass(c, BaseModel)]
+    models.append(Terrain)
+    _, schema = models_json_schema([(model, "serialization") for model in models])
     parts = [_declared(name, definition) for name, definition in schema["$defs"].items()]
     return "\n".join([_HEAD, *parts, _flags(), _number("SCENES_AT_ONCE", wire.SCENES_AT_ONCE)])
 
@@ -50,19 +51,26 @@ def _field(name: str, schema: Schema) -> str:
 
 def _type(schema: Schema) -> str:
     """Return the type of a schema; a field with a default is there in every answer."""
-    if "$ref" in schema:
-        return str(schema["$ref"]).removeprefix("#/$defs/")
-    if "const" in schema:
-        return json.dumps(schema["const"])
-    if "enum" in schema:
-        return " | ".join(map(json.dumps, schema["enum"]))
-    if "anyOf" in schema:
-        return " | ".join(map(_type, schema["anyOf"]))
-    if schema.get("type") == "array":
-        return _array(schema)
-    if schema.get("type") == "object":
-        return _record(schema.get("additionalProperties", True))
-    return _SIMPLE.get(schema.get("type", ""), "unknown")
+    match schema:
+        case {"$ref": path}:
+            return str(path).removeprefix("#/$defs/")
+        case {"const": value}:
+            return json.dumps(value)
+        case {"enum": values}:
+            return " | ".join(map(json.dumps, values))
+        case {"anyOf": schemas}:
+            return " | ".join(map(_type, schemas))
+    return _typed(schema)
+
+
+def _typed(schema: Schema) -> str:
+    match schema.get("type", ""):
+        case "array":
+            return _array(schema)
+        case "object":
+            return _record(schema.get("additionalProperties", True))
+        case simple:
+            return _SIMPLE.get(simple, "unknown")
 
 
 def _array(schema: Schema) -> str:

@@ -1,5 +1,6 @@
 /** The page: a match, two of them, an experiment, or the library. */
 
+import { useEffect } from "preact/hooks";
 import { Advice } from "./Advice";
 import { Agents } from "./agents/Agents";
 import { Compare } from "./compare/Compare";
@@ -18,6 +19,8 @@ import { Plots } from "./timeline/Plots";
 
 export function App() {
   const [a, b] = matches.value;
+  const title = a?.run.value ? titleOf(a) : "";
+  useEffect(() => void (document.title = title ? `${title} · Khala` : "Khala"), [title]);
   return (
     <>
       <Bar match={a} other={b} />

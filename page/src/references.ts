@@ -18,15 +18,18 @@ const REFERENCE = /0x[0-9a-fA-F]{3,16}\b|[[(]\s*(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?
 const HEADING = /^[ \t]*Team ([^\s:]+)/gm;
 const SCREEN_CELLS = 24;
 
-/** Split a text into pieces, in order, that together are the text. */
-export function references(text: string, screens: readonly Screen[] = []): Piece[] {
+/**
+ * Split a text into pieces, in order, that together are the text. Points without a word for their frame are left alone,
+ * unless `frame` says that they are in the minimap frame, as agents mean them in messages.
+ */
+export function references(text: string, screens: readonly Screen[] = [], frame?: "minimap"): Piece[] {
   const headings = [...text.matchAll(HEADING)].map((m) => ({ at: m.index, name: m[1] }));
   const pieces: Piece[] = [];
   let end = 0;
   let heading = -1;
   for (const match of text.matchAll(REFERENCE)) {
     while (heading + 1 < headings.length && headings[heading + 1].at < match.index) heading++;
-    const found = match[1] === undefined ? { tag: Number(match[0]) } : place(text, match, screens, headings[heading]?.name);
+    const found = match[1] === undefined ? { tag: Number(match[0]) } : place(text, match, screens, headings[heading]?.name, frame);
     if (!found) continue;
     if (match.index > end) pieces.push({ text: text.slice(end, match.index) });
     pieces.push({ text: match[0], ...found });
@@ -37,10 +40,10 @@ export function references(text: string, screens: readonly Screen[] = []): Piece
 }
 
 /** Return the place that a point means: the nearest word before it on its line says in which frame it is. */
-function place(text: string, match: RegExpMatchArray, screens: readonly Screen[], team?: string): Pick<Piece, "at"> | null {
+function place(text: string, match: RegExpMatchArray, screens: readonly Screen[], team?: string, usual?: "minimap"): Pick<Piece, "at"> | null {
   const index = match.index ?? 0;
   const line = text.slice(text.lastIndexOf("\n", index) + 1, index).toLowerCase();
-  const frame = line.lastIndexOf("minimap") > line.lastIndexOf("screen") ? "minimap" : line.includes("screen") ? "screen" : null;
+  const frame = line.lastIndexOf("minimap") > line.lastIndexOf("screen") ? "minimap" : line.includes("screen") ? "screen" : usual;
   const point: [number, number] = [Number(match[1]), Number(match[2])];
   if (frame === "minimap") return { at: point };
   const screen = screens.find((s) => s.name === team && s.minimap) ?? (screens.length === 1 ? screens[0] : undefined);

@@ -4,6 +4,7 @@ import { batch, computed, effect, signal } from "@preact/signals";
 import * as clock from "./clock";
 import { NOWHERE, readHash, writeHash, type Link } from "./hash";
 import { Live } from "./live";
+import { camera } from "./map/camera";
 import { Match } from "./match";
 import { indexOf, momentOf, spanOf } from "./time";
 
@@ -91,6 +92,7 @@ async function openMatches(to: Link): Promise<void> {
     clock.zoomed.value = null;
     clock.at.value = 0;
     chosen.value = new Set();
+    camera.value = null;
   });
   await Promise.all(opened.map((m) => m.open()));
   if (matches.value !== opened) return;

@@ -35,11 +35,18 @@ export function story(a: Standing, b: Standing): string {
   const [ahead, behind] = (a.army ?? 0) >= (b.army ?? 0) ? [a, b] : [b, a];
   const trade = a.killed && a.lost !== null ? ` ${capital(a.side)} destroyed ${whole(a.killed)} and lost ${whole(a.lost)}.` : "";
   if (ahead.army === null || behind.army === null) return trade.trim() || "Nothing is known of the armies yet.";
-  if (ahead.army === 0) return `No side has an army.${trade}`;
+  if (ahead.army === 0) return `No side has an army${work(a, b)}.${trade}`;
   if (behind.army === 0) return `${capital(ahead.side)} is ahead: ${capital(behind.side)} has no army in sight.${trade}`;
   const times = ahead.army / behind.army;
   if (times < LEAD) return `Even: armies of ${whole(a.army)} and ${whole(b.army)}.${trade}`;
   return `${capital(ahead.side)} is ahead: ${times.toFixed(1)} times the army of ${capital(behind.side)}.${trade}`;
+}
+
+/** Return who has more workers, as the end of a sentence. */
+function work(a: Standing, b: Standing): string {
+  if (!a.workers || !b.workers) return "";
+  const more = a.workers >= b.workers ? a : b;
+  return a.workers === b.workers ? `; both have ${whole(a.workers)} workers` : `; ${capital(more.side)} has more workers`;
 }
 
 /** Return the result as one side sees it, in words: `Blue wins at 0:25: enemy defeated`. */

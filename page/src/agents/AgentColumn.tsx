@@ -1,7 +1,7 @@
 /** One agent at the moment: what it read, thought, asked for and wrote, and what became of it. */
 
 import { useSignal } from "@preact/signals";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { keyOf, type Match } from "../match";
 import { agent } from "../stage";
 import { Tabs } from "../Tabs";
@@ -21,10 +21,14 @@ const TABS = [
 
 export function AgentColumn({ match, line, open, toggle }: { match: Match; line: AgentLine; open: boolean; toggle: () => void }) {
   const tab = useSignal<string>("decision");
+  const column = useRef<HTMLElement>(null);
   const key = keyOf(line);
   const decision = match.decisions.value.get(key);
   const tint = Math.min(Math.max(match.sides.value.indexOf(line.side), 0), 1);
   const panel = `panel-${match.id}-${key}`.replace(/[^\w-]/g, "-");
+  useEffect(() => {
+    if (agent.value === key) column.current?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  }, [agent.value === key, open]);
   if (!open)
     return (
       <section class={`agent closed tint-${tint}`}>
@@ -34,7 +38,7 @@ export function AgentColumn({ match, line, open, toggle }: { match: Match; line:
       </section>
     );
   return (
-    <section class={`agent tint-${tint} ${agent.value === key ? "is-chosen" : ""}`} aria-label={`Agent ${line.name} of ${line.side}`}>
+    <section ref={column} class={`agent tint-${tint} ${agent.value === key ? "is-chosen" : ""}`} aria-label={`Agent ${line.name} of ${line.side}`}>
       <Header line={line} decision={decision} step={match.step.value} toggle={toggle} />
       <Tabs label={`Views of ${line.name}`} tabs={TABS} chosen={tab.value} choose={(id) => (tab.value = id)} panel={panel} />
       <div class="agent-body" role="tabpanel" id={panel} aria-labelledby={`${panel}-${tab.value}`} tabIndex={0}>

@@ -7,9 +7,10 @@ import { Tabs } from "../Tabs";
 import { AgentColumn } from "./AgentColumn";
 import { Card } from "./Card";
 import { Happenings } from "./Happenings";
+import { Strip } from "./Strip";
 import { Threads } from "./Threads";
 
-/** Columns that are open at first: more would be too narrow to read. */
+/** Columns that are open at first; of more agents a row of all of them is shown above. */
 const OPEN_AT_FIRST = 4;
 
 const view = signal("agents");
@@ -39,13 +40,20 @@ export function Agents({ match }: { match: Match }) {
 function Columns({ match }: { match: Match }) {
   const lines = match.agents.value;
   if (!lines.length) return <p class="muted pad">No agents are known.</p>;
+  const set = (key: string, open: boolean) => {
+    opened.value = { ...opened.value, [key]: open };
+    if (!open && agent.value === key) agent.value = "";
+  };
   return (
     <>
-      {lines.map((line, i) => {
-        const key = keyOf(line);
-        const open = opened.value[key] ?? (i < OPEN_AT_FIRST || agent.value === key);
-        return <AgentColumn key={`${match.id}/${key}`} match={match} line={line} open={open} toggle={() => (opened.value = { ...opened.value, [key]: !open })} />;
-      })}
+      {lines.length > OPEN_AT_FIRST && <Strip match={match} open={(key) => set(key, true)} />}
+      <div class="columns">
+        {lines.map((line, i) => {
+          const key = keyOf(line);
+          const open = agent.value === key || (opened.value[key] ?? i < OPEN_AT_FIRST);
+          return <AgentColumn key={`${match.id}/${key}`} match={match} line={line} open={open} toggle={() => set(key, !open)} />;
+        })}
+      </div>
     </>
   );
 }

@@ -87,7 +87,7 @@ export function LetterView({ letter, who }: { letter: Letter; who: string }) {
         {letter.human && <span class="badge warn">human</span>}
         {letter.again && " (again)"}
       </span>{" "}
-      <Words text={letter.text} />
+      <Words text={letter.text} frame="minimap" />
     </p>
   );
 }

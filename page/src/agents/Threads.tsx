@@ -33,7 +33,7 @@ export function Threads({ match }: { match: Match }) {
           <li key={`${mark.step} ${i}`} class={`${mark.step > match.step.value ? "later" : ""} ${mark.kind}`}>
             <button onClick={() => clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, mark.step)))}>{clockText(timeline.time_s[indexOf(timeline, mark.step)] ?? 0)}</button>
             <span>
-              {mark.kind === "advice" && <span class="badge warn">human</span>} <Words text={mark.text} />
+              {mark.kind === "advice" && <span class="badge warn">human</span>} <Words text={mark.text} frame="minimap" />
             </span>
           </li>
         ))}

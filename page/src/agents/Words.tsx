@@ -5,8 +5,8 @@ import { references, type Piece, type Screen } from "../references";
 import { spoken } from "../stage";
 
 /** Show a text; `quiet` keeps its references out of the order of the tab key, for texts with hundreds of them. */
-export function Words({ text, screens, quiet = false }: { text: string; screens?: readonly Screen[]; quiet?: boolean }) {
-  const pieces = useMemo(() => references(text, screens), [text, screens]);
+export function Words({ text, screens, frame, quiet = false }: { text: string; screens?: readonly Screen[]; frame?: "minimap"; quiet?: boolean }) {
+  const pieces = useMemo(() => references(text, screens, frame), [text, screens, frame]);
   return <>{pieces.map((piece, i) => (isReference(piece) ? <Reference key={i} piece={piece} quiet={quiet} /> : piece.text))}</>;
 }
 

@@ -112,7 +112,7 @@ const series = (line: Line, stroke: string): uPlot.Series => ({
   stroke,
   width: 1.75,
   dash: line.match ? [5, 4] : undefined,
-  fill: line.match ? undefined : `${stroke}1f`,
+  fill: line.match ? undefined : `${stroke}14`,
   spanGaps: true,
   points: { show: false },
 });

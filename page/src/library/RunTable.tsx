@@ -86,7 +86,7 @@ function Row({ run, chosen, toggle }: { run: RunLine; chosen: boolean; toggle: (
         <input type="checkbox" checked={chosen} onChange={toggle} aria-label={`Compare ${run.run}`} />
       </td>
       {COLUMNS.map((c, i) => (
-        <td key={c.name} class={c.name === "Result" ? outcome.split(" ")[0] : typeof c.value(run) === "number" ? "number" : ""}>
+        <td key={c.name} class={c.name === "Result" && /^\w+$/.test(outcome) ? outcome : typeof c.value(run) === "number" ? "number" : ""}>
           {i === 0 ? (
             <a href={writeHash({ a: run.id })} title={run.path}>
               {run.task}

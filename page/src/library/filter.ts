@@ -2,13 +2,13 @@
 
 import type { RunLine } from "../wire";
 
-/** Return the endings of a recording in words, `win`, or `win 3, loss 1` of several episodes. */
+/** Return the endings of a recording for its first side: `win`, `blue: win` of two sides, `win 3, loss 1` of episodes. */
 export function outcomeOf(run: RunLine): string {
-  const [endings = []] = Object.values(run.outcomes);
+  const [[side, endings] = ["", []], ...others] = Object.entries(run.outcomes);
   const counts = new Map<string, number>();
   for (const ending of endings) counts.set(ending, (counts.get(ending) ?? 0) + 1);
-  if (counts.size === 1 && endings.length === 1) return endings[0];
-  return [...counts].map(([ending, n]) => `${ending} ${n}`).join(", ");
+  const words = [...counts].map(([ending, n]) => (endings.length > 1 ? `${ending} ${n}` : ending)).join(", ");
+  return others.length && words ? `${side}: ${words}` : words;
 }
 
 /** Return the recordings that have every word somewhere. */

@@ -3,9 +3,10 @@
 import { effect, signal, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Match } from "../match";
-import { agent, chosen, eyes, hovered, off, spoken } from "../stage";
+import { is } from "../scenes";
+import { agent, chosen, eyes, hovered, matches, off, spoken } from "../stage";
 import { palette } from "../theme";
-import { camera, type View } from "./camera";
+import { around, camera, type View } from "./camera";
 import { Minimap } from "./Minimap";
 import { Painter } from "./painter";
 import { unitAt, unitsIn } from "./pick";
@@ -37,12 +38,18 @@ export function MapView({ match }: { match: Match }) {
       <canvas ref={canvas} class="map-canvas" tabIndex={0} role="img" aria-label={describe(match)} />
       {frame.value && <div class="map-box" style={boxStyle(frame.value)} />}
       {!drawn.value && <p class="map-empty">{match.timeline.value?.steps.length ? "No scene of this moment is here yet." : "Nothing has been played yet."}</p>}
-      <Tools match={match} zoom={middle} />
+      <Tools match={match} zoom={middle} fit={() => fit(painter)} />
       {camera.value && <Minimap match={match} painter={painter} />}
       {pointed.value && <Tip match={match} pointed={pointed.value} width={painter.view.width} />}
       <Chosen match={match} painter={painter} />
     </section>
   );
+}
+
+/** Show the units that are chosen, or all of both sides. */
+function fit(painter: Painter): void {
+  const units = painter.spots.filter((spot) => (chosen.value.size ? chosen.value.has(spot.unit.tag) : spot.tint !== 2));
+  camera.value = around(units, painter.bounds(), painter.view.width, painter.view.height);
 }
 
 const describe = (match: Match) =>
@@ -84,6 +91,7 @@ function targetOf(painter: Painter, pointed: { value: Pointed | null }, frame: {
 /** Draw again whenever something that the map shows has changed, once a frame at most. */
 function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, stale: { value: number }, drawn: { value: boolean }): () => void {
   let request = 0;
+  let fitted = false;
   const resized = new ResizeObserver(() => void stale.value++);
   resized.observe(canvas);
   const draw = () => {
@@ -97,6 +105,11 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
     const context = canvas.getContext("2d")!;
     context.setTransform(dots, 0, 0, dots, 0, 0);
     drawn.value = painter.paint(context, width, height, wish());
+    if (drawn.value && !fitted && width > 0) {
+      fitted = true;
+      // a battle takes place in a small part of its map
+      if (!camera.value && matches.peek().length === 1 && !painter.spots.some(({ unit }) => is(unit, "STRUCTURE"))) fit(painter);
+    }
   };
   const stop = effect(() => {
     wish();

@@ -25,7 +25,7 @@ const MEANING: Record<Layer, string> = {
   names: "types of units",
 };
 
-export function Tools({ match, zoom }: { match: Match; zoom: (factor: number) => void }) {
+export function Tools({ match, zoom, fit }: { match: Match; zoom: (factor: number) => void; fit: () => void }) {
   return (
     <div class="map-tools">
       <label>
@@ -49,6 +49,9 @@ export function Tools({ match, zoom }: { match: Match; zoom: (factor: number) =>
         </button>
         <button onClick={() => zoom(1.5)} aria-label="Zoom in" title="Zoom in (+)">
           +
+        </button>
+        <button onClick={fit} title="Show the chosen units, or all of both sides">
+          Fit
         </button>
         {camera.value && <button onClick={() => (camera.value = null)}>Whole map</button>}
       </span>

@@ -37,6 +37,22 @@ export function viewOf(camera: Camera | null, bounds: Box, width: number, height
 /** Return the camera that shows all of the bounds. */
 export const whole = (bounds: Box): Camera => ({ x: (bounds[0] + bounds[2]) / 2, y: (bounds[1] + bounds[3]) / 2, zoom: 1 });
 
+/** Room around units that are to be seen, as a part of the box that holds them. */
+const ROOM = 0.4;
+/** Least size of that box in the minimap frame: a single unit is shown with its surroundings. */
+const LEAST_BOX = 6;
+
+/** Return the camera that shows these places, or null if that is the whole map. */
+export function around(places: readonly { x: number; y: number }[], bounds: Box, width: number, height: number): Camera | null {
+  if (!places.length) return null;
+  const [xs, ys] = [places.map((p) => p.x), places.map((p) => p.y)];
+  const box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+  const size = (from: number, to: number) => Math.max(to - from, LEAST_BOX) * (1 + ROOM);
+  const scale = Math.min(width / size(box[0], box[2]), height / size(box[1], box[3]));
+  const zoom = Math.min(scale / viewOf(null, bounds, width, height).scale, MOST_ZOOM);
+  return held({ x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2, zoom }, bounds);
+}
+
 /** Return the place of the minimap frame under a pixel. */
 export const placeAt = (view: View, px: number, py: number): [number, number] => [(px - view.left) / view.scale, (py - view.top) / view.scale];
 

@@ -31,11 +31,12 @@ export async function groundOf(terrain: Terrain, colours: Colours): Promise<HTML
   });
 }
 
-/** Return a grid as a tint, for creep and fog: the opacity of a cell is that of its value. */
-export async function tintOf(view: GridView, colour: string, opacity: readonly number[]): Promise<HTMLCanvasElement> {
-  const cells = await grid(view);
+/** Return a grid as a tint, for creep and fog: the opacity of a cell is that of its value; only where `known` is not 0. */
+export async function tintOf(view: GridView, colour: string, opacity: readonly number[], known?: GridView): Promise<HTMLCanvasElement> {
+  const [{ width, height, cells }, seen] = await Promise.all([grid(view), known ? grid(known) : null]);
   const tint = rgb(colour);
-  return picture(cells.width, cells.height, (x, y) => [...tint, 255 * (opacity[cells.cells[y * cells.width + x]] ?? 0)]);
+  const knows = (x: number, y: number) => !seen || seen.cells[Math.floor((y * seen.height) / height) * seen.width + Math.floor((x * seen.width) / width)] > 0;
+  return picture(width, height, (x, y) => [...tint, knows(x, y) ? 255 * (opacity[cells[y * width + x]] ?? 0) : 0]);
 }
 
 type Rgb = [number, number, number];

@@ -11,8 +11,9 @@ import { drawDeaths, drawDeeds, drawEffects, drawOrders, drawPaths, drawPower, d
 import { blend, sightOf, tints, type Sight, type Spot } from "./spots";
 import { drawUnits, radius } from "./units";
 
-/** Scenes before the moment of which ways and deaths are shown: about four seconds of a battle. */
-const PAST = 8;
+/** Seconds before the moment of which ways are shown, and deaths; a scene at least, as steps may be longer. */
+const WAYS_S = 3;
+const DEATHS_S = 6;
 /** Opacity of fog where it was never lifted, where it is down again, and where somebody looks. */
 const FOG = [0.72, 0.42, 0];
 const CREEP = [0, 0.34];
@@ -67,7 +68,7 @@ export class Painter {
     if (!frame) return false;
     const tint = tints(frame, this.match.sides.value);
     const sight = sightOf(this.match, frame, wish.eyes);
-    this.drawCreep(context, frame, wish);
+    this.drawCreep(context, frame, sight, wish);
     if (!off.has("resources")) this.drawResources(context, frame, colours);
     if (!off.has("power")) drawPower(context, frame, tint, this.view, colours);
     if (!off.has("fog")) this.drawFog(context, frame, sight, colours);
@@ -81,11 +82,10 @@ export class Painter {
     const { part, next } = this.between(frame);
     this.spots = blend(frame, next, part, tint).filter(({ unit }) => sight.sees(unit));
     const byTag = new Map(this.spots.map((spot) => [spot.unit.tag, spot]));
-    const past = this.past(frame);
-    if (!off.has("paths")) drawPaths(context, this.spots, past, view, colours);
+    if (!off.has("paths")) drawPaths(context, this.spots, this.past(frame, WAYS_S), view, colours);
     if (!off.has("effects")) drawEffects(context, frame, tint, view, colours);
     if (!off.has("orders")) drawOrders(context, this.spots, byTag, view, colours);
-    if (!off.has("deaths")) drawDeaths(context, frame, past.map((f) => ({ ...f, units: f.units.filter(sight.sees) })), tint, view, colours);
+    if (!off.has("deaths")) drawDeaths(context, frame, this.past(frame, DEATHS_S).map((f) => ({ ...f, units: f.units.filter(sight.sees) })), tint, view, colours);
     drawUnits(context, this.spots, view, colours);
     if (!off.has("shots")) drawShots(context, this.spots, byTag, view, colours, part);
     this.drawAgents(context, byTag, wish);
@@ -102,10 +102,13 @@ export class Painter {
     return next && next.step > frame.step ? { part: fraction, next } : { part: 0, next: undefined };
   }
 
-  private past(frame: Frame): Frame[] {
-    const steps = this.match.timeline.value?.steps ?? [];
+  /** Return the scenes of the last seconds that are here, the newest last. */
+  private past(frame: Frame, seconds: number): Frame[] {
+    const { steps = [], time_s = [] } = this.match.timeline.value ?? {};
     const index = this.match.index.value;
-    const frames = steps.slice(Math.max(0, index - PAST), index).map((step) => this.match.scenes.frame(step));
+    let from = Math.max(0, index - 1);
+    while (from > 0 && time_s[from - 1] >= time_s[index] - seconds) from--;
+    const frames = steps.slice(from, index).map((step) => this.match.scenes.frame(step));
     return frames.filter((f, i) => f !== undefined && f.step < frame.step && f !== frames[i - 1]) as Frame[];
   }
 
@@ -131,11 +134,12 @@ export class Painter {
     context.stroke();
   }
 
-  private drawCreep(context: CanvasRenderingContext2D, frame: Frame, { off, colours }: Wish): void {
+  private drawCreep(context: CanvasRenderingContext2D, frame: Frame, sight: Sight, { off, colours }: Wish): void {
     const terrain = this.match.terrain.value;
     if (!terrain || !frame.creep || off.has("creep")) return;
     const view = frame.creep;
-    this.creep = this.made(this.creep, view, colours.creep, () => tintOf(view, colours.creep, CREEP));
+    const known = frame.fog[sight.side];
+    this.creep = this.made(this.creep, view, `${colours.creep} ${sight.side}`, () => tintOf(view, colours.creep, CREEP, known));
     this.drawWhole(context, this.creep.canvas, terrain);
   }
 

@@ -42,7 +42,7 @@ export function Controls({ matches }: { matches: readonly Match[] }) {
         {clockText(match.timeline.value?.time_s[match.index.value] ?? 0)}
         <small> / {clockText(match.timeline.value?.time_s.at(-1) ?? 0)}</small>
       </output>
-      <span class="muted">
+      <span class="muted steps">
         step {match.step.value} of {match.timeline.value?.steps.at(-1) ?? 0}
       </span>
       <span class="spring" />

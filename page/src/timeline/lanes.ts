@@ -117,16 +117,19 @@ function polygon(context: CanvasRenderingContext2D, x: number, y: number, r: num
 /** Draw a tick for each decision, one a pixel at most: an episode may have 20 000. */
 function drawAsked(context: CanvasRenderingContext2D, match: Match, where: (step: number) => number, scale: Scale, agent: string, top: number, colours: Colours): void {
   const asked = match.timeline.value?.asked ?? {};
+  const sides = match.run.value?.sides ?? [];
+  const height = (ASKED.height - 4) / Math.max(1, sides.length);
+  context.globalAlpha = 0.75;
   for (const [key, steps] of Object.entries(asked)) {
     if (agent && key !== agent) continue;
-    context.fillStyle = tint(match, key.split("/")[0], colours);
-    context.globalAlpha = 0.75;
+    const [side] = key.split("/");
+    context.fillStyle = tint(match, side, colours);
     let last = -9;
     for (const step of steps) {
       const x = Math.round(where(step));
       if (x === last || x < 0 || x > scale.width) continue;
       last = x;
-      context.fillRect(x, top + 3, 1, ASKED.height - 5);
+      context.fillRect(x, top + 3 + Math.max(0, sides.indexOf(side)) * height, 1, height - 1);
     }
   }
   context.globalAlpha = 1;
