@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden picture clean
+.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,7 +31,7 @@ help: ## List the targets
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments --group page
 	@touch $@
 
 install: .venv/.ready ## Install what is needed to play into .venv
@@ -79,6 +79,10 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
 	  $(UV) sync --quiet --frozen --python $$python --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
+
+page: install ## Build khala/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
+	$(RUN)python -m page.typescript
+	cd page && npm ci --silent --no-audit --no-fund && npm run --silent types && npm test --silent && npm run --silent build
 
 bench: install ## Measure what docs/measurements.md claims
 	$(RUN)python -m bench
