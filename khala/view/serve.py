@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
+import signal
 import ssl
 import sys
 import tempfile
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from aiohttp import web
 
+from khala.exit_codes import SIGNALLED
 from khala.view.export import export
 from khala.view.guard import LOOPBACK, TOKEN, Guard
 from khala.view.server import Server, page
@@ -57,7 +59,9 @@ def run_view(look: Look) -> None:
     """
     guard, context = guard_of(look), _tls(look)
     sys.setswitchinterval(SWITCH_S)
-    asyncio.run(cancelled_by_signal(_view(look, guard, context)))
+    ended = asyncio.run(cancelled_by_signal(_view(look, guard, context)))
+    if isinstance(ended, signal.Signals):
+        raise SystemExit(SIGNALLED + ended)
 
 
 def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[str]) -> None:

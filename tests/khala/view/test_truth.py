@@ -31,7 +31,7 @@ def told(recording: Recording, kind: type[Any]) -> dict[tuple[int, str, str], An
     return found
 
 
-@pytest.mark.parametrize("name", ["made", "golden"])
+@pytest.mark.parametrize("name", ["made", "golden", "old"])
 def test_two_hundred_random_moments_are_as_recorded(name: str, request: pytest.FixtureRequest) -> None:
     check_moments(request.getfixturevalue(name), MOMENTS)
 
@@ -61,26 +61,27 @@ def check_moments(shown: Opened, count: int) -> None:
             assert refused == {(one.reason, one.message) for one in mine.rejections if one.text}
         for side in moment["sides"]:
             so_far = [report for (at, whose, _), report in reports.items() if at <= step and whose == side["side"]]
-            if so_far[0].killed_value is not None:  # the golden recording is older than this number
-                assert side["killed_value"] == pytest.approx(sum(report.killed_value or 0 for report in so_far))
-                assert side["lost_value"] == pytest.approx(sum(report.lost_value or 0 for report in so_far))
+            assert side["killed_value"] == pytest.approx(sum(report.killed_value or 0 for report in so_far))
+            assert side["lost_value"] == pytest.approx(sum(report.lost_value or 0 for report in so_far))
             usages = [agent.usage for report in so_far for agent in report.agents]
             assert side["tokens"] == sum(usage.prompt_tokens + usage.completion_tokens for usage in usages)
             costs = [usage.cost_usd for usage in usages if usage.cost_usd is not None]
             assert side["cost_usd"] == (pytest.approx(sum(costs)) if costs else None)
 
 
-def test_scenes_are_the_recorded_ones(made: Opened) -> None:
-    recorded = {scene.step: scene for scene in Recording.open(made.path).of(Scene)}
-    shown = json.loads(made.scenes(0, 8, 23))["scenes"]
+@pytest.mark.parametrize("name", ["made", "golden"])
+def test_scenes_are_the_recorded_ones(name: str, request: pytest.FixtureRequest) -> None:
+    found: Opened = request.getfixturevalue(name)
+    recorded = {scene.step: scene for scene in Recording.open(found.path).of(Scene)}
+    shown = json.loads(found.scenes(0, 8, 23))["scenes"]
     assert [Scene.model_validate(one) for one in shown] == [recorded[step] for step in range(8, 24)]
 
 
-def test_units_of_an_old_recording_are_where_agents_saw_them(golden: Opened) -> None:
-    recorded = list(Recording.open(golden.path).of(Observation))
+def test_units_of_an_old_recording_are_where_agents_saw_them(old: Opened) -> None:
+    recorded = list(Recording.open(old.path).of(Observation))
     chance = random.Random(14)
     for seen in chance.sample(recorded, 30):
-        (scene,) = (Scene.model_validate(one) for one in json.loads(golden.scenes(0, seen.step, seen.step))["scenes"])
+        (scene,) = (Scene.model_validate(one) for one in json.loads(old.scenes(0, seen.step, seen.step))["scenes"])
         drawn = {mark.tag: mark for mark in scene.units}
         for team in seen.view.teams:
             for unit in (*team.units, *team.enemies):
@@ -99,9 +100,11 @@ def test_the_time_line_sums_up_to_the_result(made: Opened) -> None:
     assert curves["minerals", "blue"][-1] == 89.0
 
 
-def test_every_death_of_the_result_is_on_the_time_line(golden: Opened) -> None:
-    (result,) = Recording.open(golden.path).results
-    deaths = [mark for mark in json.loads(golden.timeline(0))["marks"] if mark["kind"] == "death"]
+@pytest.mark.parametrize("name", ["golden", "old"])
+def test_every_death_of_the_result_is_on_the_time_line(name: str, request: pytest.FixtureRequest) -> None:
+    found: Opened = request.getfixturevalue(name)
+    (result,) = Recording.open(found.path).results
+    deaths = [mark for mark in json.loads(found.timeline(0))["marks"] if mark["kind"] == "death"]
     lost = sum(mark["weight"] for mark in deaths if mark["side"] == result.side)
     killed = sum(mark["weight"] for mark in deaths if mark["side"] == "opponent")
     # the deaths of the last step are in its report, and no observation follows that would name them
