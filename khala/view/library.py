@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from khala.view.index import cache_directory, connect, prepare
-from khala.view.wire import ExperimentLine, RunLine
+from khala.view.wire import RunLine
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.keys import Topic, run_key
@@ -172,7 +172,7 @@ def _walk(directory: Path, depth: int, experiments: list[Path]) -> Iterator[tupl
 
 def lines(paths: Sequence[Path], below: Path) -> list[RunLine]:
     """Return the lines of recordings, with what the cache knows of them; those that cannot be read have none."""
-    with contextlib.closing(_cache()) as db:
+    with contextlib.closing(cache()) as db:
         known = {path: (size, changed, line) for path, size, changed, line in db.execute("select * from line")}
         new: list[tuple[str, int, int, str]] = []
         found = [line for path in paths if (line := _line(path, below, known, new)) is not None]
@@ -181,36 +181,6 @@ def lines(paths: Sequence[Path], below: Path) -> list[RunLine]:
             db.executemany("insert or replace into line values (?, ?, ?, ?)", new)
             db.execute("commit")
         return found
-
-
-def experiments(directories: Sequence[Path]) -> list[ExperimentLine]:
-    """Return the lines of experiments; how many matches each plans is known until its file changes."""
-    with contextlib.closing(_cache()) as db:
-        return [line for path in directories if (line := _experiment(path, db)) is not None]
-
-
-def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | None:
-    try:
-        changed, key = (directory / EXPERIMENT).stat().st_mtime_ns, str(directory.absolute())
-        known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
-        if known:
-            return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
-        from khala.view.experiments import line_of as counted  # noqa: PLC0415  # it loads all that experiments need
-
-        line = counted(directory)
-        db.execute("insert or replace into line values (?, 0, ?, ?)", (key, changed, line.model_dump_json()))
-    except (KhalaError, OSError, ValueError, sqlite3.Error):
-        return None
-    return line
-
-
-def _played(directory: Path) -> int:
-    path = directory / "index.sqlite"
-    if not path.exists():
-        return 0
-    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
-        count: int = db.execute("select count(*) from matches").fetchone()[0]
-        return count
 
 
 def _line(
@@ -237,7 +207,8 @@ def shown(path: Path, below: Path | None) -> str:
     return path.name
 
 
-def _cache() -> sqlite3.Connection:
+def cache() -> sqlite3.Connection:
+    """Return a connection to what is known of recordings and experiments."""
     path = cache_directory() / "library.index"
     prepare(path, SCHEMA, VERSION)
     return connect(path, SCHEMA)

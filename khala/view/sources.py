@@ -8,10 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.view import library
+from khala.view import experiments, library
 from khala.view.library import run_id
 from khala.view.runs import NotThere, Opened
-from khala.view.wire import ExperimentLine, ExperimentView, Library
+from khala.view.wire import ExperimentView, Library
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Sources:
         return Library(
             title=self.title,
             runs=tuple(library.lines(paths, self._directory or Path())),
-            experiments=tuple(self._lines(found.experiments)),
+            experiments=tuple(experiments.listed(found.experiments)),
             opened=tuple(run_id(path) for path in self._first),
         )
 
@@ -71,12 +71,9 @@ class Sources:
             self.library()
         if (path := self._experiments.get(id)) is None:
             raise NotThere("there is no such experiment here")
-        from khala.view.experiments import experiment_view  # noqa: PLC0415  # SciPy takes a second
+        from khala.view.table import experiment_view  # noqa: PLC0415  # SciPy takes a second
 
         return experiment_view(path, self._directory or path)
-
-    def _lines(self, experiments: list[Path]) -> list[ExperimentLine]:
-        return library.experiments(experiments)
 
 
 def find(given: Sequence[str], runs: Path, *, adviser: str = "") -> Sources:
