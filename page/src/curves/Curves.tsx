@@ -90,7 +90,7 @@ function options(chart: Chart, lines: readonly Line[], width: number): uPlot.Opt
     padding: [16, MARGIN, 4, 0],
     legend: { show: false },
     cursor: { show: false },
-    scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1e-6) * 1.08] } },
+    scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), high ? high * 1.08 : 1] } },
     axes: [
       { show: false },
       {

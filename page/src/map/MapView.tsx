@@ -22,7 +22,7 @@ export interface Pointed {
   y: number;
 }
 
-export function MapView({ match }: { match: Match }) {
+export function MapView({ match, name = "" }: { match: Match; name?: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const pointed = useSignal<Pointed | null>(null);
   const frame = useSignal<readonly [number, number, number, number] | null>(null);
@@ -34,7 +34,7 @@ export function MapView({ match }: { match: Match }) {
   useEffect(() => keepDrawn(canvas.current!, painter, match, stale, drawn), [painter]);
   const middle = (factor: number) => zoom(target, factor, painter.view.width / 2, painter.view.height / 2);
   return (
-    <section class="map" aria-label="Map">
+    <section class="map" aria-label={`Map ${name}`.trim()}>
       <canvas ref={canvas} class="map-canvas" tabIndex={0} role="img" aria-label={describe(match)} />
       {frame.value && <div class="map-box" style={boxStyle(frame.value)} />}
       {!drawn.value && <p class="map-empty">{match.timeline.value?.steps.length ? "No scene of this moment is here yet." : "Nothing has been played yet."}</p>}
