@@ -31,8 +31,8 @@ function CurveView({ chart, matches }: { chart: Chart; matches: readonly Match[]
       <p class="curve-name">
         {chart.name}
         {values(chart, matches).map(([name, value, tint], i) => (
-          <b key={i} class={`side-${tint}`} title={name}>
-            {value}
+          <b key={i} class={`side-${tint}`}>
+            {matches.length > 1 && <i>{name.split(" ")[0]}</i>} {value}
           </b>
         ))}
       </p>

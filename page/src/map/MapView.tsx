@@ -46,6 +46,8 @@ export function MapView({ match, name = "" }: { match: Match; name?: string }) {
   );
 }
 
+const sameMap = () => new Set(matches.peek().map((m) => m.run.peek()?.line.map)).size === 1;
+
 /** Show the units that are chosen, or all of both sides. */
 function fit(painter: Painter): void {
   const units = painter.spots.filter((spot) => (chosen.value.size ? chosen.value.has(spot.unit.tag) : spot.tint !== 2));
@@ -108,7 +110,7 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
     if (drawn.value && !fitted && width > 0) {
       fitted = true;
       // a battle takes place in a small part of its map
-      if (!camera.value && matches.peek().length === 1 && !painter.spots.some(({ unit }) => is(unit, "STRUCTURE"))) fit(painter);
+      if (!camera.value && sameMap() && !painter.spots.some(({ unit }) => is(unit, "STRUCTURE"))) fit(painter);
     }
   };
   const stop = effect(() => {

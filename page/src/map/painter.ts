@@ -149,7 +149,7 @@ export class Painter {
       context.moveTo(left, i * scale + top);
       context.lineTo(64 * scale + left, i * scale + top);
     }
-    context.strokeStyle = colours.edge;
+    context.strokeStyle = colours.line;
     context.lineWidth = 1;
     context.stroke();
   }
