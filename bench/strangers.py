@@ -279,6 +279,7 @@ ATTACKS: dict[str, Callable[[Stranger], Tried]] = {
     "agent: reads pictures of others": reads(f"{VICTIM}/image/*", f"{ROOT}/*/*/image/*"),
     "agent: reads replies and messages of others": reads(f"{VICTIM}/reply", f"{VICTIM}/message"),
     "agent: reads reports and the run card": reads(f"{ROOT}/report", f"{ROOT}/run"),
+    "agent: reads the map of both sides": reads(f"{ROOT}/terrain", f"{ROOT}/scene"),
     "agent: reads the other side": reads(f"{ROOT}/{RED}/**"),
     "agent: reads everything": reads("**", "khala/**", f"{ROOT}/**", f"{ROOT}/*/*/*"),
     "agent: reads the router's own state": reads("@/**"),
@@ -318,12 +319,12 @@ class Seen:
 class Siege:
     """A match under attack; see the module. Made by `siege`."""
 
-    def __init__(self, host: Bus, reports: Publisher, turn: Turn, endpoint: str, keys: Path) -> None:
+    def __init__(self, host: Bus, published: Sequence[Publisher], turn: Turn, endpoint: str, keys: Path) -> None:
         self.endpoint, self.keys = endpoint, keys
         self.seen = Seen()
         self._turn = turn
         self._host = host
-        self._reports = reports
+        self._published = published
         self._step = 0
 
     def look(self) -> Seen:
@@ -344,7 +345,8 @@ class Siege:
             self.seen.forged += sum(FORGED.decode() in (answer.text or "") for answer in honest.values())
             self.seen.slowest_ms = max(self.seen.slowest_ms, took_ms)
             self._step += 1
-            await self._reports.put(b"secret")  # with which the recording has room for another step
+            for publisher in self._published:  # with the report, the recording has room for another step
+                await publisher.put(b"secret")
             await asyncio.sleep(PAUSE_S)
 
     def _questions(self) -> Iterator[Question]:
@@ -424,8 +426,9 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         for name in players:
             await announcer.brief(briefing(task, task.agents[0].model_copy(update={"name": name}), RUN, 0))
         await roster.assemble(seats, 20)
-        reports = await bus.publisher(f"{ROOT}/report", Delivery.LOG)
-        match = Siege(host, reports, turn, endpoint, keys)
+        maps = [await bus.publisher(f"{ROOT}/{topic}", Delivery.STATE) for topic in (Topic.TERRAIN, Topic.SCENE)]
+        published = [*maps, await bus.publisher(f"{ROOT}/{Topic.REPORT}", Delivery.LOG)]
+        match = Siege(host, published, turn, endpoint, keys)
         for key in (f"{VICTIM}/**", f"{ROOT}/{RED}/**", f"{ROOT}/junk/**", f"{OWN}/reply"):
             running(match.tap(host, key))
         for key in STATES:

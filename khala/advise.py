@@ -112,7 +112,7 @@ class Advising:
             results = await self._hear(stack, Topic.RESULT, Delivery.STATE)
             hosts = await self._bus.watch(host_key(self._adviser.run))
             stack.push_async_callback(hosts.close)
-            card = await self._card(await self._hear(stack, Topic.RUN, Delivery.STATE), find_s)
+            card = await card_of(self._bus, self._adviser, find_s)
             key = agent_key(self._adviser.run, self._adviser.side, self._adviser.name, Topic.ADVICE)
             publisher = await self._bus.publisher(key, Delivery.SPEECH)
             stack.push_async_callback(publisher.close)
@@ -130,18 +130,6 @@ class Advising:
         subscription = await self._bus.subscribe(run_key(self._adviser.run, topic), delivery)
         stack.push_async_callback(subscription.close)
         return subscription
-
-    async def _card(self, cards: Subscription[Sample], find_s: float) -> Run:
-        run, name = self._adviser.run, self._adviser.name
-        try:
-            async with asyncio.timeout(find_s):
-                card = decode_as(Run, (await anext(cards)).payload)
-        except TimeoutError:
-            raise NoMatch(f"no match of the name {run!r} was found: is it running, and at this endpoint?") from None
-        if name not in card.advisers:
-            known = ", ".join(card.advisers) or "none"
-            raise ConfigError(f"the task has no adviser {name!r}; it has {known}: see `advisers` in task files")
-        return card
 
     async def _write(self, publisher: Publisher, lines: AsyncIterator[str], card: Run) -> None:
         async for line in lines:
@@ -189,6 +177,27 @@ class Advising:
                 sides.discard(result.side)
             if not sides:
                 return
+
+
+async def card_of(bus: Bus, adviser: Adviser, find_s: float) -> Run:
+    """Return the card of the run, which has this adviser.
+
+    Raises:
+        NoMatch: there is no such run within `find_s`.
+        ConfigError: the adviser may not write to its agents.
+    """
+    cards = await bus.subscribe(run_key(adviser.run, Topic.RUN), Delivery.STATE)
+    try:
+        async with asyncio.timeout(find_s):
+            card = decode_as(Run, (await anext(cards)).payload)
+    except TimeoutError:
+        raise NoMatch(f"no match of the name {adviser.run!r} was found: is it running, and at this endpoint?") from None
+    finally:
+        await cards.close()
+    if adviser.name not in card.advisers:
+        known = ", ".join(card.advisers) or "none"
+        raise ConfigError(f"the task has no adviser {adviser.name!r}; it has {known}: see `advisers` in task files")
+    return card
 
 
 async def lines_of(stream: TextIO) -> AsyncIterator[str]:
@@ -242,7 +251,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
             await bus.close()
 
     async def play() -> None:
-        *others, last = _places(adviser, connect, tls, insecure=insecure)
+        *others, last = places(adviser, connect, tls, insecure=insecure)
         for config in others:
             with contextlib.suppress(NoMatch):
                 return await advise_at(config, FIND_NEAR_S)
@@ -251,7 +260,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
     asyncio.run(play())
 
 
-def _places(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> list[BusConfig]:
+def places(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecure: bool) -> list[BusConfig]:
     """Return where the match may be: at the endpoints given, or at one of those of this machine, the newest first."""
     if tls is None:
         near = [] if connect else [[endpoint] for endpoint in local_bus.running()]

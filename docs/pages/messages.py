@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import inspect
 import re
-from typing import TYPE_CHECKING
+
+from pydantic import BaseModel
 
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts, remarks
 from khala_protocol import keys, messages
 from khala_protocol.messages import MESSAGE_TYPES, Wire
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
 
 DESCRIBER = Describer()
 LITERALS = {"AgentStatus": "AgentReport.status", "RejectionReason": "Rejection.reason"}
@@ -39,7 +37,9 @@ def page() -> str:
     )
 
 
-def _section(model: type[BaseModel], level: str) -> str:
+def _section(model: type, level: str) -> str:
+    if not issubclass(model, BaseModel):
+        return join(f"{level} {model.__name__}", about(model), DESCRIBER.row(model))
     without = [*Wire.model_fields, "kind"] if issubclass(model, Wire) else []
     return join(f"{level} {model.__name__}", about(model), DESCRIBER.fields(model, without=without))
 

@@ -11,7 +11,7 @@ import re
 import tokenize
 import types
 import typing
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeGuard, Union, get_args, get_origin
 
 from pydantic import BaseModel, JsonValue
 from pydantic_core import PydanticUndefined, to_jsonable_python
@@ -96,13 +96,19 @@ class Describer:
         if origin is dict:
             keys = "" if args[0] is str else f", by {self.shape(args[0])}"
             return f"object of {self.shape(args[1])}{keys}"
-        if isinstance(hint, type) and issubclass(hint, BaseModel):
+        if _is_part(hint):
             return f"[{hint.__name__}]({anchor(hint.__name__)})"
         raise TypeError(f"no words for {hint!r}")
 
     def _word(self, hint: object) -> str | None:
         """Return the word for a type. By equality and not by hash: an annotation of a type need not be hashable."""
         return next((word for known, word in self._words.items() if known == hint), None)
+
+    def row(self, named: type) -> str:
+        """Return a table of the values of a list whose places have names."""
+        hints = typing.get_type_hints(named)
+        rows = [(code(name), self.shape(hints[name]), text) for name, text in attributes(named)]
+        return table(("place", "holds", "meaning"), rows)
 
 
 def about(model: type) -> str:
@@ -129,13 +135,13 @@ def attributes(model: type) -> list[tuple[str, str]]:
     return [(name, _null(text)) for name, text in texts.items()]
 
 
-def parts(models: Iterable[type[BaseModel]]) -> list[type[BaseModel]]:
-    """Return the models that these are made of, each once, in the order in which they are met."""
-    found: dict[type[BaseModel], None] = {}
+def parts(models: Iterable[type[BaseModel]]) -> list[type]:
+    """Return the models and named tuples that these are made of, each once, in the order in which they are met."""
+    found: dict[type, None] = {}
 
-    def visit(model: type[BaseModel]) -> None:
-        for field in model.model_fields.values():
-            for inner in _models_in(field.annotation):
+    def visit(model: type) -> None:
+        for field in model.model_fields.values() if issubclass(model, BaseModel) else ():
+            for inner in _parts_in(field.annotation):
                 if inner not in found:
                     found[inner] = None
                     visit(inner)
@@ -161,11 +167,16 @@ def remarks(module: ModuleType, name: str) -> list[tuple[str, str]]:
     raise LookupError(f"{module.__name__} has no {name}")
 
 
-def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _parts_in(annotation: object) -> Iterator[type]:
+    if _is_part(annotation):
         yield annotation
     for part in get_args(annotation):
-        yield from _models_in(part)
+        yield from _parts_in(part)
+
+
+def _is_part(hint: object) -> TypeGuard[type]:
+    """Return whether a type has a section of its own: a model, or a list whose places have names."""
+    return isinstance(hint, type) and (issubclass(hint, BaseModel) or hasattr(hint, "_fields"))
 
 
 def _default(field: FieldInfo) -> str:

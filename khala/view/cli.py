@@ -1,73 +1,77 @@
 """The command `khala view`; `khala.cli` mounts it."""
 
-import asyncio
-import contextlib
-import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from khala_orchestrator.console import stderr_console
-from khala_protocol.errors import ConfigError
-from khala_protocol.signals import cancelled_by_signal
-
-if TYPE_CHECKING:
-    from khala.view.guard import Guard
-    from khala.view.server import Server
+from khala_orchestrator.cli import Insecure, Tls
 
 VIEW_EPILOG = """
 Examples:\n
     khala view\n
     khala view 2s3z-20260101-120000-ab12\n
-    khala view runs/a/run.mcap runs/b/run.mcap\n
+    khala view runs/first/recording.mcap runs/second/recording.mcap\n
     khala view my_experiment\n
+    khala view first --connect tls/10.0.0.5:7447 --tls keys --adviser Adviser\n
+    khala view first --export match.html --steps 0-400
 """
-LOCAL = "127.0.0.1"
 
 
 def view(
     given: Annotated[
         list[str] | None,
         typer.Argument(
-            help="A recording, a run below runs/, or a directory; two to see them side by side.",
-            metavar="[RUN|RECORDING|DIR]...", show_default="runs",
+            help="A recording, a run below runs/, or a directory; two recordings or runs to see them side by side.",
+            metavar="[RUN|RECORDING|DIR]...",
+            show_default="runs",
         ),
     ] = None,
     *,
-    host: Annotated[str, typer.Option(help="Address to serve on; another than this machine's needs --password.")] = LOCAL,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0 for a free one.")] = 0,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(help="Follow a match on the bus at this endpoint; RUN names it if there are several."),
+    ] = None,
+    tls: Tls = None,
+    insecure: Insecure = False,
+    adviser: Annotated[
+        str | None, typer.Option(help="Let the page write to agents, as this adviser of the task.", metavar="NAME")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to serve on. One that other machines reach needs --password or --https.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to serve on.", show_default="a free one")
+    ] = 0,
+    password: Annotated[
+        str | None,
+        typer.Option(envvar="KHALA_VIEW_PASSWORD", help="Who has it may look, without the token.", metavar="TEXT"),
+    ] = None,
+    https: Annotated[
+        tuple[Path, Path] | None, typer.Option(help="Serve HTTPS with this certificate.", metavar="CERT KEY")
+    ] = None,
     no_open: Annotated[bool, typer.Option("--no-open", help="Print the address, and open no browser.")] = False,
+    export: Annotated[
+        Path | None, typer.Option(help="Write one file that opens without a server, and end.", metavar="FILE.html")
+    ] = None,
+    steps: Annotated[str | None, typer.Option(help="Of an export: 10-20, 10- or -20.", show_default="all")] = None,
+    agents: Annotated[
+        list[str] | None,
+        typer.Option(help="Of an export: agents whose long texts it holds.", show_default="all", metavar="NAME"),
+    ] = None,
 ) -> None:  # fmt: skip
     """Look at matches in the browser: the map, what each agent saw, said and did, and what became of it.
 
-    Serves a page on this machine alone, behind a token in its address.
+    A match that is being played is followed. The page is served on this machine alone, behind a token in its address,
+    and asks nobody else for anything. An index beside each recording makes long ones open at once.
     """
-    from khala.view.guard import Guard  # noqa: PLC0415  # a web server, which --help need not wait for
-    from khala.view.server import Server  # noqa: PLC0415
-    from khala.view.sources import find  # noqa: PLC0415
+    from khala.view.serve import Look, run_export, run_view  # noqa: PLC0415  # a web server, which --help can do without
 
-    guard = Guard()
-    server = Server(find(given or [], Path("runs")), guard)
-    asyncio.run(cancelled_by_signal(_serve(server, guard, host, port, opens=not no_open)))
-
-
-async def _serve(server: "Server", guard: "Guard", host: str, port: int, *, opens: bool) -> None:
-    from aiohttp import web  # noqa: PLC0415
-
-    runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
-    await runner.setup()
-    try:
-        site = web.TCPSite(runner, host, port)
-        try:
-            await site.start()
-        except OSError as error:
-            raise ConfigError(f"{host}:{port} cannot be served: {error.strerror}; --port names another") from None
-        address = f"http://{host}:{runner.addresses[0][1]}/?token={guard.token}"
-        stderr_console().print(f"view at {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
-        if opens:
-            with contextlib.suppress(webbrowser.Error):
-                await asyncio.to_thread(webbrowser.open, address)
-        await asyncio.Event().wait()
-    finally:
-        await runner.cleanup()
+    look = Look(
+        given=tuple(given or ()), connect=tuple(connect or ()), tls=tls, insecure=insecure, adviser=adviser or "",
+        host=host, port=port, password=password or "", https=https, opens=not no_open,
+    )  # fmt: skip
+    if export is not None:
+        run_export(look, export, steps=steps, agents=agents or ())
+    else:
+        run_view(look)

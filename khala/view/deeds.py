@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from khala_protocol.messages import AgentReport, Call, Point, Rejection
 
 
-
 class Screen(NamedTuple):
     """The screen of a team: where it is on the minimap, and how large."""
 
@@ -53,23 +52,27 @@ def deeds(
     calls = sorted([*((call, call.start, call.end) for call in speech.calls), *standing], key=lambda one: one[1])
     rejections = list(report.rejections) if report else []
     accepted = list(report.accepted) if report else []
+    unread = max((one for one in rejections if one.reason == "too_many_actions"), key=_start, default=None)
     found: list[Deed] = []
     for call, start, end in calls:
-        why = _taken(rejections, start, end)
-        ok = False if why else _was_accepted(call, accepted)
-        found.append(_deed(reply[start:end], call, start, ok, why, frames, screens))
+        why, ok = _taken(rejections, start, end), None
+        if why is None and (ok := _was_accepted(call, accepted)) is None and unread and start > unread.start:
+            why = unread  # one rejection stands for all calls behind it
+        found.append(_deed(reply[start:end], call, start, False if why else ok, why, frames, screens))
     found += (_rejected(one) for one in rejections if one.text)
     return tuple(sorted(found, key=lambda deed: deed.start))
 
 
 def _taken(rejections: list[Rejection], start: int, end: int) -> Rejection | None:
     """Return the rejection of the call at this place, and take it from the list."""
-    for number, one in enumerate(rejections):
-        if start <= one.start < end:
-            return rejections.pop(number)
-        if one.reason == "too_many_actions" and one.message.startswith("These are") and one.start <= start:
-            return one
-    return None
+    mine = next((one for one in rejections if start <= one.start < end), None)
+    if mine is not None:
+        rejections.remove(mine)
+    return mine
+
+
+def _start(one: Rejection) -> int:
+    return one.start
 
 
 def _was_accepted(call: Call, accepted: list[str]) -> bool | None:
@@ -139,4 +142,3 @@ def _place(call: Call, kinds: Sequence[str], screen: Screen | None) -> Point | N
 
 def _only(screens: Mapping[str, Screen]) -> Screen | None:
     return next(iter(screens.values())) if len(screens) == 1 else None
-

@@ -12,19 +12,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from khala_bridge.knowledge import knowledge
-from khala_protocol.messages import UnitFlag
+from khala_protocol.messages import MOST, UnitFlag
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from khala_protocol.messages import Point
+    from collections.abc import Iterable
 
 Json = dict[str, Any]
 OPPONENT = "opponent"
 """The side of an opponent that Khala does not play."""
 LATE = {"late": "late", "gone": "late", "malformed": "late", "fallback": "fallback"}
 """The kind of mark of an agent's status."""
-_WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
+WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
 
 
 @dataclass(slots=True)
@@ -48,19 +46,19 @@ class Memory:
     """Whether the scenes show the map without fog."""
     sums: dict[str, float] = field(default_factory=dict)
     """Of the curves that add up, so far."""
+    fallen: dict[str, float] = field(default_factory=dict)
+    """What each side lost since the last report, for reports of older versions, which do not say."""
 
     def begin(self, episode: int) -> None:
         """Forget what belongs to another episode."""
         if episode != self.episode:
             self.episode, self.step, self.scenes = episode, 0, False
-            self.places, self.dead, self.made, self.sums = {}, set(), set(), {}
+            self.places, self.dead, self.made, self.sums, self.fallen = {}, set(), set(), {}, {}
 
     def dump(self) -> Json:
         """Return it as JSON data."""
-        return {
-            "episode": self.episode, "scenes": self.scenes, "places": self.places, "dead": sorted(self.dead),
-            "made": sorted(self.made), "step": self.step, "sums": self.sums, "whole": self.whole,
-        }  # fmt: skip
+        plain = {name: getattr(self, name) for name in self.__slots__}
+        return plain | {"dead": sorted(self.dead), "made": sorted(self.made)}
 
     @classmethod
     def load(cls, data: Json) -> Memory:
@@ -82,13 +80,14 @@ class Digest:
     marks: list[tuple[Any, ...]] = field(default_factory=list)
     decisions: list[tuple[Any, ...]] = field(default_factory=list)
 
-    def step(self, episode: int, step: int) -> Json:
-        """Return the row of a step, which is merged with what is known of it."""
-        return self.steps.setdefault((episode, step), {})
+    def note(self, said: Json, values: Json) -> None:
+        """Note numbers of a step; what is no number counts as unknown."""
+        row = self.steps.setdefault((said["episode"], said["step"]), {})
+        row |= {name: number(value) for name, value in values.items()}
 
     def mark(self, said: Json, kind: str, text: str, *, side: str = "", agent: str = "") -> None:
         """Note that something happened."""
-        self.marks.append((said["episode"], said["step"], kind, side, agent, text[:200]))
+        self.marks.append((said["episode"], said["step"], kind, str(side), str(agent), str(text)[:200]))
 
     # --- reports ------------------------------------------------------------------------------------
 
@@ -100,20 +99,27 @@ class Digest:
         usages = [agent.get("usage", {}) for agent in agents]
         costs = [usage["cost_usd"] for usage in usages if usage.get("cost_usd") is not None]
         latencies = [agent["latency_s"] for agent in agents if agent.get("latency_s") is not None]
-        row = self.step(said["episode"], said["step"])
-        row |= {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
-        row |= {f"latency_s/{side}": max(latencies, default=None)}
-        row |= self._sums(side, {
-            "killed_value": said.get("killed_value"),
-            "lost_value": said.get("lost_value"),
+        known = {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
+        sums = self._sums(side, {
+            "killed_value": self._killed(said, side),
+            "lost_value": self._lost(said, side),
             "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
             "cost_usd": sum(costs) if costs else None,
             "refused": sum(len(agent.get("rejections", ())) for agent in agents),
         })  # fmt: skip
+        self.note(said, known | sums | {f"latency_s/{side}": max(latencies, default=None)})
         for agent in agents:
             self._agent(said, side, agent)
         for incident in said.get("incidents", ()):
             self.mark(said, "incident", incident, side=side)
+
+    def _killed(self, said: Json, side: str) -> float | None:
+        value: float | None = said.get("killed_value")
+        return value if value is not None else self.memory.fallen.pop(self._other(side), None)
+
+    def _lost(self, said: Json, side: str) -> float | None:
+        value: float | None = said.get("lost_value")
+        return value if value is not None else self.memory.fallen.pop(side, None)
 
     def _sums(self, side: str, more: Json) -> Json:
         """Add to the sums of a side; return them as far as any number was known."""
@@ -140,18 +146,22 @@ class Digest:
 
     def result(self, said: Json) -> None:
         """Take in the result of an episode for a side."""
-        self.mark(said | {"step": self.memory.step}, "end", f"{said['outcome']}: {said['cause']}", side=said.get("side", "blue"))
+        self.mark(
+            said | {"step": self.memory.step},
+            "end",
+            f"{said['outcome']}: {said['cause']}",
+            side=said.get("side", "blue"),
+        )
 
     # --- observations -------------------------------------------------------------------------------
 
     def observation(self, said: Json) -> None:
         """Take in what an agent saw; of a match with scenes only what these do not say."""
         self.memory.begin(said["episode"])
-        row = self.step(said["episode"], said["step"])
-        row["loop"] = said["game_loop"]
+        self.note(said, {"loop": said["game_loop"]})
         view, side = said["view"], said["side"]
         if not self.memory.scenes:
-            row |= _from_view(view, side, alone=len(self.sides) == 1)
+            self.note(said, _from_view(view, side, alone=len(self.sides) == 1))
             self._remember(view, side)
         events = [*view.get("events", ()), *(event for team in view["teams"] for event in team.get("events", ()))]
         for event in events:
@@ -181,7 +191,9 @@ class Digest:
 
     def loss(self, episode: int, step: int, side: str, kind: str, at: tuple[float | None, float | None]) -> None:
         """Note that a unit died."""
-        self.losses.append((episode, step, side, kind, value_of(kind), *at))
+        value, (x, y) = value_of(kind), at
+        self.losses.append((episode, step, side, str(kind), value, number(x), number(y)))
+        self.memory.fallen[side] = self.memory.fallen.get(side, 0.0) + value
 
     def _other(self, side: str) -> str:
         return next((other for other in self.sides if other != side), OPPONENT)
@@ -193,10 +205,9 @@ class Digest:
         memory = self.memory
         memory.begin(said["episode"])
         names = {player["player"]: player.get("side") or OPPONENT for player in said["players"]}
-        row = self.step(said["episode"], said["step"])
-        row["loop"] = said["game_loop"]
+        self.note(said, {"loop": said["game_loop"]})
         for player in said["players"]:
-            row |= _from_player(player, names[player["player"]])
+            self.note(said, _from_player(player, names[player["player"]]))
         self._structures(said, names, first=not memory.scenes)
         memory.scenes, memory.whole = True, bool(said["whole"])
         for unit in said["units"]:
@@ -210,6 +221,11 @@ class Digest:
                 self.memory.made.add(tag)
                 if not first:
                     self.mark(said, "building", unit[1], side=names[unit[2]])
+
+
+def number(value: object) -> float | None:
+    """Return a value if it is a number."""
+    return value if isinstance(value, int | float) and abs(value) <= MOST else None
 
 
 def value_of(kind: str) -> float:
@@ -241,7 +257,7 @@ def _from_player(player: Json, side: str) -> Json:
 def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     found = {f"{name}/{side}": value for name, value in view["resources"].items() if name != "promised"}
     if counts := view.get("counts"):
-        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in _WORKERS)
+        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in WORKERS)
     if army := view.get("army"):
         found[f"army_value/{side}"] = army["value"]
         if alone:
@@ -253,23 +269,10 @@ def _from_view(view: Json, side: str, *, alone: bool) -> Json:
 
 def counted(kinds: Iterable[str]) -> str:
     """Return what there is of several: `2 Stalkers, 1 Probe`."""
-    return ", ".join(f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common())
+    return ", ".join(
+        f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common()
+    )
 
 
 def _several(kind: str) -> str:
     return f"{kind}es" if kind.endswith(("ch", "sh", "s", "x")) else f"{kind}s"
-
-
-def centre(points: Iterable[tuple[float, float, float]]) -> Point | None:
-    """Return the middle of places with weights: x, y, weight."""
-    found = [(x, y, weight or 1.0) for x, y, weight in points]
-    whole = sum(weight for _, _, weight in found)
-    return (sum(x * w for x, _, w in found) / whole, sum(y * w for _, y, w in found) / whole) if found else None
-
-
-def pairs(row: Json) -> Iterator[tuple[str, str, Any]]:
-    """Yield the values of a step: curve, side, value."""
-    for key, value in row.items():
-        name, slash, side = key.partition("/")
-        if slash:
-            yield name, side, value

@@ -15,14 +15,16 @@ import secrets
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from aiohttp import BasicAuth, web
+from aiohttp import web
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator
 
+    from aiohttp.typedefs import Middleware
+
     Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
-TOKEN = "token"
+TOKEN = "token"  # noqa: S105  # its name in the address
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 _SCRIPT = re.compile(r"<script(?P<tag>[^>]*)>(?P<body>.*?)</script\s*>", re.DOTALL | re.IGNORECASE)
 _STYLE = re.compile(r"<style[^>]*>(?P<body>.*?)</style\s*>", re.DOTALL | re.IGNORECASE)
@@ -53,17 +55,16 @@ class Guard:
     names: tuple[str, ...] = LOOPBACK
     secure: bool = False
 
-    def middleware(self) -> Callable[[web.Request, Handler], Awaitable[web.StreamResponse]]:
+    def middleware(self) -> Middleware:
         """Return the middleware that holds every request to the rules."""
 
         @web.middleware
         async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
-            response = self._refused(request) or self._welcomed(request)
+            response: web.StreamResponse | None = self._refused(request)
             if response is None:
-                try:
-                    response = await handler(request)
-                except web.HTTPException as error:
-                    response = error
+                response = self._welcomed(request)
+            if response is None:
+                response = await _handled(request, handler)
             if not response.prepared:
                 response.headers.update(HEADERS)
                 response.headers.setdefault("Content-Security-Policy", "default-src 'none'")
@@ -96,11 +97,7 @@ class Guard:
         given = (request.cookies.get(self.cookie, ""), request.query.get(TOKEN, ""))
         if any(_same(one, self.token) for one in given):
             return True
-        try:
-            login = BasicAuth.decode(request.headers.get("Authorization", ""))
-        except ValueError:
-            return False
-        return bool(self.password) and _same(login.password, self.password)
+        return bool(self.password) and _same(_password(request.headers.get("Authorization", "")), self.password)
 
     def _welcomed(self, request: web.Request) -> web.Response | None:
         """Return a redirect to the same address without the token, which a cookie has from then on."""
@@ -116,6 +113,23 @@ class Guard:
     def cookie(self) -> str:
         """Name of the cookie: browsers send the cookies of one port to all others of the host."""
         return f"khala_view_{hashlib.sha256(self.token.encode()).hexdigest()[:8]}"
+
+
+async def _handled(request: web.Request, handler: Handler) -> web.StreamResponse:
+    try:
+        return await handler(request)
+    except web.HTTPException as error:
+        return _refusal(error.status, (error.text or error.reason).strip())
+
+
+def _password(authorization: str) -> str:
+    """Return the password of a header, in which a name stands before it; "" if there is none."""
+    scheme, _, packed = authorization.partition(" ")
+    try:
+        login = base64.b64decode(packed, validate=True).decode() if scheme.casefold() == "basic" else ""
+    except ValueError:
+        return ""
+    return login.partition(":")[2]
 
 
 def policy_of(page: str) -> str:

@@ -75,10 +75,16 @@ class Found(NamedTuple):
     """A sample that the index knows."""
 
     step: int
-    spot: Spot
+    chunk: int
+    place: int
     log_time_ns: int
     side: str
     agent: str
+
+    @property
+    def spot(self) -> Spot:
+        """Where it lies."""
+        return Spot(self.chunk, self.place)
 
 
 class Index:
@@ -88,60 +94,65 @@ class Index:
         """Open the index of a recording, which may not be there yet."""
         self.recording = recording
         self.path = index_path(recording)
-        self._local = threading.local()
-        self._open: list[sqlite3.Connection] = []
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._size = 0
         self._lock = threading.Lock()
+        self.is_broken = False
+        """Whether it must be removed, so that it is made again."""
         prepare(self.path)
-
-    @property
-    def db(self) -> sqlite3.Connection:
-        """The connection of this thread."""
-        connection: sqlite3.Connection | None = getattr(self._local, "db", None)
-        if connection is None:
-            connection = self._local.db = connect(self.path)
-            self._open.append(connection)
-        return connection
+        self._db = connect(self.path)
 
     def close(self) -> None:
-        """Close the connections of all threads."""
-        while self._open:
-            self._open.pop().close()
-        self._local = threading.local()
+        """Close it, and remove it if it is broken; who still asks gets an error."""
+        with self._lock:
+            self._db.close()
+        if self.is_broken:
+            remove(self.path)
 
     def rows(self, query: str, *values: object) -> list[tuple[Any, ...]]:
-        """Return the rows of a query."""
-        return self.db.execute(query, values).fetchall()
+        """Return the rows of a query.
+
+        Raises:
+            RecordingError: the index was closed, or is broken.
+        """
+        try:
+            with self._lock:  # a connection that is closed while another thread uses it takes the process with it
+                return self._db.execute(query, values).fetchall()
+        except sqlite3.ProgrammingError:
+            raise RecordingError("the recording was closed meanwhile: ask again") from None
+        except sqlite3.Error as error:
+            self.is_broken = True
+            raise RecordingError(f"the index {self.path} is broken, and is made again: {error}") from error
 
     def meta(self, name: str, default: Any = None) -> Any:
         """Return a noted value."""
         found = self.rows("select value from meta where name = ?", name)
         return json.loads(found[0][0]) if found else default
 
-    def newest(
-        self, topic: Topic, episode: int, side: str, agent: str, step: int, *, exactly: bool = False, first: bool = False
-    ) -> Found | None:
-        """Return the sample of an agent's topic at a step, or the last one before it.
-
-        Args:
-            exactly: only at this step.
-            first: of several at the same step the first one instead of the last.
-        """
+    def newest(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> Found | None:
+        """Return the sample of an agent's topic at a step, or else the last one before it."""
         found = self.rows(
-            "select step, chunk, place, log_time_ns from sample where topic = ? and episode = ? and side = ? and "
-            f"agent = ? and step {'=' if exactly else '<='} ? order by step desc, rowid {'asc' if first else 'desc'} "
-            "limit 1", topic, episode, side, agent, step,
+            "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? and "
+            "side = ? and agent = ? and step <= ? order by step desc, rowid desc limit 1",
+            topic, episode, side, agent, step,
         )  # fmt: skip
-        return _found(*found[0], side, agent) if found else None
+        return Found(*found[0]) if found else None
+
+    def first(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> Found | None:
+        """Return the first sample of an agent's topic at exactly this step."""
+        found = self.rows(
+            "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? and "
+            "side = ? and agent = ? and step = ? order by rowid limit 1", topic, episode, side, agent, step,
+        )  # fmt: skip
+        return Found(*found[0]) if found else None
 
     def at(self, topic: Topic, episode: int, first: int, last: int) -> Iterator[Found]:
         """Yield the samples of a topic from step to step, both included, in the order of steps and of the file."""
-        for *where, side, agent in self.rows(
+        for row in self.rows(
             "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? "
             "and step between ? and ? order by step, rowid", topic, episode, first, last,
         ):  # fmt: skip
-            yield _found(*where, side, agent)
+            yield Found(*row)
 
     def payload(self, spot: Spot) -> bytes:
         """Return the bytes of a sample.
@@ -171,10 +182,6 @@ class Index:
         return data
 
 
-def _found(step: int, chunk: int, place: int, log_time_ns: int, side: str, agent: str) -> Found:
-    return Found(step, Spot(chunk, place), log_time_ns, side, agent)
-
-
 def index_path(recording: Path) -> Path:
     """Return where the index of a recording is: beside it, or in the user's cache directory."""
     if os.access(recording.parent, os.W_OK):
@@ -198,11 +205,13 @@ def connect(path: Path, schema: str = SCHEMA) -> sqlite3.Connection:
     db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
     try:
         db.executescript("pragma trusted_schema = off; pragma cell_size_check = on; pragma synchronous = off;")
-        if _tables(db) != [line.strip() for line in schema.split(";") if line.strip()]:
-            raise sqlite3.DatabaseError("it has other tables")
+        tables = _tables(db)
     except BaseException:
         db.close()
         raise
+    if tables != [line.strip() for line in schema.split(";") if line.strip()]:
+        db.close()
+        raise sqlite3.DatabaseError("it has other tables")
     return db
 
 
@@ -213,14 +222,19 @@ def prepare(path: Path, schema: str = SCHEMA, version: int = VERSION) -> None:
             with contextlib.closing(connect(path, schema)) as db:
                 if db.execute("pragma user_version").fetchone()[0] == version:
                     return
-    for name in (path, path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")):
-        name.unlink(missing_ok=True)
+    remove(path)
     descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)  # prompts and replies are for its user alone
     os.close(descriptor)
     with contextlib.closing(sqlite3.connect(path, timeout=BUSY_S)) as db:
         script = f"begin immediate; {schema}; pragma user_version = {version}; commit; pragma journal_mode = wal;"
         with contextlib.suppress(sqlite3.OperationalError):  # another viewer was quicker
             db.executescript(script)
+
+
+def remove(path: Path) -> None:
+    """Remove an index, and what SQLite keeps beside it."""
+    for name in (path, path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")):
+        name.unlink(missing_ok=True)
 
 
 def _tables(db: sqlite3.Connection) -> list[str]:

@@ -8,27 +8,31 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import os
 import sqlite3
 import time
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from khala.view.index import cache_directory, connect, prepare
 from khala.view.wire import RunLine
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.keys import Topic, run_key
-from khala_protocol.messages import Result, Run
+from khala_protocol.messages import Result, Run, Wire
 from khala_protocol.recording.summary import Summary
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
+
+W = TypeVar("W", bound=Wire)
 
 SUFFIX = ".mcap"
+EXPERIMENT = "experiment.yaml"
+"""The file of an experiment, `khala.experiment.store.FILE`."""
 LIVE_S = 60.0
 """A recording without an end is live if it changed within this time, or twice the longest wait for its agents."""
 MOST_FILES = 20_000
@@ -36,7 +40,8 @@ DEEPEST = 8
 """Directories below the one that was opened."""
 VERSION = 1
 SCHEMA = "create table line(path text primary key, size integer not null, changed_ns integer not null, line text not null) without rowid"  # noqa: E501  # as SQLite keeps it
-CARD_LABELS = ("factor.model", "factor.player", "factor.policy", "model")
+PLAYERS = ("factor.model", "factor.player", "factor.policy")
+"""Labels of an experiment that say who decided, if no model was asked."""
 
 
 @dataclass(frozen=True)
@@ -88,17 +93,17 @@ def _read_head(path: Path, size: int, changed_ns: int) -> Head:  # noqa: ARG001 
     return Head(card, results, summary.complete, False, summary.size, began_s, reports // max(1, sides))
 
 
-def _decoded(kind, summary, key):  # type: ignore[no-untyped-def]
+def _decoded(kind: type[W], summary: Summary, key: str) -> Iterator[W]:
     with contextlib.suppress(KhalaError):
         for payload in summary.payloads(key):
             yield decode_as(kind, payload)
 
 
-def line_of(head: Head, id: str, shown: str) -> RunLine:  # noqa: A002  # as in the paths
+def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in the paths
     """Return a recording as a list shows it."""
     card, results = head.card, head.results
     labels = card.labels if card else {}
-    models = tuple(dict.fromkeys(labels[name] for name in CARD_LABELS if name in labels))
+    models = tuple(dict.fromkeys(labels[name] for name in PLAYERS if name in labels))
     costs = [usage.cost_usd for result in results for usage in result.usage.values() if usage.cost_usd is not None]
     outcomes: dict[str, list[str]] = {}
     for result in sorted(results, key=lambda one: one.episode):
@@ -106,7 +111,7 @@ def line_of(head: Head, id: str, shown: str) -> RunLine:  # noqa: A002  # as in 
     seconds = {result.episode: result.game_s for result in results}
     return RunLine(
         id=id,
-        path=shown,
+        path=name,
         run=card.run if card else "",
         task=card.task if card else "",
         map=card.map_name if card else "",
@@ -115,7 +120,7 @@ def line_of(head: Head, id: str, shown: str) -> RunLine:  # noqa: A002  # as in 
         clock=card.clock.rule if card else "",
         models=models,
         recorded_at_s=head.recorded_at_s,
-        outcomes=outcomes,  # type: ignore[arg-type]  # pydantic makes tuples of lists
+        outcomes=outcomes,
         valid=all(result.valid for result in results),
         complete=head.complete,
         live=head.live,
@@ -128,33 +133,46 @@ def line_of(head: Head, id: str, shown: str) -> RunLine:  # noqa: A002  # as in 
     )
 
 
-def recordings(directory: Path) -> list[Path]:
-    """Return the recordings of a directory and those below it, the newest first.
+class Found(NamedTuple):
+    """What a directory holds."""
+
+    recordings: list[Path]
+    """The newest first."""
+    experiments: list[Path]
+    """Directories of experiments."""
+
+
+def found_in(directory: Path) -> Found:
+    """Return the recordings and experiments of a directory and of those below it.
 
     Raises:
         ConfigError: it cannot be read.
     """
+    found = Found([], [])
     try:
-        found = list(_walk(directory, 0))[:MOST_FILES]
+        times = sorted(islice(_walk(directory, 0, found.experiments), MOST_FILES), reverse=True)
     except OSError as error:
         raise ConfigError(f"{directory} cannot be read: {error.strerror}") from None
-    return [path for _, path in sorted(found, reverse=True)]
+    found.recordings.extend(path for _, path in times)
+    return found
 
 
-def _walk(directory: Path, depth: int) -> Iterator[tuple[int, Path]]:
+def _walk(directory: Path, depth: int, experiments: list[Path]) -> Iterator[tuple[int, Path]]:
     with os.scandir(directory) as entries:
         for entry in entries:
             with contextlib.suppress(OSError):
                 if entry.is_dir(follow_symlinks=False):
                     if depth < DEEPEST and not entry.name.startswith("."):
-                        yield from _walk(Path(entry.path), depth + 1)
+                        yield from _walk(Path(entry.path), depth + 1, experiments)
+                elif entry.name == EXPERIMENT:
+                    experiments.append(directory)
                 elif entry.name.endswith(SUFFIX) and entry.is_file():
                     yield entry.stat().st_mtime_ns, Path(entry.path)
 
 
 def lines(paths: Sequence[Path], below: Path) -> list[RunLine]:
     """Return the lines of recordings, with what the cache knows of them; those that cannot be read have none."""
-    with contextlib.closing(_cache()) as db:
+    with contextlib.closing(cache()) as db:
         known = {path: (size, changed, line) for path, size, changed, line in db.execute("select * from line")}
         new: list[tuple[str, int, int, str]] = []
         found = [line for path in paths if (line := _line(path, below, known, new)) is not None]
@@ -170,11 +188,11 @@ def _line(
 ) -> RunLine | None:
     try:
         state = path.stat()
-        key, shown = str(path.absolute()), _shown(path, below)
+        key, name = str(path.absolute()), shown(path, below)
         size, changed, line = known.get(key, (-1, -1, ""))
         if (size, changed) == (state.st_size, state.st_mtime_ns):
-            return RunLine.model_validate_json(line).but(path=shown)
-        made = line_of(read_head(path), run_id(path), shown)
+            return RunLine.model_validate_json(line).but(path=name)
+        made = line_of(read_head(path), run_id(path), name)
     except (KhalaError, OSError, ValueError):
         return None
     if made.complete:
@@ -182,24 +200,15 @@ def _line(
     return made
 
 
-def _shown(path: Path, below: Path) -> str:
+def shown(path: Path, below: Path | None) -> str:
+    """Return the path of a recording as it is shown: below the directory that was opened."""
     with contextlib.suppress(ValueError):
-        return str(path.relative_to(below))
+        return str(path.relative_to(below or path.parent))
     return path.name
 
 
-def _cache() -> sqlite3.Connection:
+def cache() -> sqlite3.Connection:
+    """Return a connection to what is known of recordings and experiments."""
     path = cache_directory() / "library.index"
     prepare(path, SCHEMA, VERSION)
     return connect(path, SCHEMA)
-
-
-def by_id(paths: Iterable[Path]) -> dict[str, Path]:
-    """Return recordings by their names in paths."""
-    return {run_id(path): path for path in paths}
-
-
-def dumped(line: RunLine) -> dict[str, object]:
-    """Return a line as JSON data."""
-    data: dict[str, object] = json.loads(line.model_dump_json())
-    return data

@@ -172,7 +172,7 @@ class Moments:
 
     def _reply(self, episode: int, step: int, side: str, agent: str) -> Reply | None:
         """Return the reply that counted: the first one."""
-        found = self._index.newest(Topic.REPLY, episode, side, agent, step, exactly=True, first=True)
+        found = self._index.first(Topic.REPLY, episode, side, agent, step)
         return self._read(Reply, found) if found else None
 
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 
 from khala.view import scenes, terrain
 from khala.view.index import Index, Spot
-from khala.view.library import line_of, read_head
+from khala.view.library import PLAYERS, line_of, read_head
 from khala.view.moments import Moments
 from khala.view.scan import Scanning
 from khala.view.timeline import timeline
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 W = TypeVar("W", bound=Wire)
 
-PLAYER_LABELS = ("factor.model", "factor.player", "factor.policy")
-"""Labels of an experiment that say who decided, if no model was asked."""
+
+_PICTURES = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG\r\n\x1a\n": "image/png", b"RIFF": "image/webp"}
+"""Media types by how the bytes begin; nothing else is sent as a picture."""
 
 
 class NotThere(LookupError):
@@ -46,7 +47,7 @@ class Opened:
         path: of the recording.
         shown: its path as it is shown.
         changed: is called in another thread when there is more in the index.
-        can_advise: whether advice can be sent to its agents.
+        adviser: name of the adviser as which the page writes to agents; "" for none.
     """
 
     def __init__(
@@ -56,13 +57,17 @@ class Opened:
         shown: str = "",
         *,
         changed: Callable[[], None] = lambda: None,
-        can_advise: bool = False,
+        adviser: str = "",
     ) -> None:
         self.id, self.path, self.shown = id, path, shown or path.name
-        self.can_advise = can_advise
+        self._adviser = adviser
         self.index = Index(path)
         self.scanning = Scanning(self.index, changed)
         self._scales: dict[int, float] = {}
+        self._timelines: dict[int, tuple[int, bytes]] = {}
+        """By episode, with the offset of the index at which it was made."""
+        self._known: tuple[int, tuple[AgentLine, ...]] = (-1, ())
+        """The agents as they were known at an offset of the index."""
 
     def start(self) -> None:
         """Begin to index."""
@@ -81,25 +86,28 @@ class Opened:
         return RunView(
             line=line,
             sides=self.sides,
-            agents=tuple(self.agents()),
+            agents=self.agents(),
             episodes=tuple(self.episodes()),
             indexed=self.indexed(),
             scenes=self._drawn_from(),
-            can_advise=self.can_advise and line.live,
+            can_advise=line.live and self.may_advise,
             card=card.model_dump(mode="json") if card else {},
         ).model_dump_json().encode()  # fmt: skip
 
     def timeline(self, episode: int) -> bytes:
         """Return the `Timeline` of an episode."""
         self._require(episode)
-        return timeline(self.index, episode).model_dump_json().encode()
+        offset = self.index.meta("offset", 0)
+        if self._timelines.get(episode, (-1, b""))[0] != offset:
+            self._timelines[episode] = offset, timeline(self.index, episode).model_dump_json().encode()
+        return self._timelines[episode][1]
 
     def terrain(self, episode: int) -> bytes:
         """Return the `Terrain` of an episode."""
         self._require(episode)
         if (spot := terrain.recorded(self.index, episode)) is not None:
             return self.index.payload(spot)
-        return terrain.from_views(self.index, self._name, episode).model_dump_json().encode()
+        return terrain.from_views(self.index, self.run, episode).model_dump_json().encode()
 
     def scenes(self, episode: int, first: int, last: int) -> bytes:
         """Return the `Scenes` from step to step, both included."""
@@ -107,7 +115,7 @@ class Opened:
         last = min(last, first + MOST_SCENES - 1)
         if self._drawn_from() != "views":
             return scenes.recorded(self.index, episode, first, last)
-        found = scenes.from_views(self.index, self._name, self.sides, episode, first, last, self._scale(episode))
+        found = scenes.from_views(self.index, self.run, self.sides, episode, first, last, self._scale(episode))
         return Scenes(scenes=tuple(found)).model_dump_json().encode()
 
     def moment(self, episode: int, step: int) -> bytes:
@@ -124,12 +132,14 @@ class Opened:
             raise NotThere(f"{side}/{agent} was not asked up to step {step} of episode {episode}")
         return found.model_dump_json().encode()
 
-    def image(self, sha256: str) -> bytes:
-        """Return the bytes of a picture."""
+    def picture(self, sha256: str) -> tuple[str, bytes]:
+        """Return the media type of a picture, and its bytes."""
         found = self.index.rows("select chunk, place from image where sha256 = ?", sha256)
-        if not found:
+        data = self.index.payload(Spot(*found[0])) if found else b""
+        kind = next((kind for magic, kind in _PICTURES.items() if data.startswith(magic)), None)
+        if kind is None:
             raise NotThere("there is no such picture in this recording")
-        return self.index.payload(Spot(*found[0]))
+        return kind, data
 
     def progress(self) -> Progress:
         """Return how far the match, and the index, are."""
@@ -140,6 +150,16 @@ class Opened:
         lag_s = max(0.0, time.time() - reported_ns / 1e9) if live and reported_ns else None
         return Progress(episode=episode, steps=steps, indexed=self.indexed(), live=live, lag_s=lag_s)
 
+    @property
+    def may_advise(self) -> bool:
+        """Whether the task takes advice from this view's adviser."""
+        return self._card is not None and bool(self._adviser) and self._adviser in self._card.advisers
+
+    @property
+    def run(self) -> str:
+        """Name of the run."""
+        return self._card.run if self._card else self.id
+
     # --- parts --------------------------------------------------------------------------------------
 
     def indexed(self) -> float:
@@ -147,7 +167,8 @@ class Opened:
         if self.index.meta("ended") or self.index.meta("broken"):
             return 1.0
         with contextlib.suppress(OSError):
-            return round(min(1.0, self.index.meta("offset", 0) / max(1, self.path.stat().st_size)), 4)
+            offset: int = self.index.meta("offset", 0)
+            return round(min(1.0, offset / max(1, self.path.stat().st_size)), 4)
         return 0.0
 
     def line(self) -> RunLine:
@@ -167,12 +188,18 @@ class Opened:
             game_s=sum(one.game_s for one in episodes),
         )
 
-    def agents(self) -> Iterator[AgentLine]:
-        """Yield the agents of the match."""
+    def agents(self) -> tuple[AgentLine, ...]:
+        """Return the agents of the match."""
+        offset = self.index.meta("offset", 0)
+        if self._known[0] != offset:
+            self._known = offset, tuple(self._agents())
+        return self._known[1]
+
+    def _agents(self) -> Iterator[AgentLine]:
         names = {(side, agent): name for side, agent, name in self.index.rows("select * from model")}
         card = self._card
         labels = card.labels if card else {}
-        player = next((labels[name] for name in PLAYER_LABELS if name in labels), "")
+        player = next((labels[name] for name in PLAYERS if name in labels), "")
         for agent in card.agents if card else ():
             found = self.index.newest(Topic.BRIEFING, 0, agent.side, agent.name, 0)
             briefing = self._read(Briefing, found.spot if found else None)
@@ -212,10 +239,6 @@ class Opened:
         """The sides that Khala plays."""
         return tuple(dict.fromkeys(agent.side for agent in self._card.agents)) if self._card else ()
 
-    @property
-    def _name(self) -> str:
-        return self._card.run if self._card else self.id
-
     @cached_property
     def _card(self) -> Run | None:
         return read_head(self.path).card
@@ -229,19 +252,18 @@ class Opened:
         return found
 
     def _scale(self, episode: int) -> float:
-        if episode not in self._scales:
-            scale = terrain.scale_of(self.index, episode)
-            if self.indexed() < 1.0:
-                return scale
+        if (known := self._scales.get(episode)) is not None:
+            return known
+        scale = terrain.scale_of(self.index, episode)
+        if self.indexed() >= 1.0:
             self._scales[episode] = scale
-        return self._scales[episode]
+        return scale
 
     def _moments(self, episode: int) -> Moments:
-        return Moments(self.index, list(self.agents()), self._scale(episode))
+        return Moments(self.index, self.agents(), self._scale(episode))
 
     def _read(self, kind: type[W], spot: Spot | None) -> W | None:
         try:
             return decode_as(kind, self.index.payload(spot)) if spot else None
         except PeerError:
             return None
-

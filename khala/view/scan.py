@@ -25,12 +25,12 @@ from khala.view.digest import Digest, Memory
 from khala.view.index import SCHEMA, connect
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic, parse
+from khala_protocol.messages import MOST
 from khala_protocol.recording.chunks import Scan
 from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from khala.view.index import Index
     from khala_protocol.keys import Address
@@ -54,7 +54,7 @@ _HEAD = re.compile(
 _PLAIN = frozenset({Topic.REPLY, Topic.SCENE, Topic.OBSERVATION, Topic.EXCHANGE, Topic.MESSAGE, Topic.REPORT})
 """Topics whose messages belong to a step."""
 _KEPT = _PLAIN | {Topic.RUN, Topic.RESULT, Topic.BRIEFING, Topic.TERRAIN}
-WRONG = (ValueError, LookupError, TypeError, AttributeError)
+WRONG = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError)
 """Errors of reading data that is not as our messages are."""
 
 
@@ -128,7 +128,7 @@ class Scanner:
         return True
 
     def _resumed(self, file: BinaryIO) -> Scan:
-        """Return the scan at the place where the index ends, of this file as it was then; otherwise at its beginning."""
+        """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
         with contextlib.suppress(*WRONG):  # of another version, or of somebody else
             state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
             if state["fingerprint"] == fingerprint(file, state["offset"]):
@@ -178,7 +178,7 @@ class Scanner:
         if head and not self._is_read(batch, address):
             return int(head[1]), int(head[2])
         said = from_json(payload, allow_inf_nan=False, cache_strings="none")
-        place = int(said.get("episode", 0)), int(said.get("step", 0))
+        place = _count(said.get("episode", 0)), _count(said.get("step", 0))
         match address.topic:
             case Topic.RUN:
                 self._sides = batch.digest.sides = tuple(dict.fromkeys(agent["side"] for agent in said["agents"]))
@@ -204,7 +204,9 @@ class Scanner:
         db.executemany("insert or ignore into decision values (?, ?, ?, ?, ?)", digest.decisions)
         db.executemany("insert into loss values (?, ?, ?, ?, ?, ?, ?)", digest.losses)
         db.executemany("insert into mark values (?, ?, ?, ?, ?, ?)", digest.marks)
-        db.executemany("insert or replace into model values (?, ?, ?)", [(*who, name) for who, name in batch.models.items()])
+        db.executemany(
+            "insert or replace into model values (?, ?, ?)", [(*who, name) for who, name in batch.models.items()]
+        )
         for (episode, step), row in digest.steps.items():
             known = db.execute("select data from step where episode = ? and step = ?", (episode, step)).fetchone()
             whole = (json.loads(known[0]) if known else {}) | row
@@ -239,7 +241,6 @@ class Scanning:
         self._index, self._changed = index, changed
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"index {index.recording.name}", daemon=True)
-        self.failed = ""
 
     def start(self) -> None:
         """Begin."""
@@ -265,9 +266,15 @@ class Scanning:
                         self._changed()
                 self._changed()
         except (OSError, sqlite3.Error) as error:
-            self.failed = f"the index of {self._index.recording} cannot be written: {error}"
-            log.warning("%s", self.failed)
+            self._index.is_broken = isinstance(error, sqlite3.DatabaseError)
+            log.warning("the index %s cannot be written: %s", self._index.path, error)
             self._changed()
+
+
+def _count(value: object) -> int:
+    if not isinstance(value, int) or not 0 <= value <= MOST:
+        raise ValueError(f"{value} counts nothing")
+    return value
 
 
 def fingerprint(file: BinaryIO, offset: int) -> str:
@@ -286,12 +293,13 @@ def _address(key: str) -> Address | None:
         return None
 
 
-def whole(path: Path, index: Index) -> None:
-    """Index a recording up to its end, in this thread; for exports and tests.
+def whole(index: Index) -> None:
+    """Index a recording up to its end, in this thread; another viewer that does it already is waited for.
 
     Raises:
         OSError: it cannot be read.
     """
     with contextlib.closing(Scanner(index)) as scanner:
-        while scanner.advance() or (not scanner.done and scanner.advance() is None):
-            pass
+        while (found := scanner.advance()) is not False:
+            if found is None:
+                time.sleep(POLL_S)

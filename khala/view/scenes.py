@@ -6,30 +6,39 @@ agents' observations have them, and those that were not seen at a step are remem
 
 from __future__ import annotations
 
-from itertools import chain
-from typing import TYPE_CHECKING, Any
+import contextlib
+from functools import cache
+from typing import TYPE_CHECKING
 
-from pydantic_core import from_json
-
-from khala.view.digest import OPPONENT, is_structure, value_of
-from khala.view.scan import WRONG
+from khala.view.digest import WORKERS, value_of
 from khala_bridge.knowledge import is_armed, knowledge
+from khala_protocol.codec import decode_as
+from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
-from khala_protocol.messages import LOOPS_PER_S, PlayerMark, Scene, UnitFlag, UnitMark
+from khala_protocol.messages import (
+    LOOPS_PER_S,
+    Observation,
+    PlayerMark,
+    Scene,
+    UnitDetails,
+    UnitFlag,
+    UnitMark,
+    UnitView,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.view.index import Found, Index
+    from khala.view.index import Index
+    from khala_protocol.messages import Landmark, View
 
-NOBODY = 16
-"""The player of what is neutral, as the game numbers it."""
 REMEMBERED_S = 20.0
 """Units that move are forgotten when nobody has seen them for so long; structures never are."""
 EARLIER = 8
 """Steps before the first one that is wanted, whose observations say what is remembered."""
 _RADIUS = 0.375
 """Of a type that nothing is known of, in world units."""
+_NOWHERE = (-1.0, -1.0)
 
 
 def recorded(index: Index, episode: int, first: int, last: int) -> bytes:
@@ -41,41 +50,29 @@ def recorded(index: Index, episode: int, first: int, last: int) -> bytes:
 def from_views(
     index: Index, run: str, sides: Sequence[str], episode: int, first: int, last: int, scale: float
 ) -> Iterator[Scene]:
-    """Yield scenes made of observations.
-
-    Args:
-        scale: cells of the minimap per world unit.
-    """
-    memory = _Sighted(sides, scale)
-    by_step: dict[int, list[Found]] = {}
+    """Yield scenes made of observations, from step to step; `scale` is cells of the minimap per world unit."""
+    known = _Known(sides, scale)
+    by_step: dict[int, list[Observation]] = {}
     for found in index.at(Topic.OBSERVATION, episode, first - EARLIER, last):
-        by_step.setdefault(found.step, []).append(found)
-    for step, those in sorted(by_step.items()):
-        seen = [said for found in those if (said := _read(index, found)) is not None]
-        loop = max((said["game_loop"] for said in seen), default=0)
-        memory.begin(loop)
+        with contextlib.suppress(PeerError):
+            by_step.setdefault(found.step, []).append(decode_as(Observation, index.payload(found.spot)))
+    for step, seen in sorted(by_step.items()):
+        loop = max(said.game_loop for said in seen)
+        known.begin(loop)
         for said in seen:
-            memory.take(said)
+            if said.side in sides:
+                known.take(said.side, said.view)
         if step >= first:
-            yield memory.scene(run, episode, step, loop)
+            yield known.scene(run, episode, step)
 
 
-def _read(index: Index, found: Found) -> dict[str, Any] | None:
-    try:
-        said: dict[str, Any] = from_json(index.payload(found.spot), allow_inf_nan=False)
-        return said if said["view"] and said["game_loop"] >= 0 else None
-    except WRONG:
-        return None
-
-
-class _Sighted:
-    """What the agents of all sides saw, by tag."""
+class _Known:
+    """What the agents of all sides know at a step: units by their tags, and the newest view of each side."""
 
     def __init__(self, sides: Sequence[str], scale: float) -> None:
         self._sides, self._scale = tuple(sides), scale
         self._units: dict[int, tuple[int, UnitMark]] = {}
-        self._resources: dict[str, dict[str, Any]] = {}
-        self._views: dict[str, dict[str, Any]] = {}
+        self._views: dict[str, View] = {}
         self._loop = 0
 
     def begin(self, loop: int) -> None:
@@ -83,42 +80,42 @@ class _Sighted:
         self._loop = loop
         oldest = loop - REMEMBERED_S * LOOPS_PER_S
         self._units = {
-            tag: (at, unit) for tag, (at, unit) in self._units.items()
-            if at >= oldest or unit.flags & UnitFlag.STRUCTURE
+            tag: (at, mark) for tag, (at, mark) in self._units.items()
+            if at >= oldest or mark.flags & UnitFlag.STRUCTURE
         }  # fmt: skip
 
-    def take(self, said: dict[str, Any]) -> None:
-        """Take in an observation."""
-        side, view = said["side"], said["view"]
-        number = self._player(side)
-        for team in view["teams"]:
-            for group in ("units", "allies", "enemies"):
-                player = self._enemy(side) if group == "enemies" else number
-                for unit in team.get(group, ()):
-                    self._see(unit, player, side)
-            self._bury(team.get("events", ()))
-        self._bury(view.get("events", ()))
-        for landmark in view.get("landmarks", ()):
-            if landmark["what"] == "structure" and int(landmark["tag"], 16) not in self._units:
-                self._stand(landmark, number, side)
-        known = self._views.get(side, {})
-        self._views[side] = known | {name: value for name, value in view.items() if value is not None}
+    def take(self, side: str, view: View) -> None:
+        """Take in what an agent sees."""
+        own, enemy = self._player(side), self._enemy(side)
+        for team in view.teams:
+            for unit in (*team.units, *team.allies):
+                self._see(unit, own, side)
+            for unit in team.enemies:
+                self._see(unit, enemy, side)
+        for event in (*view.events, *(event for team in view.teams for event in team.events)):
+            if event.what == "died":
+                self._units.pop(_tag(event.tag), None)
+        for landmark in view.landmarks:
+            if landmark.what == "structure" and _tag(landmark.tag) not in self._units:
+                self._see(_standing(landmark), own, side)
+        if view.counts is not None or side not in self._views:  # those who lead know most
+            self._views[side] = view
 
-    def scene(self, run: str, episode: int, step: int, loop: int) -> Scene:
+    def scene(self, run: str, episode: int, step: int) -> Scene:
         """Return the scene of this step."""
-        units = tuple(
-            unit if at == loop else unit._replace(flags=unit.flags | UnitFlag.REMEMBERED, seen_by=0)
-            for at, unit in self._units.values()
+        marks = tuple(
+            mark if at == self._loop else mark._replace(flags=mark.flags | UnitFlag.REMEMBERED, seen_by=0)
+            for at, mark in self._units.values()
         )
-        return Scene(
+        return Scene.model_construct(  # of parts that were checked
             run=run,
             episode=episode,
             step=step,
-            game_loop=loop,
+            game_loop=self._loop,
             sides=self._sides,
             whole=False,
-            players=tuple(self._players(units)),
-            units=units,
+            players=tuple(self._players(marks)),
+            units=marks,
         )
 
     def _player(self, side: str) -> int:
@@ -128,98 +125,120 @@ class _Sighted:
         others = [other for other in self._sides if other != side]
         return self._player(others[0]) if others else len(self._sides) + 1
 
-    def _bury(self, events: Iterable[dict[str, Any]]) -> None:
-        for event in events:
-            if event["what"] == "died":
-                self._units.pop(int(event["tag"], 16), None)
-
-    def _see(self, unit: dict[str, Any], player: int, side: str) -> None:
-        tag, kind = int(unit["tag"], 16), unit["type"]
+    def _see(self, unit: UnitView, player: int, side: str) -> None:
+        tag = _tag(unit.tag)
         at, known = self._units.get(tag, (-1, None))
-        seen_by = 1 << self._sides.index(side) | (known.seen_by if known and at == self._loop else 0)
-        order = next(iter(unit.get("orders") or ()), {})
-        to = order.get("minimap") or (-1.0, -1.0)
-        facts = knowledge().get(kind)
-        mark = UnitMark(
-            tag=tag,
-            type=kind,
-            player=player,
-            x=unit["minimap"][0],
-            y=unit["minimap"][1],
-            radius=round((facts.radius if facts and facts.radius else _RADIUS) * self._scale, 3),
-            facing=0.0,
-            health=unit["health"],
-            health_max=unit["health_max"],
-            shield=unit.get("shield", 0.0),
-            shield_max=unit.get("shield_max", 0.0),
-            energy=unit.get("energy", 0.0),
-            progress=unit.get("build_progress", 1.0),
-            flags=_flags(unit),
-            seen_by=seen_by,
-            order=unit.get("order") or order.get("name") or "",
-            target=int(order["target"], 16) if order.get("target") else 0,
-            to_x=to[0],
-            to_y=to[1],
-        )
-        if known is not None and at == self._loop and not mark.order and known.order:
-            mark = mark._replace(order=known.order, target=known.target, to_x=known.to_x, to_y=known.to_y)
-        self._units[tag] = self._loop, mark
+        mark = _mark(unit, player, self._scale)
+        if known is not None and at == self._loop:
+            mark = mark._replace(seen_by=known.seen_by)
+            if known.order and not mark.order:  # only its own side knows it
+                mark = mark._replace(order=known.order, target=known.target, to_x=known.to_x, to_y=known.to_y)
+        self._units[tag] = self._loop, mark._replace(seen_by=mark.seen_by | 1 << self._sides.index(side))
 
-    def _stand(self, landmark: dict[str, Any], player: int, side: str) -> None:
-        facts = knowledge().get(landmark["type"])
-        health, shield = (facts.health, facts.shield) if facts else (1.0, 0.0)
-        whole = {
-            "tag": landmark["tag"], "type": landmark["type"], "minimap": landmark["minimap"], "health": health,
-            "health_max": health, "shield": shield, "shield_max": shield,
-        }  # fmt: skip
-        self._see(whole, player, side)
-
-    def _players(self, units: Iterable[UnitMark]) -> Iterator[PlayerMark]:
-        mine: dict[int, list[UnitMark]] = {}
-        for unit in units:
-            mine.setdefault(unit.player, []).append(unit)
-        for number, side in enumerate(chain(self._sides, [] if len(self._sides) > 1 else [""]), start=1):
-            those = mine.get(number, [])
-            view = self._views.get(side, {})
-            resources = view.get("resources", {})
-            economy, army = view.get("economy"), view.get("army")
-            value = sum(value_of(unit.type) for unit in those if unit.flags & UnitFlag.ARMY)
-            yield PlayerMark(
-                player=number,
-                side=side,
-                race=_race(those),
-                units=len(those),
-                workers=sum(bool(unit.flags & UnitFlag.WORKER) for unit in those),
-                army_value=int(army["value"] if army else value),
-                minerals=resources.get("minerals"),
-                vespene=resources.get("vespene"),
-                supply_used=resources.get("supply_used"),
-                supply_cap=resources.get("supply_cap"),
-                income=tuple(economy["income"]) if economy else None,
-                upgrades=tuple(view.get("upgrades", ())),
+    def _players(self, marks: Iterable[UnitMark]) -> Iterator[PlayerMark]:
+        sides = self._sides if len(self._sides) > 1 else (*self._sides, "")
+        for number, side in enumerate(sides, start=1):
+            mine = [mark for mark in marks if mark.player == number]
+            workers = sum(bool(mark.flags & UnitFlag.WORKER) for mark in mine)
+            value = sum(value_of(mark.type) for mark in mine if mark.flags & UnitFlag.ARMY)
+            seen = PlayerMark(
+                player=number, side=side, race=_race(mine), units=len(mine), workers=workers, army_value=int(value)
             )
+            view = self._views.get(side)
+            yield seen.but(**_means(view)) if view else seen
 
 
-def _flags(unit: dict[str, Any]) -> int:
-    kind = unit["type"]
-    facts = knowledge().get(kind)
-    details = unit.get("details") or {}
-    found = {
-        UnitFlag.STRUCTURE: is_structure(kind),
-        UnitFlag.WORKER: facts is not None and facts.worker,
-        UnitFlag.ARMY: facts is not None and not facts.structure and not facts.worker and is_armed(kind),
-        UnitFlag.FLYING: unit.get("flying", False),
-        UnitFlag.BURROWED: details.get("burrowed", False),
-        UnitFlag.CLOAKED: unit.get("cloaked", False),
-        UnitFlag.HALLUCINATION: unit.get("hallucination", False),
-        UnitFlag.UNPOWERED: details.get("unpowered", False),
+def _means(view: View) -> dict[str, object]:
+    """Return what a view says of its side as a whole."""
+    found: dict[str, object] = {
+        "minerals": view.resources.minerals,
+        "vespene": view.resources.vespene,
+        "supply_used": view.resources.supply_used,
+        "supply_cap": view.resources.supply_cap,
+        "upgrades": view.upgrades,
     }
-    return sum(flag for flag, is_set in found.items() if is_set)
+    if view.army is not None:
+        found["army_value"] = view.army.value
+    if view.economy is not None:
+        found["income"] = view.economy.income
+    if view.counts is not None:
+        found["workers"] = sum(count.ready for count in view.counts.units if count.type in WORKERS)
+    return found
 
 
-def _race(units: Sequence[UnitMark]) -> str:
-    found = (knowledge().get(unit.type) for unit in units)
-    return next((facts.race for facts in found if facts is not None and facts.race), "")
+def _mark(unit: UnitView, player: int, scale: float) -> UnitMark:
+    order = unit.orders[0] if unit.orders else None
+    to = (order.minimap if order else None) or _NOWHERE
+    return UnitMark(
+        tag=_tag(unit.tag),
+        type=unit.type,
+        player=player,
+        x=unit.minimap[0],
+        y=unit.minimap[1],
+        radius=_radius(unit.type, scale),
+        facing=0.0,
+        health=unit.health,
+        health_max=unit.health_max,
+        shield=unit.shield,
+        shield_max=unit.shield_max,
+        energy=unit.energy,
+        progress=unit.build_progress,
+        flags=_flags(unit),
+        seen_by=0,
+        order=unit.order or "",
+        target=_tag(order.target) if order and order.target else 0,
+        to_x=to[0],
+        to_y=to[1],
+    )
 
 
-__all__ = ["EARLIER", "NOBODY", "OPPONENT", "from_views", "recorded"]
+def _standing(landmark: Landmark) -> UnitView:
+    """Return a structure of which only the place is known: as if it were whole."""
+    facts = knowledge().get(landmark.type)
+    health, shield = (facts.health, facts.shield) if facts else (1.0, 0.0)
+    return UnitView(
+        tag=landmark.tag, type=landmark.type, alliance="own", screen=(0.0, 0.0), minimap=landmark.minimap,
+        health=health, health_max=health, shield=shield, shield_max=shield,
+    )  # fmt: skip
+
+
+def _flags(unit: UnitView) -> int:
+    details = unit.details or UnitDetails()
+    return (
+        _kind(unit.type)
+        | UnitFlag.FLYING * unit.flying
+        | UnitFlag.BURROWED * details.burrowed
+        | UnitFlag.CLOAKED * unit.cloaked
+        | UnitFlag.HALLUCINATION * unit.hallucination
+        | UnitFlag.UNPOWERED * details.unpowered
+    )
+
+
+@cache
+def _kind(name: str) -> int:
+    """Return the flags of a type."""
+    facts = knowledge().get(name)
+    if facts is None:
+        return 0
+    if facts.structure:
+        return int(UnitFlag.STRUCTURE)
+    return int(UnitFlag.WORKER if facts.worker else UnitFlag.ARMY if is_armed(name) else 0)
+
+
+@cache
+def _radius(name: str, scale: float) -> float:
+    facts = knowledge().get(name)
+    return round((facts.radius if facts and facts.radius else _RADIUS) * scale, 3)
+
+
+def _race(marks: Sequence[UnitMark]) -> str:
+    found = (knowledge().get(mark.type) for mark in marks)
+    return next((facts.race for facts in found if facts is not None and facts.race != "neutral"), "")
+
+
+def _tag(tag: str) -> int:
+    """Return a tag as a number; 0 for a text that is none."""
+    try:
+        return int(tag, 16)
+    except ValueError:
+        return 0

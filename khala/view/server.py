@@ -40,7 +40,6 @@ FIRST_LOOK_S = 0.5
 MOST_OPEN = 8
 """Recordings that stay open; of more, the one that was not asked about for longest is closed."""
 _JSON = "application/json"
-_PICTURES = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG\r\n\x1a\n": "image/png", b"RIFF": "image/webp"}
 NO_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>khala view</title>
 <h1>The page is not built</h1><p>This checkout has no <code>khala/view/assets/index.html</code>:
 <code>make page</code> builds it. The answers are below <code>/api</code>.</p></html>
@@ -60,14 +59,14 @@ class Server:
     Args:
         sources: what can be opened.
         guard: who may ask.
-        advise: sends advice for a run, or is None.
+        advise: sends advice to the agents of a run; None if the view may not.
     """
 
     def __init__(
         self,
         sources: Sources,
         guard: Guard,
-        advise: Callable[[Opened, AdviceNote], Awaitable[None]] | None = None,
+        advise: Callable[[str, AdviceNote], Awaitable[None]] | None = None,
     ) -> None:
         self._sources, self._guard, self._advise = sources, guard, advise
         self._opened: OrderedDict[str, Opened] = OrderedDict()
@@ -147,10 +146,7 @@ class Server:
 
     async def _image(self, request: web.Request) -> web.Response:
         opened, digest = await self._run(request), request.match_info["sha256"]
-        data = await self._made(lambda: opened.image(digest))
-        kind = next((kind for magic, kind in _PICTURES.items() if data.startswith(magic)), None)
-        if kind is None:
-            raise web.HTTPNotFound(text="this is no picture\n")
+        kind, data = await self._made(lambda: opened.picture(digest))
         headers = {"Cache-Control": "private, max-age=86400, immutable"}
         return web.Response(body=data, content_type=kind, headers=headers)
 
@@ -179,10 +175,12 @@ class Server:
     async def _run(self, request: web.Request) -> Opened:
         """Return the recording that a path names, and begin to index one that is new."""
         name = request.match_info["run"]
-        if (opened := self._opened.get(name)) is not None:
+        if (known := self._opened.get(name)) is not None and not known.index.is_broken:
             self._opened.move_to_end(name)
-            return opened
-        opened = await self._made(lambda: self._sources.open(name, lambda: self._notice(name)))
+            return known
+        if known is not None:
+            await self._forget(name)
+        opened: Opened = await self._made(lambda: self._sources.open(name, lambda: self._notice(name)))
         if name in self._opened:  # two requests at once
             await asyncio.to_thread(opened.index.close)
             return self._opened[name]
@@ -196,9 +194,12 @@ class Server:
 
     async def _close_oldest(self) -> None:
         while len(self._opened) > MOST_OPEN:
-            name, oldest = self._opened.popitem(last=False)
-            del self._changed[name]
-            await asyncio.to_thread(oldest.close)
+            await self._forget(next(iter(self._opened)))
+
+    async def _forget(self, name: str) -> None:
+        oldest = self._opened.pop(name)
+        del self._changed[name]
+        await asyncio.to_thread(oldest.close)
 
     def _notice(self, name: str) -> None:
         """Note in another thread that there is more in an index."""
@@ -242,10 +243,11 @@ class Server:
                     await asyncio.wait_for(changed.wait(), 1.0)
 
     async def _advised(self, opened: Opened, text: str) -> Note:
-        if self._advise is None or not opened.can_advise:
-            return Note(ok=False, text="this view may not write to agents: start it with --adviser NAME")
+        if self._advise is None or not opened.may_advise:
+            what = "start it with --adviser NAME, an adviser that the task names"
+            return Note(ok=False, text=f"this view may not write to agents: {what}")
         try:
-            await self._advise(opened, AdviceNote.model_validate_json(text))
+            await self._advise(opened.run, AdviceNote.model_validate_json(text))
         except ValidationError:
             return Note(ok=False, text="this is no advice: it has a side, a recipient and a text")
         except KhalaError as error:

@@ -1,17 +1,21 @@
-"""What a view was asked to open: recordings by their ids, and experiments."""
+"""What a view was asked to open: recordings and experiments, by the ids under which the page asks for them.
+
+An id is a hash of a path that was found here: no path of a request ever names a file.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.view import library
+from khala.view import experiments, library
+from khala.view.library import run_id
 from khala.view.runs import NotThere, Opened
 from khala.view.wire import ExperimentView, Library
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
 
 class Sources:
@@ -21,53 +25,58 @@ class Sources:
         title: what was asked for.
         directory: whose recordings are listed; None lists only those that are opened.
         opened: recordings with which the page begins.
-        can_advise: whether the view may write to agents.
+        adviser: name of the adviser as which the page writes; "" for none.
     """
 
-    def __init__(
-        self, title: str, directory: Path | None, opened: Sequence[Path] = (), *, can_advise: bool = False
-    ) -> None:
-        self._title, self._directory, self._first = title, directory, tuple(opened)
-        self._can_advise = can_advise
-        self._paths = library.by_id(opened)
+    def __init__(self, title: str, directory: Path | None, opened: Sequence[Path] = (), *, adviser: str = "") -> None:
+        self.title = title
+        self._directory, self._first, self._adviser = directory, tuple(opened), adviser
+        self._recordings = {run_id(path): path for path in opened}
+        self._experiments: dict[str, Path] = {}
 
     def library(self) -> Library:
         """Return what can be opened."""
-        paths = list(self._listed())
-        self._paths |= library.by_id(paths)
+        found = library.found_in(self._directory) if self._directory else library.Found([], [])
+        paths = list(dict.fromkeys((*self._first, *found.recordings)))
+        self._recordings |= {run_id(path): path for path in paths}
+        self._experiments |= {run_id(path): path for path in found.experiments}
         return Library(
-            title=self._title,
+            title=self.title,
             runs=tuple(library.lines(paths, self._directory or Path())),
-            opened=tuple(library.run_id(path) for path in self._first),
+            experiments=tuple(experiments.listed(found.experiments)),
+            opened=tuple(run_id(path) for path in self._first),
         )
 
-    def open(self, id: str, changed: Callable[[], None]) -> Opened:  # noqa: A002  # as in the paths
-        """Return a recording by its id.
+    def open(self, id: str, changed: Callable[[], None] = lambda: None) -> Opened:  # noqa: A002  # as in the paths
+        """Return a recording.
 
         Raises:
-            NotThere: there is none.
+            NotThere: there is none of this id.
             RecordingError: it cannot be read.
         """
-        if id not in self._paths:
+        if id not in self._recordings:
             self.library()
-        if (path := self._paths.get(id)) is None:
+        if (path := self._recordings.get(id)) is None:
             raise NotThere("there is no such recording here")
-        return Opened(id, path, changed=changed, can_advise=self._can_advise)
+        return Opened(id, path, library.shown(path, self._directory), changed=changed, adviser=self._adviser)
 
     def experiment(self, id: str) -> ExperimentView:  # noqa: A002  # as in the paths
         """Return the table of an experiment.
 
         Raises:
-            NotThere: there is none.
+            NotThere: there is none of this id.
+            KhalaError: it cannot be read, or no match of it was played.
         """
-        raise NotThere(f"there is no experiment {id!r} here")
+        if id not in self._experiments:
+            self.library()
+        if (path := self._experiments.get(id)) is None:
+            raise NotThere("there is no such experiment here")
+        from khala.view.table import experiment_view  # noqa: PLC0415  # SciPy takes a second
 
-    def _listed(self) -> Iterable[Path]:
-        below = library.recordings(self._directory) if self._directory else []
-        return dict.fromkeys((*self._first, *below))
+        return experiment_view(path, self._directory or path)
 
 
-def find(given: Sequence[str], runs: Path) -> Sources:
+def find(given: Sequence[str], runs: Path, *, adviser: str = "") -> Sources:
     """Return what names on the command line stand for: recordings, directories, runs below `runs`.
 
     Raises:
@@ -77,15 +86,19 @@ def find(given: Sequence[str], runs: Path) -> Sources:
         raise ConfigError(f"at most two can be seen side by side, and these are {len(given)}: name one or two")
     if not given:
         if not runs.is_dir():
-            raise ConfigError(f"there is no directory {runs}: name a recording or a directory, or play with `khala run`")
-        return Sources(str(runs), runs)
+            raise ConfigError(
+                f"there is no directory {runs}: name a recording or a directory, or play with `khala run`"
+            )
+        return Sources(str(runs), runs, adviser=adviser)
     places = [_place(name, runs) for name in given]
     directories = [place for place in places if place.is_dir()]
     if directories and len(places) > 1:
-        raise ConfigError(f"{directories[0]} holds several recordings: name two recordings to see them side by side")
+        raise ConfigError(
+            f"{directories[0]} holds no recording or several: name two recordings to see them side by side"
+        )
     if directories:
-        return Sources(given[0], directories[0])
-    return Sources(" and ".join(given), None, places)
+        return Sources(given[0], directories[0], adviser=adviser)
+    return Sources(" and ".join(given), None, places, adviser=adviser)
 
 
 def _place(name: str, runs: Path) -> Path:
@@ -93,6 +106,8 @@ def _place(name: str, runs: Path) -> Path:
     path = next((path for path in (Path(name), runs / name) if path.exists()), None)
     if path is None:
         raise ConfigError(f"there is no {name}, nor {runs / name}: name a recording, a directory or a run")
-    if path.is_dir() and len(found := library.recordings(path)) == 1:
-        return found[0]
+    if path.is_dir():
+        found = library.found_in(path)
+        return found.recordings[0] if len(found.recordings) == 1 and not found.experiments else path
+    library.read_head(path)  # says at once what is no recording
     return path

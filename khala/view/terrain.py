@@ -6,18 +6,20 @@ size of the map; otherwise pairs of units tell it, for an observation has their 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import contextlib
+from itertools import islice
+from typing import TYPE_CHECKING
 
-from pydantic_core import from_json
-
-from khala.view.scan import WRONG
+from khala_protocol.codec import decode_as
+from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
-from khala_protocol.messages import GridView, ResourceMark, Terrain
+from khala_protocol.messages import GridView, Observation, ResourceMark, Terrain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from khala.view.index import Index, Spot
+    from khala_protocol.messages import TeamView, View
 
 MINIMAP = 64.0
 USUAL = 64 / 152
@@ -40,51 +42,47 @@ def scale_of(index: Index, episode: int) -> float:
     """Return cells of the minimap frame per world unit."""
     if (spot := recorded(index, episode)) is not None:
         try:
-            said = from_json(index.payload(spot))
-            return float(said.get("minimap", MINIMAP)) / float(max(said["size"]))
-        except (*WRONG, ZeroDivisionError):
+            said = decode_as(Terrain, index.payload(spot))
+            return said.minimap / max(*said.size, 1)
+        except PeerError:
             return USUAL
-    scales = sorted(scale for view in _views(index, episode) for scale in _scales(view))
-    return scales[len(scales) // 2] if scales else USUAL
+    return _scale(_views(index, episode))
 
 
 def from_views(index: Index, run: str, episode: int) -> Terrain:
     """Return a terrain without heights: its size, its bounds, and the resources that were seen."""
-    scale = scale_of(index, episode)
+    views = list(_views(index, episode))
+    scale = _scale(views)
     side = round(MINIMAP / scale)
-    bounds, resources = (0.0, 0.0, MINIMAP, MINIMAP), {}
-    for view in _views(index, episode):
-        bounds = tuple(view.get("bounds") or bounds)
-        for team in view["teams"]:
-            resources |= {unit["tag"]: unit for unit in team.get("resources", ())}
-    marks = tuple(
-        ResourceMark(int(tag, 16), unit["type"], *unit["minimap"], round(_RESOURCE_RADIUS * scale, 2))
-        for tag, unit in resources.items()
-    )
+    seen = {unit.tag: unit for view in views for team in view.teams for unit in team.resources}
     return Terrain(
-        run=run, episode=episode, size=(side, side), bounds=bounds, height=_NOTHING, walkable=_NOTHING, resources=marks
+        run=run,
+        episode=episode,
+        size=(side, side),
+        bounds=views[0].bounds if views else (0.0, 0.0, MINIMAP, MINIMAP),
+        height=_NOTHING,
+        walkable=_NOTHING,
+        resources=tuple(
+            ResourceMark(int(tag, 16), unit.type, *unit.minimap, round(_RESOURCE_RADIUS * scale, 2))
+            for tag, unit in seen.items()
+        ),
     )
 
 
-def _views(index: Index, episode: int) -> Iterator[dict[str, Any]]:
-    for found in list(index.at(Topic.OBSERVATION, episode, 0, FARTHEST_LOOK))[:FARTHEST_LOOK]:
-        try:
-            view = from_json(index.payload(found.spot))["view"]
-            if isinstance(view["teams"], list):
-                yield view
-        except WRONG:
-            continue
+def _views(index: Index, episode: int) -> Iterator[View]:
+    for found in islice(index.at(Topic.OBSERVATION, episode, 0, FARTHEST_LOOK), FARTHEST_LOOK):
+        with contextlib.suppress(PeerError):
+            yield decode_as(Observation, index.payload(found.spot)).view
 
 
-def _scales(view: dict[str, Any]) -> Iterator[float]:
-    """Yield cells per world unit, of pairs of units far from each other on a screen of world units."""
-    for team in view["teams"]:
-        units = [unit for group in ("units", "allies", "enemies", "resources") for unit in team.get(group, ())]
-        for axis in (0, 1):
-            yield from _scale(units, axis)
+def _scale(views: Iterable[View]) -> float:
+    scales = sorted(scale for view in views for team in view.teams for axis in (0, 1) for scale in _apart(team, axis))
+    return scales[len(scales) // 2] if scales else USUAL
 
 
-def _scale(units: Iterable[dict[str, Any]], axis: int) -> Iterator[float]:
-    places = sorted((unit["screen"][axis], unit["minimap"][axis]) for unit in units)
+def _apart(team: TeamView, axis: int) -> Iterator[float]:
+    """Yield cells per world unit, of the units that are farthest from each other on a screen of world units."""
+    units = (*team.units, *team.allies, *team.enemies, *team.resources)
+    places = sorted((unit.screen[axis], unit.minimap[axis]) for unit in units)
     if places and (apart := places[-1][0] - places[0][0]) >= _NEAREST and places[-1][1] > places[0][1]:
         yield (places[-1][1] - places[0][1]) / apart

@@ -10,7 +10,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, get_args
 
-from khala.view.digest import centre, counted, pairs
+from khala.view.digest import counted
 from khala.view.wire import Curve, CurveName, Mark, Timeline
 from khala_protocol.keys import Topic
 from khala_protocol.messages import LOOPS_PER_S
@@ -33,16 +33,23 @@ SMALLEST_FIGHT = 150.0
 class _Fight:
     """Losses that belong together."""
 
-    losses: list[tuple[int, str, float, Point | None]] = field(default_factory=list)
+    step: int
+    """In which it began."""
     last_s: float = 0.0
+    lost: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    """Minerals and vespene, by side."""
+    _placed: float = 0.0
+    _sum_x: float = 0.0
+    _sum_y: float = 0.0
 
     @property
     def value(self) -> float:
-        return sum(value for _, _, value, _ in self.losses)
+        return sum(self.lost.values())
 
     @property
     def at(self) -> Point | None:
-        return centre((*at, value) for _, _, value, at in self.losses if at is not None)
+        """Its middle, as the places of larger losses count for more."""
+        return (self._sum_x / self._placed, self._sum_y / self._placed) if self._placed else None
 
     def takes(self, time_s: float, at: Point | None) -> bool:
         """Return whether a loss belongs to it."""
@@ -50,14 +57,21 @@ class _Fight:
         near = at is None or middle is None or max(abs(at[0] - middle[0]), abs(at[1] - middle[1])) <= FIGHT_CELLS
         return time_s - self.last_s <= FIGHT_GAP_S and near
 
+    def add(self, time_s: float, side: str, value: float, at: Point | None) -> None:
+        """Take a loss in."""
+        self.last_s = time_s
+        self.lost[side] += value
+        if at is not None:
+            weight = value or 1.0
+            self._placed += weight
+            self._sum_x += weight * at[0]
+            self._sum_y += weight * at[1]
+
     def mark(self) -> Mark:
         """Return the mark: of the side that lost most, with what each of them lost."""
-        lost: dict[str, float] = defaultdict(float)
-        for _, side, value, _ in self.losses:
-            lost[side] += value
-        text = ", ".join(f"{side} lost {value:g}" for side, value in sorted(lost.items()))
-        most = max(lost, key=lambda side: lost[side])
-        return Mark(step=self.losses[0][0], kind="fight", side=most, text=text, weight=self.value, at=_rounded(self.at))
+        text = ", ".join(f"{side} lost {value:g}" for side, value in sorted(self.lost.items()))
+        most = max(self.lost, key=lambda side: self.lost[side])
+        return Mark(step=self.step, kind="fight", side=most, text=text, weight=self.value, at=_rounded(self.at))
 
 
 def timeline(index: Index, episode: int) -> Timeline:
@@ -95,15 +109,13 @@ def _loops(rows: Sequence[dict[str, Any]]) -> list[int]:
 
 
 def _curves(rows: Sequence[dict[str, Any]]) -> Iterator[Curve]:
-    values: dict[tuple[str, str], list[float | None]] = {}
-    for number, row in enumerate(rows):
-        for name, side, value in pairs(row):
-            values.setdefault((name, side), [None] * len(rows))[number] = value
     order = {name: number for number, name in enumerate(get_args(CurveName))}
-    for name, side in sorted((one for one in values if one[0] in order), key=lambda one: (order[one[0]], one[1])):
-        column = values[name, side]
-        if any(value is not None for value in column):
-            yield Curve(name=name, side=side, values=tuple(column))  # type: ignore[arg-type]  # one of its names
+    keys = {key: key.partition("/") for key in set().union(*rows)}
+    known = {key: (name, side) for key, (name, _, side) in keys.items() if name in order}
+    for key in sorted(known, key=lambda key: (order[known[key][0]], known[key][1])):
+        values = [row.get(key) for row in rows]
+        if any(value is not None for value in values):
+            yield Curve(name=known[key][0], side=known[key][1], values=tuple(values))
 
 
 def _marks(index: Index, episode: int, times_s: dict[int, float]) -> Iterator[Mark]:
@@ -126,7 +138,7 @@ def _deaths(losses: Iterable[tuple[int, str, str, float, Point | None]]) -> Iter
     for step, side, kind, _, at in losses:
         groups[step, side].append((kind, at))
     for (step, side), those in groups.items():
-        at = _rounded(centre((*place, 1.0) for _, place in those if place is not None))
+        at = _rounded(_middle([place for _, place in those if place is not None]))
         text = f"{counted(kind for kind, _ in those)} died"
         yield Mark(step=step, kind="death", side=side, text=text, weight=len(those), at=at)
 
@@ -140,10 +152,15 @@ def _fights(losses: Iterable[tuple[int, str, str, float, Point | None]], times_s
         open_ = [fight for fight in open_ if time_s - fight.last_s <= FIGHT_GAP_S]
         fight = next((fight for fight in open_ if fight.takes(time_s, at)), None)
         if fight is None:
-            open_.append(fight := _Fight())
-        fight.losses.append((step, side, value, at))
-        fight.last_s = time_s
+            open_.append(fight := _Fight(step))
+        fight.add(time_s, side, value, at)
     yield from (fight.mark() for fight in (*over, *open_) if fight.value >= SMALLEST_FIGHT)
+
+
+def _middle(places: Sequence[Point]) -> Point | None:
+    if not places:
+        return None
+    return sum(x for x, _ in places) / len(places), sum(y for _, y in places) / len(places)
 
 
 def _rounded(at: Point | None) -> Point | None:

@@ -40,8 +40,8 @@ from khala_protocol.messages import (
 MOST_SCENES = 64
 """Scenes in one answer."""
 SCENES_AT_ONCE = 16
-"""Scenes that the page asks for: always `from` a multiple of it `to` the last step before the next multiple, also beyond
-the end of the episode, so that an export can hold the same paths."""
+"""Scenes that the page asks for: always `from` a multiple of it `to` the last step before the next multiple, also
+beyond the end of the episode, so that an export can hold the same paths."""
 
 CurveName = Literal[
     "army_value", "workers", "supply_used", "supply_cap", "minerals", "vespene", "income_minerals", "income_vespene",

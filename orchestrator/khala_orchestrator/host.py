@@ -6,9 +6,10 @@ host may be its own router, and the game, because only its caller knows which on
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import gc
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from khala_orchestrator.advisers import AdviceInbox
 from khala_orchestrator.announce import Announcer
@@ -26,6 +27,7 @@ from khala_protocol.recording import Recorder
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Sequence
     from pathlib import Path
+    from types import TracebackType
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
     from khala_orchestrator.roster import Seat
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Briefing, Message, Report, Result, Scene, Terrain, Wire
+
+_LONG_STEP_S = 0.5
+"""After this time, the recording of a step is flushed before its end; a part of a step compresses a little less."""
 
 
 async def host(
@@ -77,7 +82,7 @@ async def host(
         await announcer.run(card)
         flush()  # a host that is killed before its first report can be resumed, too
         watch(card)
-        observer = _PublishingObserver(announcer, watch, flush)
+        observer = stack.enter_context(_PublishingObserver(announcer, watch, flush))
         scenery = Scenery(config.task, config.run, game, observer)
         match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock), scenery)
         for briefing in match.briefings(past.episode if past else 0):  # by which agents know that the host is there
@@ -131,6 +136,9 @@ def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> A
 class _PublishingObserver:
     """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
 
+    While a step takes long, what there is of it is flushed, too: who follows the file sees the map that agents think
+    about. A context manager.
+
     Attributes:
         live: False while a recording is played again: then it only keeps the briefings, and the map of the open step.
     """
@@ -142,7 +150,20 @@ class _PublishingObserver:
         self._held: list[Briefing] = []
         self._terrain: Terrain | None = None
         self._scene: Scene | None = None
+        self._flushing: asyncio.TimerHandle | None = None
         self.live = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop_flushing()
+
+    def _stop_flushing(self) -> None:
+        if self._flushing is not None:
+            self._flushing.cancel()
 
     async def go_live(self) -> None:
         """Publish from now on, beginning with the briefings of the episode and its map."""
@@ -169,6 +190,7 @@ class _PublishingObserver:
     async def scene(self, scene: Scene) -> None:
         if self.live:
             await self._announcer.scene(scene)
+            self._flushing = asyncio.get_running_loop().call_later(_LONG_STEP_S, self._flush)
         else:
             self._scene = scene
 
@@ -178,6 +200,7 @@ class _PublishingObserver:
 
     async def report(self, report: Report) -> None:
         if self.live:
+            self._stop_flushing()
             await self._announcer.report(report)
             self._flush()
             self._watch(report)

@@ -175,7 +175,7 @@ class RecordedTurn:
         sent = {(one.side, one.agent): encode(one).decode() for one in observations}
         missing = dict(sent)
         for sample in step.samples:
-            message = sample.message
+            message = sample.message if sample.is_of(Observation) else None
             if not isinstance(message, Observation) or message.step != step.step:
                 continue  # a host that goes on after it was killed asks again what was open, maybe for some steps
             now, recorded = sent.get((message.side, message.agent), ""), sample.payload.decode()
@@ -196,7 +196,7 @@ def accepted_replies(recording: Recording) -> dict[tuple[int, int, Seat], Reply]
     """
     replies: dict[tuple[int, int, Seat], Reply] = {}
     for sample in recording:
-        match sample.message:
+        match sample.message if sample.is_of(Observation, Reply) else None:
             case Observation() as seen:
                 replies.pop((seen.episode, seen.step, Seat(seen.side, seen.agent)), None)
             case Reply() as reply if sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):

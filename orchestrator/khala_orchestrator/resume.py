@@ -88,7 +88,7 @@ class Unfinished:
         left = self.sides * (1 if self.steps else 0)
         is_open = False
         for sample in self.recording:
-            message = sample.message
+            message = sample.message if sample.is_of(Report, ModelCall) else None
             if isinstance(message, Report) and (message.episode, message.step) == last:
                 left -= 1
             elif left == 0 and _is_of_the_episode(sample, self.episode):

@@ -15,7 +15,18 @@ from rich.text import Text
 from khala_orchestrator.console import STATUS, card, clock, side, speaker, table, two_sides, visible_message
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.messages import AgentReport, ImageRef, Message, Observation, Reply, Report, Result, Run
+from khala_protocol.messages import (
+    AgentReport,
+    ImageRef,
+    Message,
+    Observation,
+    Reply,
+    Report,
+    Result,
+    Run,
+    Scene,
+    Terrain,
+)
 from khala_protocol.recording import Recording, read
 from khala_protocol.visible import visible_line
 
@@ -80,6 +91,8 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
     """
     named = False
     for recorded in read(path):
+        if recorded.is_of(Terrain, Scene):
+            continue
         match recorded.message and visible_message(recorded.message):
             case Run() as run:
                 named = two_sides(run)
@@ -105,8 +118,8 @@ def summary(path: Path, selection: StepSelection) -> dict[str, Any]:
     found: dict[str, list[Wire]] = {"run": [], "result": [], "report": []}
     topics: Counter[str] = Counter()
     for recorded in read(path):
-        message = recorded.message
         topics[recorded.key] += 1
+        message = recorded.message if recorded.is_of(Run, Result, Report) else None
         if isinstance(message, Run | Result) or (isinstance(message, Report) and selection.holds(message.step)):
             found[message.kind].append(message)
     plain = {kind: [message.model_dump(mode="json") for message in messages] for kind, messages in found.items()}

@@ -284,6 +284,8 @@ export interface PlayerMark {
   upgrades: string[];
 }
 
+export type PowerMark = [player: number, x: number, y: number, radius: number];
+
 /** Server → page: there is more to see. */
 export interface Progress {
   kind: "progress";
@@ -373,14 +375,17 @@ export interface Scene {
   game_loop: number;
   /** The sides that Khala plays, in the order of the bits of `UnitMark.seen_by`. */
   sides: string[];
-  /** Whether the game was asked for the map without fog; otherwise it is what the sides know together. */
+  /**
+   * Whether it has all units: the game showed the map without fog, or all players are Khala's. Otherwise it is what
+   * the sides know together.
+   */
   whole: boolean;
   players: PlayerMark[];
   /** Units and structures, without the resources of the map. */
   units: UnitMark[];
   effects: EffectMark[];
-  /** Power fields: player, x, y, radius. */
-  power: [number, number, number, number][];
+  /** Power fields of the sides. */
+  power: PowerMark[];
   /** Tags of the terrain's resources that are no longer there, as far as anybody knows. */
   gone: number[];
   /** 1 where creep is; None if there is none. */

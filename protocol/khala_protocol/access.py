@@ -15,6 +15,7 @@ certificate may order matches, and the observer's may list and watch them; its w
 directory of their own.
 
 Report and run card are not for agents: one has the accepted calls of all of them, the other the task of both sides.
+Terrain and scenes are for neither agents nor advisers: they have the map of both sides, without fog.
 Messages reach an agent in its observations.
 A rule covers a key only if it includes it, and `**` does not include a part that begins with `@`, such as those under
 which Zenoh keeps what late joiners ask for; so each key stands here with and without them.

@@ -1051,12 +1051,16 @@ class GridView(Frozen):
 
 
 class ResourceMark(NamedTuple):
-    """A mineral field, a geyser or a rock of the map."""
+    """A mineral field, a geyser, a rock or a tower of the map, that belongs to nobody; a list in JSON."""
 
     tag: int
+    """As the game names it to who sees it; it may have another one in somebody's memory."""
     type: str
+    """Name of its type, `MineralField`."""
     x: float
+    """In the minimap frame."""
     y: float
+    """In the minimap frame."""
     radius: float
     """In cells of the minimap frame."""
 
@@ -1099,22 +1103,32 @@ class UnitFlag(IntFlag):
 
 
 class UnitMark(NamedTuple):
-    """One unit of a scene; positions and lengths in the minimap frame."""
+    """One unit of a scene, a list in JSON; positions and lengths in the minimap frame."""
 
     tag: int
+    """The game's own number of the unit, constant for the whole episode."""
     type: str
+    """Name of its type, `Stalker`."""
     player: int
     """Number of its player, from 1; 16 for nobody."""
     x: float
+    """Of its middle."""
     y: float
+    """Of its middle."""
     radius: float
+    """0 if the game has none for it."""
     facing: float
     """Direction in radians from east, clockwise as seen on the screen."""
     health: float
+    """0, as the following ones, where `health_max` is 0."""
     health_max: float
+    """0 if nobody knows: of what is in the fog of all sides, the game tells places and types."""
     shield: float
+    """Shield points."""
     shield_max: float
+    """0 for a unit without shields."""
     energy: float
+    """0 for a unit without energy."""
     progress: float
     """Of its construction, 0 to 1."""
     flags: int
@@ -1128,17 +1142,35 @@ class UnitMark(NamedTuple):
     to_x: float
     """Where its order leads; -1 for nowhere."""
     to_y: float
+    """Where its order leads; -1 for nowhere."""
 
 
 class EffectMark(NamedTuple):
-    """An effect on the ground: a storm, a bile, a cloud."""
+    """An effect on the ground, a list in JSON: a storm, a bile, a cloud."""
 
     name: str
+    """As PySC2 has it, `PsiStorm`."""
     player: int
     """Number of the player whose it is; 0 if unknown."""
     x: float
+    """In the minimap frame."""
     y: float
+    """In the minimap frame."""
     radius: float
+    """In cells of the minimap frame; 0 if the game has none for it."""
+
+
+class PowerMark(NamedTuple):
+    """A power field, a list in JSON."""
+
+    player: int
+    """Number of the player whose it is."""
+    x: float
+    """In the minimap frame."""
+    y: float
+    """In the minimap frame."""
+    radius: float
+    """In cells of the minimap frame."""
 
 
 class PlayerMark(Frozen):
@@ -1174,13 +1206,14 @@ class Scene(Wire):
     sides: tuple[str, ...]
     """The sides that Khala plays, in the order of the bits of `UnitMark.seen_by`."""
     whole: bool
-    """Whether the game was asked for the map without fog; otherwise it is what the sides know together."""
+    """Whether it has all units: the game showed the map without fog, or all players are Khala's. Otherwise it is what
+    the sides know together."""
     players: tuple[PlayerMark, ...]
     units: tuple[UnitMark, ...]
     """Units and structures, without the resources of the map."""
     effects: tuple[EffectMark, ...] = ()
-    power: tuple[tuple[int, float, float, float], ...] = ()
-    """Power fields: player, x, y, radius."""
+    power: tuple[PowerMark, ...] = ()
+    """Power fields of the sides."""
     gone: tuple[int, ...] = ()
     """Tags of the terrain's resources that are no longer there, as far as anybody knows."""
     creep: GridView | None = None

@@ -107,6 +107,8 @@ BAD = [
     ("llm --fault teapot=2", "teapot"),
     ("replay missing.mcap", "missing.mcap: there is no such file"),
     ("replay bad.yaml", "bad.yaml is no recording"),
+    ("view nosuch", "there is no nosuch, nor runs/nosuch: name a recording, a directory or a run"),
+    ("view --host 0.0.0.0", "give --password, or --https CERT KEY"),
     ("replay missing.mcap --steps soon", "'soon' names no steps"),
     ("sc2 install file/below", "file"),
 ]

@@ -16,7 +16,7 @@ from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic
-from khala_protocol.messages import ModelCall, Observation, Reply, Report, Run
+from khala_protocol.messages import ModelCall, Observation, Reply, Report, Run, Scene, Terrain
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
@@ -89,6 +89,8 @@ async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
             assert [_plain(result) for result in again] == [_plain(result) for result in results]
             assert digest(Recording.open(path)) == digest(Recording.open(whole))
         assert [report.step for report in Recording.open(path).of(Report)] == [0, 1, 2, 3, 4] * 2
+        assert [scene.step for scene in Recording.open(path).of(Scene)] == [0, 1, 2, 3, 4] * 2
+        assert {terrain.episode for terrain in Recording.open(path).of(Terrain)} == {0, 1}
 
 
 async def test_a_host_that_is_killed_before_its_first_report_can_be_resumed(

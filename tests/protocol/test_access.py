@@ -26,7 +26,7 @@ Sessions = Callable[[str], Awaitable[ZenohBus]]
 
 A, B, RED, ADA = "khala/r/blue/A", "khala/r/blue/B", "khala/r/red/C", "khala/r/blue/Ada"
 TOPICS = [
-    "khala/r/run", "khala/r/result", "khala/r/report", "khala/other/run",
+    "khala/r/run", "khala/r/result", "khala/r/report", "khala/r/terrain", "khala/r/scene", "khala/other/run",
     *(f"{who}/{topic}" for who in (A, B, RED)
       for topic in ("briefing", "observation", "image/0", "reply", "exchange", "message", "advice")),
     f"{ADA}/advice",

@@ -69,6 +69,8 @@ def values(  # noqa: PLR0911  # one a type
         return st.tuples(*map(values, arguments))
     if origin is dict:
         return st.dictionaries(*map(values, arguments), max_size=2)
+    if hasattr(annotation, "_fields"):
+        return st.builds(annotation, **{name: values(hint) for name, hint in get_type_hints(annotation).items()})
     assert isinstance(annotation, type) and issubclass(annotation, Frozen), annotation
     return built(annotation)
 

@@ -15,7 +15,7 @@ from khala_bridge.overview.grids import joined, packed, value_at
 from khala_bridge.overview.marks import ARMY, WORKER, Pen
 from khala_bridge.overview.terrain import is_ground
 from khala_bridge.state import Alliance, Display
-from khala_protocol.messages import EffectMark, PlayerMark, Scene
+from khala_protocol.messages import EffectMark, PlayerMark, PowerMark, Scene
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -194,10 +194,10 @@ def _owner(effect: Effect, snapshot: Snapshot) -> int:
     return effect.owner or (snapshot.player.player_id if effect.alliance is _OWN else 0)
 
 
-def _power(sides: Sequence[Watched], pen: Pen) -> Iterator[tuple[int, float, float, float]]:
+def _power(sides: Sequence[Watched], pen: Pen) -> Iterator[PowerMark]:
     for side in sides:
         for source in side.now.power_sources:
-            yield side.now.player.player_id, *pen.place(source.pos), pen.length(source.radius)
+            yield PowerMark(side.now.player.player_id, *pen.place(source.pos), pen.length(source.radius))
 
 
 def _gone(sides: Sequence[Watched], whole: Snapshot | None, terrain: Terrain, pen: Pen) -> set[int]:

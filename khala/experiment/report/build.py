@@ -110,13 +110,14 @@ def _place(experiment: Experiment, one: Summary) -> list[int]:
     ]
 
 
-def _planned(experiment: Experiment) -> int:
+def planned(experiment: Experiment) -> int:
+    """Return the number of matches of the whole grid."""
     return len(list(planned_cells(experiment))) * len(experiment.seeds) * experiment.repetitions
 
 
 def _missing(experiment: Experiment, played: int) -> list[str]:
-    planned = _planned(experiment)
-    return [f"{planned - played} of {planned} matches were not played yet"] if played < planned else []
+    count = planned(experiment)
+    return [f"{count - played} of {count} matches were not played yet"] if played < count else []
 
 
 def _count(experiment: Experiment, summaries: Sequence[Summary], factors: Sequence[str]) -> str:

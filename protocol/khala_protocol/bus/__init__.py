@@ -9,7 +9,7 @@ nothing of a bus may be touched from another thread, or after a fork.
     │ Delivery │ used for                            │ a slow receiver      │ a receiver that joins later  │
     ├──────────┼─────────────────────────────────────┼──────────────────────┼──────────────────────────────┤
     │ STATE    │ briefing, observation, image, run,  │ loses old ones, is   │ gets the newest at once, and │
-    │          │ result                              │ counts them; never   │ after a lost link the newest │
+    │          │ result, terrain, scene              │ counts them; never   │ after a lost link the newest │
     │          │                                     │ slows a sender down  │ it missed                    │
     │ SPEECH   │ reply, advice                       │ the sender waits,    │ gets nothing from before     │
     │          │                                     │ half a second at most│                              │

@@ -16,6 +16,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header
 from mcap.stream_reader import MAGIC_SIZE
+from mcap.writer import MCAP0_MAGIC
 
 from khala_protocol.recording.recorder import LIBRARY
 from khala_protocol.recording.unpack import BROKEN, LARGEST_RECORD, Budget, chunk_bytes
@@ -70,8 +71,7 @@ class Scan:
 
     def chunks(self, file: BinaryIO) -> Iterator[PlacedChunk]:
         """Yield the chunks from `offset` on, up to the end of the file or to a record that is not whole yet."""
-        file.seek(0, 2)
-        size = file.tell()
+        size = file.seek(0, 2)
         try:
             while not self.ended and (head := record_at(file, self.offset, size)) is not None:
                 kind, content, end = head
@@ -117,8 +117,7 @@ def chunk_at(file: BinaryIO, offset: int) -> bytes:
     Raises:
         BROKEN: there is none, or it is not whole.
     """
-    file.seek(0, 2)
-    head = record_at(file, offset, file.tell())
+    head = record_at(file, offset, file.seek(0, 2))
     if head is None or head[0] != Opcode.CHUNK:
         raise McapError("there is no chunk at this place")
     chunk = Chunk.read(_stream(head[1]))
@@ -155,17 +154,22 @@ def payload_at(data: bytes, place: int) -> bytes:
 def footer(file: BinaryIO) -> Footer | None:
     """Return the footer of a file; None if it is torn, or still grows."""
     length = _HEAD.size + 20
-    file.seek(0, 2)
-    size = file.tell()
+    size = file.seek(0, 2)
     if size < 2 * MAGIC_SIZE + length:
         return None
-    head = record_at(file, size - MAGIC_SIZE - length, size)
-    return Footer.read(_stream(head[1])) if head is not None and head[0] == Opcode.FOOTER else None
+    file.seek(size - MAGIC_SIZE - length)
+    data = file.read()
+    is_one = data.startswith(_HEAD.pack(Opcode.FOOTER, 20)) and data.endswith(MCAP0_MAGIC)
+    return Footer.read(_stream(data[_HEAD.size : length])) if is_one else None
 
 
 def record_at(file: BinaryIO, offset: int, size: int) -> tuple[int, bytes, int] | None:
-    """Return kind, content and end of the record at this offset; None if it is not whole."""
-    if offset + _HEAD.size > size:
+    """Return kind, content and end of the record at this offset; None if it is not whole.
+
+    Raises:
+        BROKEN: it is larger than ours are.
+    """
+    if not 0 <= offset <= size - _HEAD.size:
         return None
     file.seek(offset)
     kind, length = _HEAD.unpack(file.read(_HEAD.size))

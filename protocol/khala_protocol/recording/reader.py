@@ -60,6 +60,10 @@ class Recorded:
         except PeerError:
             return None
 
+    def is_of(self, *kinds: type[Wire]) -> bool:
+        """Return whether its key is one of such messages, without decoding it: a scene of 100 units takes 1 ms."""
+        return self.address is not None and KINDS.get(self.address.topic) in kinds
+
     @cached_property
     def message(self) -> Wire | None:
         """The message; None if the bytes are not of this protocol, too many, or a picture."""
@@ -84,7 +88,8 @@ class RecordedStep:
 
     def of(self, kind: type[W]) -> tuple[W, ...]:
         """Return the messages of one kind that were recorded during this step, in order."""
-        return tuple(sample.message for sample in self.samples if isinstance(sample.message, kind))
+        samples = (sample for sample in self.samples if sample.is_of(kind))
+        return tuple(sample.message for sample in samples if isinstance(sample.message, kind))
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,7 @@ class Recording:
             RecordingError: there is no such file, or it is not a recording.
         """
         path = Path(path)
-        _require_recording(path)
+        require_recording(path)
         counts: Counter[str] = Counter()
         cards: list[Run] = []
         results: list[Result] = []
@@ -155,7 +160,7 @@ class Recording:
         """Yield all messages of one kind, of one agent or side or of all, in the order of the file."""
         for sample in self:
             address = sample.address
-            if address is None or KINDS.get(address.topic) is not kind or agent not in (None, address.agent):
+            if address is None or not sample.is_of(kind) or agent not in (None, address.agent):
                 continue
             if side not in (None, address.side):
                 continue
@@ -208,7 +213,7 @@ def read(path: Path | str) -> Iterator[Recorded]:
         RecordingError: there is no such file, or it is not a recording.
     """
     path = Path(path)
-    _require_recording(path)
+    require_recording(path)
     return (record for record in _records(path) if isinstance(record, Recorded))
 
 
@@ -225,7 +230,8 @@ def recover(path: Path | str, new_path: Path | str) -> Recording:
     return Recording.open(new_path)
 
 
-def _require_recording(path: Path) -> None:
+def require_recording(path: Path) -> None:
+    """Raise `RecordingError` unless there is a file at `path` that begins as a recording does."""
     try:
         check_regular(path)
         with path.open("rb") as file:

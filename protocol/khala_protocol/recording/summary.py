@@ -5,6 +5,7 @@ A file that is torn, or still grows, has no such end; then its first chunk alone
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -12,16 +13,21 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Statistics, SummaryOffset
+from mcap.records import Channel, Statistics, SummaryOffset
 
 from khala_protocol.errors import RecordingError
 from khala_protocol.recording.chunks import Scan, chunk_at, footer, record_at, samples_of
+from khala_protocol.recording.reader import require_recording
 from khala_protocol.recording.unpack import BROKEN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
+_CHUNK = struct.Struct("<QQQQI")
+"""Of a chunk's record in the index: first and last log time, offset, length, and bytes of the pairs that follow."""
+_PAIR = struct.Struct("<HQ")
+"""A channel, and the offset of its index."""
 _READ = (Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
 """Kinds of records of the summary that are read; the schemas are most of it."""
 
@@ -55,8 +61,9 @@ class Summary:
         """Return the summary of a recording.
 
         Raises:
-            RecordingError: it cannot be read.
+            RecordingError: there is no such file, or it is not a recording.
         """
+        require_recording(path)
         try:
             with path.open("rb") as file:
                 size = file.seek(0, 2)
@@ -87,8 +94,7 @@ class Summary:
                         channel = Channel.read(_stream(content))
                         keys[channel.id] = channel.topic
                     case Opcode.CHUNK_INDEX:
-                        index = ChunkIndex.read(_stream(content))
-                        chunks.append((index.chunk_start_offset, frozenset(index.message_index_offsets)))
+                        chunks.append(_chunk(content))
                     case Opcode.STATISTICS:
                         found = Statistics.read(_stream(content))
                         times = found.message_start_time, found.message_end_time
@@ -129,6 +135,13 @@ def _records(file: BinaryIO, offset: int, end: int) -> Iterator[tuple[int, bytes
     while offset < end and (found := record_at(file, offset, end)) is not None:
         kind, content, offset = found
         yield kind, content
+
+
+def _chunk(content: bytes) -> tuple[int, frozenset[int]]:
+    """Return offset and channels of a chunk; mcap's own reader takes ten times as long, for thousands of files."""
+    _, _, offset, _, size = _CHUNK.unpack_from(content)
+    pairs = content[_CHUNK.size : _CHUNK.size + size]
+    return offset, frozenset(channel for channel, _ in _PAIR.iter_unpack(pairs))
 
 
 def _stream(content: bytes) -> ReadDataStream:

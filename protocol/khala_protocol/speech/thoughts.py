@@ -33,4 +33,5 @@ def thought_of(reply: str) -> str:
             break
         if not text[begin : line.start()].strip():
             begin = heading.end
-    return reply[begin:end].strip()
+    thought = reply[begin:end].strip()
+    return thought.lstrip("*_# \n") if begin else thought

@@ -9,6 +9,7 @@ from s2clientprotocol import raw_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import casting
+from khala_simulator.api.observation import observe
 from khala_simulator.api.sight import Display
 from khala_simulator.combat import buffs
 from khala_simulator.process.client import command
@@ -52,6 +53,19 @@ def walk(table: Any, x: float) -> None:
 
 def test_what_was_never_seen_is_not_told(fogged: Any) -> None:
     assert units(fogged, alliance=raw_pb2.Enemy) == []
+
+
+@pytest.mark.parametrize("through_fog", [False, True])
+def test_a_death_in_the_fog_is_not_told_to_who_has_looked_through_it(fogged: Any, through_fog: bool) -> None:
+    world, tag = fogged.world, int(fogged.world.tag[fogged.pylon])
+    units(fogged)
+    seen = b"".join(observe(fogged.game, fogged.seat, disable_fog=through_fog))
+    told = sc.ResponseObservation.FromString(seen).observation.raw_data.units
+    assert (tag in {unit.tag for unit in told}) is through_fog
+    world.life[fogged.pylon] = 0
+    advance(world, 2)
+    assert tag in {death.tag for death in world.deaths}
+    assert list(fogged.observe().raw_data.event.dead_units) == []
 
 
 def test_a_structure_stays_as_a_snapshot_when_the_fog_closes(fogged: Any) -> None:

@@ -1,0 +1,48 @@
+"""The experiments of a directory, as a list shows them: without the code that plays and measures them.
+
+How many matches one plans is counted once for each state of its file, and kept with what is known of recordings.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+from typing import TYPE_CHECKING
+
+from khala.view.library import EXPERIMENT, cache
+from khala.view.wire import ExperimentLine
+from khala_protocol.errors import KhalaError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+def listed(directories: Sequence[Path]) -> list[ExperimentLine]:
+    """Return the lines of experiments; how many matches each plans is known until its file changes."""
+    with contextlib.closing(cache()) as db:
+        return [line for path in directories if (line := _experiment(path, db)) is not None]
+
+
+def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | None:
+    try:
+        changed, key = (directory / EXPERIMENT).stat().st_mtime_ns, str(directory.absolute())
+        known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
+        if known:
+            return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
+        from khala.view.table import line_of  # noqa: PLC0415  # it loads all that experiments need
+
+        line = line_of(directory)
+        db.execute("insert or replace into line values (?, 0, ?, ?)", (key, changed, line.model_dump_json()))
+    except (KhalaError, OSError, ValueError, sqlite3.Error):
+        return None
+    return line
+
+
+def _played(directory: Path) -> int:
+    path = directory / "index.sqlite"
+    if not path.exists():
+        return 0
+    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        count: int = db.execute("select count(*) from matches").fetchone()[0]
+        return count

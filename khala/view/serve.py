@@ -1,0 +1,177 @@
+"""Run a view: find what is to be seen, follow a match if it is on a bus, serve the page, or write it into a file."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import signal
+import ssl
+import sys
+import tempfile
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aiohttp import web
+
+from khala.exit_codes import SIGNALLED
+from khala.view.export import export
+from khala.view.guard import LOOPBACK, TOKEN, Guard
+from khala.view.server import Server, page
+from khala.view.sources import Sources, find
+from khala_orchestrator.console import stderr_console
+from khala_orchestrator.transcript import StepSelection
+from khala_protocol.errors import ConfigError
+from khala_protocol.joining import client_config
+from khala_protocol.signals import cancelled_by_signal
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Sequence
+
+RUNS = Path("runs")
+SWITCH_S = 0.001
+"""An index is made in a thread; answers wait no longer than this for Python's lock, a fifth of the usual."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What `khala view` was asked for; see its options."""
+
+    given: tuple[str, ...]
+    connect: tuple[str, ...] = ()
+    tls: Path | None = None
+    insecure: bool = False
+    adviser: str = ""
+    host: str = "127.0.0.1"
+    port: int = 0
+    password: str = ""
+    https: tuple[Path, Path] | None = None
+    opens: bool = True
+
+
+def run_view(look: Look) -> None:
+    """Serve until a signal ends it.
+
+    Raises:
+        KhalaError: there is nothing to be seen, or it cannot be served so.
+    """
+    guard, context = guard_of(look), _tls(look)
+    sys.setswitchinterval(SWITCH_S)
+    ended = asyncio.run(cancelled_by_signal(_view(look, guard, context)))
+    if isinstance(ended, signal.Signals):
+        raise SystemExit(SIGNALLED + ended)
+
+
+def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[str]) -> None:
+    """Write a view into a file.
+
+    Raises:
+        KhalaError: there is nothing to export, or too much.
+    """
+    if look.connect:
+        raise ConfigError("an export is of a recording: name one, or look at the match without --export")
+    part = StepSelection.of(None, steps)
+    size = export(find(look.given, RUNS), page(), path, first=part.first, last=part.last, agents=agents)
+    stderr_console().print(f"{path}: {size / 1e6:.1f} MB, opens in a browser without a server", soft_wrap=True)
+
+
+def guard_of(look: Look) -> Guard:
+    """Return the rules for who may ask.
+
+    Raises:
+        ConfigError: other machines could reach it without a password and without TLS.
+    """
+    near = is_loopback(look.host)
+    if not near and not look.password and look.https is None:
+        raise ConfigError(
+            f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
+            "or --https CERT KEY, or leave --host out and come by `ssh -L`"
+        )
+    return Guard(password=look.password, names=LOOPBACK if near else (), secure=look.https is not None)
+
+
+def is_loopback(host: str) -> bool:
+    """Return True if only this machine can reach the address."""
+    if host.casefold() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def _tls(look: Look) -> ssl.SSLContext | None:
+    if look.https is None:
+        return None
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    try:
+        context.load_cert_chain(*look.https)
+    except (OSError, ssl.SSLError) as error:
+        names = " and ".join(map(str, look.https))
+        raise ConfigError(f"--https: {names} are no certificate and its key in PEM: {error}") from None
+    return context
+
+
+async def _view(look: Look, guard: Guard, context: ssl.SSLContext | None) -> None:
+    async with contextlib.AsyncExitStack() as stack:
+        sources = await stack.enter_async_context(_sources(look))
+        advise = None
+        if look.adviser:
+            from khala.view.advice import Advisers  # noqa: PLC0415  # loads the native library of the bus
+
+            advisers = Advisers(look.adviser, look.connect, look.tls, insecure=look.insecure)
+            stack.push_async_callback(advisers.close)
+            advise = advisers.send
+        server = Server(sources, guard, advise)
+        runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
+        stack.push_async_callback(runner.cleanup)
+        await runner.setup()
+        await _listen(runner, look, context)
+        scheme = "https" if guard.secure else "http"
+        name = f"[{look.host}]" if ":" in look.host else look.host
+        address = f"{scheme}://{name}:{runner.addresses[0][1]}/?{TOKEN}={guard.token}"
+        stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
+        if look.opens:
+            with contextlib.suppress(webbrowser.Error):
+                await asyncio.to_thread(webbrowser.open, address)
+        await asyncio.Event().wait()
+
+
+async def _listen(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> None:
+    try:
+        await web.TCPSite(runner, look.host, look.port, ssl_context=context).start()
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise ConfigError(f"{look.host}:{look.port} cannot be served: {why}; --port names another port") from None
+
+
+@contextlib.asynccontextmanager
+async def _sources(look: Look) -> AsyncIterator[Sources]:
+    """Yield what is to be seen; a match on a bus is recorded meanwhile."""
+    if not look.connect:
+        yield find(look.given, RUNS, adviser=look.adviser)
+        return
+    from khala.view.live import Following, running_match  # noqa: PLC0415
+    from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415  # loads the native library
+    from khala_protocol.recording import Recorder  # noqa: PLC0415
+
+    if len(look.given) > 1:
+        raise ConfigError("one match is followed at a time: name one run, or none if only one is played there")
+    names = ("observer", "host")
+    bus = await open_bus(client_config(look.connect, tls=look.tls, names=names, insecure=look.insecure))
+    async with contextlib.AsyncExitStack() as stack:
+        stack.push_async_callback(bus.close)
+        name = look.given[0] if look.given else None
+        stderr_console().print(f"looking for {name or 'a match'} at {', '.join(bus.endpoints)}", soft_wrap=True)
+        card = await running_match(bus, name)
+        directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="khala-view-", ignore_cleanup_errors=True))
+        path = Path(directory) / f"{card.run}.mcap"
+        recorder = Recorder(path)
+        following = asyncio.create_task(Following(bus, card, recorder).follow(), name="follow")
+        try:
+            yield Sources(f"{card.run}, live", None, [path], adviser=look.adviser)
+        finally:
+            following.cancel()
+            await asyncio.wait([following])

@@ -1,0 +1,90 @@
+"""The table of an experiment, with a way to each recording.
+
+Nothing is computed here that a report does not compute: see `khala.experiment.report`, which takes a second to load.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from khala.experiment.report.build import planned, report
+from khala.experiment.store import FILE, INDEX, Store
+from khala.view.library import lines, run_id
+from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from khala.experiment.report.document import Table
+    from khala.experiment.report.summary import Summary
+    from khala.experiment.statistics import Interval
+    from khala.experiment.store import Played
+
+
+def line_of(directory: Path) -> ExperimentLine:
+    """Return an experiment as a list shows it.
+
+    Raises:
+        KhalaError: it cannot be read.
+    """
+    store = Store(directory)
+    experiment = store.experiment()
+    return ExperimentLine(
+        id=run_id(directory),
+        name=experiment.name,
+        description=experiment.description,
+        played=len(store.played()),
+        matches=planned(experiment),
+    )
+
+
+def experiment_view(directory: Path, below: Path) -> ExperimentView:
+    """Return the table of an experiment; its intervals are computed again only if a match was played since.
+
+    Raises:
+        KhalaError: it cannot be read, or no match of it was played.
+    """
+    return _view(directory, below, *((directory / name).stat().st_mtime_ns for name in (FILE, INDEX)))
+
+
+@lru_cache(maxsize=8)
+def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> ExperimentView:  # noqa: ARG001  # as they were
+    store = Store.opened(directory)
+    made, played = report(store), list(store.played().values())
+    table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
+    recordings = [directory / one.recording for one in played if one.recording]
+    return ExperimentView(
+        line=line_of(directory),
+        factors=table.columns[: table.words],
+        columns=table.columns[table.words :],
+        rows=tuple(_rows(table, made.summaries, played, directory)),
+        notes=(*made.document.paragraphs, *made.document.warnings, table.note),
+        runs=tuple(lines(recordings, below)),
+    )
+
+
+def _rows(table: Table, summaries: list[Summary], played: list[Played], directory: Path) -> Iterator[Row]:
+    columns = table.columns[table.words :]
+    for texts, one in zip(table.rows, summaries, strict=True):
+        cells = zip(columns, texts[table.words :], strict=True)
+        mine = [match for match in played if match.recording and match.cell.items() <= one.where.items()]
+        yield Row(
+            names=texts[: table.words],
+            games=one.games,
+            cells=tuple(_cell(column, text, one) for column, text in cells),
+            runs=tuple(run_id(directory / match.recording) for match in mine),
+        )
+
+
+def _cell(column: str, text: str, one: Summary) -> Cell:
+    intervals: dict[str, Interval] = {"won": one.won, "K/D": one.kd}
+    if (interval := intervals.get(column)) is None or interval.value is None:
+        return Cell(text=text)
+    return Cell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,147 @@
+"""Recordings of a directory are listed by their begin and their end, and what the command line names is found."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from typing import TYPE_CHECKING, BinaryIO
+
+import pytest
+
+from khala.view import library
+from khala.view.library import found_in, lines, read_head, run_id
+from khala.view.serve import Look, guard_of, is_loopback
+from khala.view.sources import Sources, find
+from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.recording import Recording, summary
+from khala_protocol.recording.chunks import chunk_at
+from khala_protocol.recording.summary import Summary
+from tests.khala.view.made import AGENT, RUN, STEPS, make
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_a_line_says_what_a_scan_of_the_whole_file_would(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap")
+    (line,) = lines([path], tmp_path)
+    recording = Recording.open(path)
+    assert recording.run is not None
+    assert (line.run, line.task, line.seed) == (RUN, recording.run.task, recording.run.seed)
+    assert line.outcomes == {"blue": ("win",)}
+    assert (line.complete, line.live, line.steps) == (True, False, STEPS)
+    assert line.game_s == recording.results[0].game_s
+    assert Summary.of(path).counts == dict(recording.counts)
+
+
+def test_a_summary_reads_the_begin_and_the_end_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = make(tmp_path / "made.mcap")
+    seen: list[int] = []
+
+    def noted(file: BinaryIO, at: int) -> bytes:
+        seen.append(at)
+        return chunk_at(file, at)
+
+    monkeypatch.setattr(summary, "chunk_at", noted)
+    read_head(path)
+    assert len(set(seen)) == 2  # the chunk of the run card, and that of the result
+
+
+def test_a_recording_that_is_torn_is_listed_by_its_begin(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap")
+    path.write_bytes(path.read_bytes()[:-100])
+    (line,) = lines([path], tmp_path)
+    assert (line.run, line.complete, line.outcomes) == (RUN, False, {})
+
+
+def test_what_is_known_of_a_recording_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = make(tmp_path / "made.mcap")
+    first = lines([path], tmp_path)
+    monkeypatch.setattr(library, "read_head", lambda _: pytest.fail("it was read again"))
+    assert lines([path], tmp_path) == first
+
+
+def test_one_that_changed_is_read_again(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap")
+    lines([path], tmp_path)
+    path.unlink()
+    make(path, steps=3)
+    assert lines([path], tmp_path)[0].steps == 3
+
+
+def test_a_directory_lists_what_is_below_it_and_nothing_else(tmp_path: Path) -> None:
+    path = make(tmp_path / "a" / "b" / "made.mcap", steps=1)
+    (tmp_path / "a" / "no.mcap").write_bytes(b"no recording")
+    (tmp_path / "notes.txt").write_text("notes")
+    (tmp_path / "loop").symlink_to(tmp_path)
+    found = found_in(tmp_path)
+    assert path in found.recordings
+    assert [line.path for line in lines(found.recordings, tmp_path)] == ["a/b/made.mcap"]
+
+
+def test_names_of_the_command_line_are_found(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    one = make(runs / "one" / "recording.mcap", steps=1)
+    two = make(runs / "two" / "recording.mcap", steps=1)
+    assert find(["one"], runs).library().opened == (run_id(one),)
+    assert find([str(one), "two"], runs).library().opened == (run_id(one), run_id(two))
+    assert {line.id for line in find([], runs).library().runs} == {run_id(one), run_id(two)}
+    assert find([str(runs)], runs).library().opened == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "error"),
+    [
+        (["none"], "there is no none, nor .*runs/none: name a recording, a directory or a run"),
+        (["a", "b", "c"], "at most two can be seen side by side, and these are 3"),
+        (["..", "one"], ".. holds no recording or several"),
+    ],
+)
+def test_what_is_not_there_is_said(
+    tmp_path: Path, given: list[str], error: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("one", "other"):
+        make(tmp_path / "runs" / name / "recording.mcap", steps=1)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with pytest.raises(ConfigError, match=error):
+        find(given, tmp_path / "runs")
+
+
+def test_a_file_that_is_no_recording_is_refused_at_once(tmp_path: Path) -> None:
+    (tmp_path / "no.mcap").write_bytes(b"no recording at all")
+    with pytest.raises(RecordingError, match="no recording"):
+        find([str(tmp_path / "no.mcap")], tmp_path)
+
+
+def test_without_runs_the_command_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=re.escape("play with `khala run`")):
+        find([], tmp_path / "runs")
+
+
+@pytest.mark.parametrize(
+    ("host", "near"),
+    [("127.0.0.1", True), ("localhost", True), ("::1", True), ("127.9.9.9", True), ("0.0.0.0", False),
+     ("::", False), ("10.0.0.5", False), ("table", False)],
+)  # fmt: skip
+def test_only_this_machine_may_look_without_a_password(host: str, near: bool) -> None:
+    assert is_loopback(host) is near
+    look = Look(given=(), host=host)
+    if near:
+        assert "127.0.0.1" in guard_of(look).names
+    else:
+        with pytest.raises(ConfigError, match="--password"):
+            guard_of(look)
+
+
+def test_agents_are_those_of_the_run_card(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap", steps=1)
+    opened = Sources("made", None, [path]).open(run_id(path))
+    assert [agent.name for agent in opened.agents()] == [AGENT]
+    opened.index.close()
+
+
+def test_a_recording_goes_with_its_directory(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap", steps=1)
+    other = shutil.copy(path, tmp_path / "copy.mcap")
+    assert run_id(path) != run_id(tmp_path / other)
