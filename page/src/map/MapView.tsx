@@ -9,7 +9,7 @@ import { palette } from "../theme";
 import { around, camera, type View } from "./camera";
 import { Minimap } from "./Minimap";
 import { Painter } from "./painter";
-import { unitAt, unitsIn } from "./pick";
+import { nextUnit, unitAt, unitsIn } from "./pick";
 import { listen, zoom, type Target } from "./pointer";
 import { Chosen, Tip } from "./Selection";
 import type { Spot } from "./spots";
@@ -55,7 +55,7 @@ function fit(painter: Painter): void {
 }
 
 const describe = (match: Match) =>
-  `Map of ${match.run.value?.line.map ?? "the match"}. Keys: W A S D move, plus and minus zoom, 0 shows all of it.`;
+  `Map of ${match.run.value?.line.map ?? "the match"}. Keys: W A S D move, plus and minus zoom, 0 shows all of it, U goes from unit to unit.`;
 
 const boxStyle = ([x0, y0, x1, y1]: readonly [number, number, number, number]) => ({
   left: `${Math.min(x0, x1)}px`,
@@ -83,6 +83,7 @@ function targetOf(painter: Painter, pointed: { value: Pointed | null }, frame: {
       chosen.value = new Set([...(add ? chosen.value : []), ...(spot ? [spot.unit.tag] : [])]);
       hover(x, y);
     },
+    next: (by) => (chosen.value = new Set(nextUnit(painter.spots, [...chosen.value][0], by))),
     box: (from, to, done) => {
       frame.value = done ? null : [...from, ...to];
       if (done) chosen.value = unitsIn(painter.spots, painter.view, from, to);
