@@ -218,7 +218,7 @@ def connect(path: Path, schema: str = SCHEMA) -> sqlite3.Connection:
 def prepare(path: Path, schema: str = SCHEMA, version: int = VERSION) -> None:
     """Make an empty index, unless there is a good one."""
     with contextlib.suppress(sqlite3.DatabaseError):
-        if path.exists():
+        if path.is_file() and not path.is_symlink():  # who made the recording may have put anything there
             with contextlib.closing(connect(path, schema)) as db:
                 if db.execute("pragma user_version").fetchone()[0] == version:
                     return

@@ -145,7 +145,7 @@ class Opened:
         """Return how far the match, and the index, are."""
         newest = self.index.rows("select episode, count(*) from step group by episode order by episode desc limit 1")
         episode, steps = newest[0] if newest else (0, 0)
-        live = self.line().live
+        live = read_head(self.path).live
         reported_ns = self.index.meta("reported_ns")
         lag_s = max(0.0, time.time() - reported_ns / 1e9) if live and reported_ns else None
         return Progress(episode=episode, steps=steps, indexed=self.indexed(), live=live, lag_s=lag_s)
@@ -201,8 +201,11 @@ class Opened:
         labels = card.labels if card else {}
         player = next((labels[name] for name in PLAYERS if name in labels), "")
         for agent in card.agents if card else ():
-            found = self.index.newest(Topic.BRIEFING, 0, agent.side, agent.name, 0)
-            briefing = self._read(Briefing, found.spot if found else None)
+            found = self.index.rows(
+                "select chunk, place from sample where topic = ? and side = ? and agent = ? "
+                "order by rowid desc limit 1", Topic.BRIEFING, agent.side, agent.name,
+            )  # fmt: skip
+            briefing = self._read(Briefing, Spot(*found[0]) if found else None)
             yield AgentLine(
                 side=agent.side,
                 name=agent.name,

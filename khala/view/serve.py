@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import ipaddress
 import signal
+import socket
 import ssl
 import sys
 import tempfile
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Sequence
 
 RUNS = Path("runs")
+EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104  # they are recognised, not listened on
 SWITCH_S = 0.001
 """An index is made in a thread; answers wait no longer than this for Python's lock, a fifth of the usual."""
 
@@ -130,13 +132,19 @@ async def _view(look: Look, guard: Guard, context: ssl.SSLContext | None) -> Non
         await runner.setup()
         await _listen(runner, look, context)
         scheme = "https" if guard.secure else "http"
-        name = f"[{look.host}]" if ":" in look.host else look.host
-        address = f"{scheme}://{name}:{runner.addresses[0][1]}/?{TOKEN}={guard.token}"
+        address = f"{scheme}://{_name(look.host)}:{runner.addresses[0][1]}/?{TOKEN}={guard.token}"
         stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
         if look.opens:
             with contextlib.suppress(webbrowser.Error):
                 await asyncio.to_thread(webbrowser.open, address)
         await asyncio.Event().wait()
+
+
+def _name(host: str) -> str:
+    """Return the name under which a browser finds the server."""
+    if host in EVERYWHERE:
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host
 
 
 async def _listen(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> None:

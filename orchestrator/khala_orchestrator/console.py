@@ -224,7 +224,8 @@ def _visible(value: Any) -> Any:
         case dict():
             return {_visible(key): _visible(item) for key, item in value.items()}
         case tuple() | list():
-            return type(value)(map(_visible, value))
+            make = getattr(value, "_make", type(value))  # a named tuple takes its fields one by one
+            return make(map(_visible, value))
     return value
 
 

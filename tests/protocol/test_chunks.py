@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import pytest
@@ -52,13 +53,12 @@ def test_a_sample_is_found_again_at_its_place(path: Path) -> None:
 
 
 def test_a_scan_goes_on_where_another_one_ended(path: Path) -> None:
-    first, found = Scan(), []
+    first, found, end = Scan(), [], 0
     with path.open("rb") as file:
-        chunks = first.chunks(file)
-        for _ in range(3):
-            chunk = next(chunks)
+        for chunk in itertools.islice(first.chunks(file), 3):
             found += [(first.keys[one.channel], one.payload) for one in first.samples(chunk)]
-    second = Scan(chunk.end, keys=first.keys, expected=first.expected)
+            end = chunk.end
+    second = Scan(end, keys=first.keys, expected=first.expected)
     assert found + scanned(path, second) == [(one.key, one.payload) for one in read(path)]
 
 

@@ -102,6 +102,17 @@ def test_one_with_values_of_somebody_else_makes_no_answer_lie(path: Path) -> Non
         found.moment(0, 3)
 
 
+def test_what_is_no_file_in_its_place_is_removed(path: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_text("of somebody else")
+    index_path(path).symlink_to(other)
+    assert len(opened(path).index.rows("select * from step")) == STEPS
+    assert other.read_text() == "of somebody else"
+    index_path(path).unlink()
+    os.mkfifo(index_path(path))
+    assert len(opened(path).index.rows("select * from step")) == STEPS
+
+
 def test_two_viewers_share_it(path: Path) -> None:
     index = Index(path)
     with contextlib.closing(Scanner(index, lambda: True)) as first, contextlib.closing(Scanner(index)) as second:
