@@ -100,6 +100,7 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
   const draw = () => {
     request = 0;
     const { width, height } = canvas.getBoundingClientRect();
+    if (!width || !height) return;
     const dots = Math.min(devicePixelRatio, 2);
     if (canvas.width !== Math.round(width * dots) || canvas.height !== Math.round(height * dots)) {
       canvas.width = Math.round(width * dots);
