@@ -44,7 +44,7 @@ function Bar({ match, other }: { match: Match | undefined; other: Match | undefi
       <a href="#" class="home">
         Khala
       </a>
-      {match && <span class="title">{[match, other].map((m) => m?.run.value && titleOf(m)).filter(Boolean).join("  |  ")}</span>}
+      {match && <h1 class="title">{[match, other].map((m) => m?.run.value && titleOf(m)).filter(Boolean).join("  |  ")}</h1>}
       {match && !other && episodes.length > 1 && (
         <select aria-label="Episode" value={match.episode} onChange={(e) => (location.hash = writeHash({ a: match.id, e: Number(e.currentTarget.value) }))}>
           {episodes.map((e) => (
