@@ -7,15 +7,18 @@ open    a recording of many decisions (`bench.long_recording`), first without an
         map and the decisions of that moment, over jumps all through the match; memory of the server and of the tab
 units   frames a second while a battle of `UNITS` units plays, and the longest frame
 live    a match that is played: milliseconds from the host's report of a step to the page that shows the step
-match   what a page costs the match that it watches over the bus, one that has next to no processor: milliseconds of the
-        host's own work a step (observe, publish, act), in turns with and without
+match   what a page costs the match that it watches over the bus, if its processor is `THROTTLE` times slower than ours:
+        milliseconds of the host's own work a step (observe, publish, act), in turns with and without, the match on one
+        core and the viewer on another
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import contextlib
 import json
+import os
 import random
 import statistics
 import sys
@@ -30,6 +33,8 @@ import psutil
 from bench.browser import Viewer, browsing, viewing
 from bench.long_recording import lengthen, played
 from bench.processes import Processes, free_port
+from khala_agents.scripted.players import PLAYERS
+from khala_orchestrator.config import load_task
 from khala_protocol.codec import encode
 from khala_protocol.messages import Report, Scene, UnitMark
 from khala_protocol.recording import Recorder, Recording
@@ -39,13 +44,17 @@ if TYPE_CHECKING:
 
     from playwright.sync_api import Browser, Page
 
+    from khala_protocol.messages import Briefing, Observation
+
 UNITS = 400
 JUMPS = 100
 PLAYED_S = 8.0
 ROUNDS = 3
+THOUGHT_S = 0.1
 THROTTLE = 20
 """How much slower the processor of the slow page is."""
 WAIT_MS = 300_000
+TASK = "3s5z"
 PARTS = ("open", "units", "live", "match")
 JUMP = """step => new Promise(done => {
     const begun = performance.now()
@@ -181,7 +190,7 @@ def _steps(page: Page) -> list[int]:
 
 def frames(browser: Browser, directory: Path) -> Frames:
     """Play a battle of many units on the page."""
-    path = crowded(played(directory / "battle", task="3s5z", steps=60), directory / "crowd.mcap")
+    path = crowded(played(directory / "battle", task=TASK, steps=60), directory / "crowd.mcap")
     with viewing(path) as viewer:
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(viewer.address)
@@ -215,10 +224,11 @@ def _beside(units: Sequence[UnitMark]) -> Iterator[UnitMark]:
 
 def lag(browser: Browser, directory: Path) -> Lag:
     """Watch a match that is played on this machine."""
+    directory.mkdir()
     with Processes(directory) as processes:
         path = directory / "live" / "recording.mcap"
         options = ("--run", "live", "--latency", "0.3", "--out", str(directory))
-        match = processes.start("live", "run", "3s5z", *options)
+        match = processes.start("live", "run", TASK, *options)
         while not path.exists():
             assert match.poll() is None, processes.last_words("live")
             time.sleep(0.05)
@@ -241,6 +251,8 @@ def lag(browser: Browser, directory: Path) -> Lag:
 
 def cost(browser: Browser, directory: Path) -> Cost:
     """Play matches without and with a slow page that watches over the bus."""
+    for child in psutil.Process().children(recursive=True):  # the browser
+        child.cpu_affinity([1 % (os.cpu_count() or 1)])
     work: dict[bool, list[float]] = {False: [], True: []}
     for turn in range(ROUNDS):
         for watched in (False, True):
@@ -248,22 +260,44 @@ def cost(browser: Browser, directory: Path) -> Cost:
     return Cost(statistics.median(work[False]), statistics.median(work[True]))
 
 
+async def decide(_: Briefing, observation: Observation) -> str:
+    """Play as `focus-fire` does, and think as long as a quick model."""
+    await asyncio.sleep(THOUGHT_S)
+    return PLAYERS["focus-fire"](observation.text, random.Random(observation.step))
+
+
 def _work_ms(browser: Browser, directory: Path, *, watched: bool) -> list[float]:
+    """Play a match; return the milliseconds of the host's own work in each step."""
     directory.mkdir(parents=True)
-    port = free_port()
-    endpoint = f"tcp/127.0.0.1:{port}"
-    with Processes(directory) as processes, contextlib.ExitStack() as stack:
-        options = ("--run", "cost", "--latency", "0.1", "--listen", endpoint, "--out", str(directory))
-        match = processes.start("cost", "run", "3s5z", *options)
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with Processes(directory) as processes, contextlib.ExitStack() as stack, _core(0):
+        host = processes.start("host", "host", TASK, "--run", "cost", "--listen", endpoint, "--out", str(directory))
+        names = [agent.name for agent in load_task(TASK).agents]
+        policy = f"{__spec__.name}:decide"
+        processes.start("agents", "agent", *names, "--run", "cost", "--connect", endpoint, "--policy", policy)
         if watched:
+            stack.enter_context(_core(1))
             viewer = stack.enter_context(viewing("cost", "--connect", endpoint))
             page = browser.new_page()
             stack.callback(page.close)
             page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": THROTTLE})
             page.goto(viewer.address)
-        match.wait(WAIT_MS / 1000)
-    reports = Recording.open(directory / "cost" / "recording.mcap").of(Report)
+        if host.wait(WAIT_MS / 1000):
+            raise RuntimeError(f"the host failed: {processes.last_words('host')}")
+    (recording,) = directory.glob("cost/*.mcap")
+    reports = Recording.open(recording).of(Report)
     return [1000 * (r.timings.observe_s + r.timings.publish_s + r.timings.act_s) for r in reports]
+
+
+@contextlib.contextmanager
+def _core(number: int) -> Iterator[None]:
+    """Start processes on one core, as on a machine of their own."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {number % (os.cpu_count() or 1)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 # --- the command ------------------------------------------------------------------------------------
