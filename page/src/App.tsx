@@ -44,7 +44,7 @@ function Bar({ match, other }: { match: Match | undefined; other: Match | undefi
       <a href="#" class="home">
         Khala
       </a>
-      {match && <span class="title">{[match, other].map((m) => m?.run.value && titleOf(m)).filter(Boolean).join("  |  ")}</span>}
+      {match && <h1 class="title">{[match, other].map((m) => m?.run.value && titleOf(m)).filter(Boolean).join("  |  ")}</h1>}
       {match && !other && episodes.length > 1 && (
         <select aria-label="Episode" value={match.episode} onChange={(e) => (location.hash = writeHash({ a: match.id, e: Number(e.currentTarget.value) }))}>
           {episodes.map((e) => (
@@ -73,7 +73,7 @@ const titleOf = (match: Match) => {
 function One({ match }: { match: Match }) {
   const [live] = lives.value;
   return (
-    <main class="one">
+    <main class="one" data-moment={match.moment.value?.step}>
       <Score match={match} />
       <MapView key={`${match.id}/${match.episode}`} match={match} />
       <Agents match={match} />

@@ -21,6 +21,7 @@ export const KEYS: readonly (readonly [string, string])[] = [
   ["m", "layers of the map"],
   ["w a s d", "move the map while it has the focus"],
   ["+ - 0", "zoom it in, out, to the whole map"],
+  ["u", "choose the next unit of the map, with shift the one before"],
   ["shift and drag", "choose units on the map"],
   ["ctrl and wheel", "zoom the time line; shift and wheel moves it"],
   ["?", "this help"],

@@ -7,6 +7,8 @@ import type { AdviceNote, Note, Progress } from "./wire";
 
 /** Seconds until the connection is tried again. */
 const AGAIN_S = 2;
+/** Seconds between two looks at what is new at least, so that a long match does not keep the server busy. */
+const REST_S = 0.3;
 
 /** The last words of the server on an advice. */
 export const note = signal<Note | null>(null);
@@ -14,7 +16,8 @@ export const note = signal<Note | null>(null);
 export class Live {
   private socket: WebSocket | null = null;
   private ended = false;
-  private growing: Promise<void> = Promise.resolve();
+  private newest: Progress | null = null;
+  private growing = false;
 
   constructor(private readonly match: Match) {
     if (!isExport()) this.connect();
@@ -40,9 +43,23 @@ export class Live {
     };
   }
 
-  /** Take a line of the server; one after the other, since a slow answer must not overtake. */
   private hear(told: Progress | Note): void {
     if (told.kind === "note") note.value = told;
-    else this.growing = this.growing.then(() => this.match.grow(told)).catch(() => undefined);
+    else {
+      this.newest = told;
+      if (!this.growing) void this.grow();
+    }
+  }
+
+  /** Take what is new, one look after the other; of the progress that is told meanwhile only the newest counts. */
+  private async grow(): Promise<void> {
+    this.growing = true;
+    while (this.newest && !this.ended) {
+      const progress = this.newest;
+      this.newest = null;
+      await this.match.grow(progress).catch(() => undefined); // the next progress tries again
+      await new Promise((rest) => setTimeout(rest, REST_S * 1000));
+    }
+    this.growing = false;
   }
 }

@@ -111,6 +111,7 @@ export class Match {
       (moment, path) => {
         this.moments.set(path, moment);
         this.moment.value = moment;
+        this.trouble.value = "";
       },
       (error) => (this.trouble.value = error.message),
     );

@@ -17,10 +17,11 @@ export interface Screen {
 const REFERENCE = /0x[0-9a-fA-F]{3,16}\b|[[(]\s*(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)\s*[\])]/g;
 const HEADING = /^[ \t]*Team ([^\s:]+)/gm;
 const SCREEN_CELLS = 24;
+const MINIMAP_CELLS = 64;
 
 /**
- * Split a text into pieces, in order, that together are the text. Points without a word for their frame are left alone,
- * unless `frame` says that they are in the minimap frame, as agents mean them in messages.
+ * Split a text into pieces, in order, that together are the text. A point without a word for its frame is left alone if
+ * it may be of either one, unless `frame` says that it is of the minimap, as agents mean it in messages.
  */
 export function references(text: string, screens: readonly Screen[] = [], frame?: "minimap"): Piece[] {
   const headings = [...text.matchAll(HEADING)].map((m) => ({ at: m.index, name: m[1] }));
@@ -42,13 +43,16 @@ export function references(text: string, screens: readonly Screen[] = [], frame?
 /** Return the place that a point means: the nearest word before it on its line says in which frame it is. */
 function place(text: string, match: RegExpMatchArray, screens: readonly Screen[], team?: string, usual?: "minimap"): Pick<Piece, "at"> | null {
   const index = match.index ?? 0;
-  const line = text.slice(text.lastIndexOf("\n", index) + 1, index).toLowerCase();
-  const frame = line.lastIndexOf("minimap") > line.lastIndexOf("screen") ? "minimap" : line.includes("screen") ? "screen" : usual;
   const point: [number, number] = [Number(match[1]), Number(match[2])];
+  const line = text.slice(text.lastIndexOf("\n", index) + 1, index).toLowerCase();
+  const frame = line.lastIndexOf("minimap") > line.lastIndexOf("screen") ? "minimap" : line.includes("screen") ? "screen" : isOffScreen(point) ? "minimap" : usual;
   if (frame === "minimap") return { at: point };
   const screen = screens.find((s) => s.name === team && s.minimap) ?? (screens.length === 1 ? screens[0] : undefined);
   return frame === "screen" && screen?.minimap ? { at: fromScreen(point, screen.minimap, screen.screen) } : null;
 }
+
+/** Whether a point can only be one of the minimap, which is larger than a screen. */
+const isOffScreen = ([x, y]: [number, number]) => Math.max(x, y) >= SCREEN_CELLS && Math.max(x, y) < MINIMAP_CELLS && Math.min(x, y) >= 0;
 
 function fromScreen(point: [number, number], centre: [number, number], size: number): [number, number] {
   const cell = size / SCREEN_CELLS;

@@ -1,7 +1,9 @@
 import { describe, expect, test } from "vitest";
 import { moved, placeAt, viewOf, whole, zoomedAt, type Box } from "../src/map/camera";
-import { turn } from "../src/map/spots";
+import { nextUnit } from "../src/map/pick";
+import { turn, type Spot } from "../src/map/spots";
 import { letters } from "../src/map/units";
+import { Flag } from "../src/wire";
 
 const bounds: Box = [0, 8, 64, 40];
 
@@ -32,3 +34,12 @@ test("a unit turns the shorter way around", () => {
 });
 
 test.each([["Stalker", "St"], ["SiegeTank", "ST"], ["SCV", "SC"]])("%s is written %s", (type, two) => expect(letters(type)).toBe(two));
+
+test("the next unit is a fighter first, and after the last one comes the first again", () => {
+  const spot = (tag: number, flags: number, tint: 0 | 1 | 2 = 0) => ({ tint, unit: { tag, flags } }) as Spot;
+  const spots = [spot(1, Flag.WORKER), spot(2, Flag.STRUCTURE), spot(3, Flag.ARMY, 1), spot(4, Flag.ARMY), spot(5, 0, 2)];
+  const chain = [1, 2, 3, 4, 5].reduce<number[]>((tags) => [...tags, ...nextUnit(spots, tags.at(-1), 1)], []);
+  expect(chain).toEqual([4, 3, 2, 1, 4]);
+  expect(nextUnit(spots, 4, -1)).toEqual([1]);
+  expect(nextUnit([], 4, 1)).toEqual([]);
+});

@@ -26,6 +26,11 @@ test("a point of a screen is where the screen of the team above it is", () => {
   ]);
 });
 
+test("a point that no screen has is one of the minimap, and so is any point of a message", () => {
+  expect(found("attack at [35.4, 3.8]").map((p) => p.at)).toEqual([[35.4, 3.8]]);
+  expect(references("gather at [5, 3.8]", [], "minimap").map((p) => p.at)).toEqual([undefined, [5, 3.8]]);
+});
+
 test("a pair of numbers without a frame, or of a team that is unknown, is no place", () => {
   expect(found("odds of (3, 4)")).toEqual([]);
   expect(found("Team Ghost-1:\n <Move_Screen([12, 12])>")).toEqual([]);

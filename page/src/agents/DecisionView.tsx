@@ -61,7 +61,7 @@ function DeedView({ deed, decision }: { deed: Deed; decision: Decision }) {
   const point = () => pointAt(deed.tags, deed.at ? [deed.at] : []);
   const stale = decision.fate === "stale" || decision.fate === "adapted";
   return (
-    <li class={`deed ${deed.accepted === false ? "refused" : ""}`} onPointerEnter={point} onPointerLeave={pointAway}>
+    <li class={`deed ${{ true: "", false: "refused", null: "open" }[String(deed.accepted) as keyof typeof SIGNS]}`} onPointerEnter={point} onPointerLeave={pointAway}>
       <span class="sign" role="img" aria-label={meaning} title={meaning}>
         {sign}
       </span>

@@ -1,43 +1,37 @@
 /** Messages between agents in the order in which they were written; a click goes to their time. */
 
 import { useSignal } from "@preact/signals";
-import * as clock from "../clock";
 import type { Match } from "../match";
-import { clockText, indexOf, momentOf } from "../time";
+import type { Mark } from "../wire";
+import { Rows } from "./Rows";
 import { Words } from "./Words";
 
-/** Messages that are shown before and after the moment. */
-const AROUND = 100;
-
 export function Threads({ match }: { match: Match }) {
-  const between = useSignal("");
-  const timeline = match.timeline.value;
-  const all = (timeline?.marks ?? []).filter((m) => m.kind === "message" || m.kind === "advice");
-  const wanted = all.filter((m) => !between.value || m.text.includes(between.value) || m.agent === between.value);
-  if (!timeline || !all.length) return <p class="muted pad">No messages were written.</p>;
-  const now = wanted.findLastIndex((m) => m.step <= match.step.value);
-  const near = wanted.slice(Math.max(0, now - AROUND), now + AROUND);
+  const of = useSignal("");
+  const all = (match.timeline.value?.marks ?? []).filter((m) => m.kind === "message" || m.kind === "advice");
+  const concerns = (mark: Mark) => !of.value || mark.agent === of.value || mark.text.startsWith(`→ ${of.value}:`);
+  if (!all.length) return <p class="muted pad">No messages were written.</p>;
   return (
     <div class="list-view">
       <label class="choice">
-        Of{" "}
-        <select value={between.value} onChange={(e) => (between.value = e.currentTarget.value)}>
+        From or to{" "}
+        <select value={of.value} onChange={(e) => (of.value = e.currentTarget.value)}>
           <option value="">everybody</option>
-          {match.agents.value.map((a) => (
-            <option>{a.name}</option>
+          {[...new Set(match.agents.value.map((a) => a.name))].map((name) => (
+            <option>{name}</option>
           ))}
         </select>
       </label>
-      <ol class="rows">
-        {near.map((mark, i) => (
-          <li key={`${mark.step} ${i}`} class={`${mark.step > match.step.value ? "later" : ""} ${mark.kind}`}>
-            <button onClick={() => clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, mark.step)))}>{clockText(timeline.time_s[indexOf(timeline, mark.step)] ?? 0)}</button>
-            <span>
-              {mark.kind === "advice" && <span class="badge warn">human</span>} <Words text={mark.text} frame="minimap" />
-            </span>
-          </li>
-        ))}
-      </ol>
+      <Rows match={match} marks={all.filter(concerns)} write={(mark) => <Message match={match} mark={mark} />} />
     </div>
+  );
+}
+
+function Message({ match, mark }: { match: Match; mark: Mark }) {
+  const side = Math.min(Math.max(match.sides.value.indexOf(mark.side), 0), 1);
+  return (
+    <>
+      <b class={`side-${side}`}>{mark.agent}</b> {mark.kind === "advice" && <span class="badge warn">human</span>} <Words text={mark.text} frame="minimap" />
+    </>
   );
 }

@@ -16,7 +16,7 @@ export function Compare({ a, b }: { a: Match; b: Match }) {
         {[a, b].map((match, i) => (
           <div class="half" key={i}>
             <Score match={match} name={"AB"[i]} />
-            <MapView match={match} />
+            <MapView match={match} name={"AB"[i]} />
           </div>
         ))}
       </div>
@@ -90,7 +90,7 @@ function Decisions({ a, b }: { a: Match; b: Match }) {
             <div class="decision-pair">
               {[first, second].map((d, i) => (
                 <div key={i}>
-                  <h4>{"AB"[i]}</h4>
+                  <h3>{"AB"[i]}</h3>
                   {d ? <DecisionView decision={d} /> : <p class="muted">Not asked yet.</p>}
                 </div>
               ))}

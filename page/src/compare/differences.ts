@@ -13,13 +13,13 @@ export interface Difference {
   write: (value: number | null) => string;
 }
 
-/** Return the values of both matches that are known, by curve and side. */
+/** Return the values of both matches, by curve and side, where one of them has any. */
 export function differences(a: Match, b: Match): Difference[] {
   const sides = [...new Set([...a.sides.value, ...b.sides.value, ""])];
   return CHARTS.flatMap((chart) =>
     sides.flatMap((side) => {
       const values = [a, b].map((match) => chart.values(match, side)?.[match.index.value] ?? null);
-      return values.every((v) => v === null) ? [] : [{ name: chart.name, side, a: values[0], b: values[1], write: chart.write }];
+      return values.every((v) => !v) ? [] : [{ name: chart.name, side, a: values[0], b: values[1], write: chart.write }];
     }),
   );
 }

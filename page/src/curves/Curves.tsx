@@ -31,8 +31,8 @@ function CurveView({ chart, matches }: { chart: Chart; matches: readonly Match[]
       <p class="curve-name">
         {chart.name}
         {values(chart, matches).map(([name, value, tint], i) => (
-          <b key={i} class={`side-${tint}`} title={name}>
-            {value}
+          <b key={i} class={`side-${tint}`}>
+            {matches.length > 1 && <i>{name.split(" ")[0]}</i>} {value}
           </b>
         ))}
       </p>
@@ -90,7 +90,7 @@ function options(chart: Chart, lines: readonly Line[], width: number): uPlot.Opt
     padding: [16, MARGIN, 4, 0],
     legend: { show: false },
     cursor: { show: false },
-    scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1e-6) * 1.08] } },
+    scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), high ? high * 1.08 : 1] } },
     axes: [
       { show: false },
       {

@@ -1,8 +1,9 @@
 /** An experiment's table: each number with its interval as a bar; a row leads to its matches. */
 
 import { useSignal } from "@preact/signals";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "../api";
+import { still } from "../theme";
 import type { Cell, ExperimentView, Row } from "../wire";
 import { RunTable } from "./RunTable";
 
@@ -10,6 +11,11 @@ export function Experiment({ id }: { id: string }) {
   const [view, setView] = useState<ExperimentView | null>(null);
   const [trouble, setTrouble] = useState("");
   const chosen = useSignal(-1);
+  const matches = useRef<HTMLHeadingElement>(null);
+  const choose = (i: number) => {
+    chosen.value = i === chosen.value ? -1 : i;
+    if (chosen.value >= 0) matches.current?.scrollIntoView({ behavior: still ? "auto" : "smooth" });
+  };
   useEffect(() => void get<ExperimentView>(`experiments/${id}`).then(setView, (error: Error) => setTrouble(error.message)), [id]);
   if (!view) return <main class="library">{trouble ? <p class="bad">{trouble}</p> : <p class="muted">Loading…</p>}</main>;
   const ranges = view.columns.map((_, i) => rangeOf(view.rows.map((row) => row.cells[i])));
@@ -23,14 +29,14 @@ export function Experiment({ id }: { id: string }) {
         <table>
           <thead>
             <tr>
-              {[...view.factors, "games", ...view.columns].map((name) => (
+              {[...view.factors, ...view.columns].map((name) => (
                 <th key={name}>{name}</th>
               ))}
             </tr>
           </thead>
           <tbody>
             {view.rows.map((r, i) => (
-              <RowView key={i} row={r} ranges={ranges} chosen={i === chosen.value} choose={() => (chosen.value = i === chosen.value ? -1 : i)} />
+              <RowView key={i} row={r} ranges={ranges} chosen={i === chosen.value} choose={() => choose(i)} />
             ))}
           </tbody>
         </table>
@@ -40,7 +46,7 @@ export function Experiment({ id }: { id: string }) {
           <li key={words}>{words}</li>
         ))}
       </ul>
-      <h2>{row ? `Matches of ${row.names.join(", ")}` : "Matches"}</h2>
+      <h2 ref={matches}>{row ? `Matches of ${row.names.join(", ")}` : "Matches"}</h2>
       <RunTable runs={runs} />
     </main>
   );
@@ -60,7 +66,6 @@ function RowView({ row, ranges, chosen, choose }: { row: Row; ranges: readonly R
           )}
         </td>
       ))}
-      <td class="number">{row.games}</td>
       {row.cells.map((cell, i) => (
         <td key={i}>
           {cell.text}
@@ -73,10 +78,14 @@ function RowView({ row, ranges, chosen, choose }: { row: Row; ranges: readonly R
 
 type Range = readonly [number, number];
 
-/** Return the lowest and the highest end of the intervals of a column, from 0 on. */
+/** The part of all ends of intervals that a column shows: one K/D of 70 would make all others a dot. */
+const SHOWN = 0.9;
+
+/** Return the range that the bars of a column show, from 0 on. */
 function rangeOf(cells: readonly Cell[]): Range {
   const ends = cells.flatMap((c) => [c?.low, c?.value, c?.high]).filter((v): v is number => typeof v === "number");
-  return [Math.min(0, ...ends), Math.max(1e-9, ...ends)];
+  const sorted = ends.sort((a, b) => a - b);
+  return [Math.min(0, ...ends), Math.max(1e-9, sorted[Math.floor((sorted.length - 1) * SHOWN)] ?? 0)];
 }
 
 function Interval({ cell, range }: { cell: Cell; range: Range }) {

@@ -9,7 +9,7 @@ import { palette } from "../theme";
 import { around, camera, type View } from "./camera";
 import { Minimap } from "./Minimap";
 import { Painter } from "./painter";
-import { unitAt, unitsIn } from "./pick";
+import { nextUnit, unitAt, unitsIn } from "./pick";
 import { listen, zoom, type Target } from "./pointer";
 import { Chosen, Tip } from "./Selection";
 import type { Spot } from "./spots";
@@ -22,7 +22,7 @@ export interface Pointed {
   y: number;
 }
 
-export function MapView({ match }: { match: Match }) {
+export function MapView({ match, name = "" }: { match: Match; name?: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const pointed = useSignal<Pointed | null>(null);
   const frame = useSignal<readonly [number, number, number, number] | null>(null);
@@ -34,7 +34,7 @@ export function MapView({ match }: { match: Match }) {
   useEffect(() => keepDrawn(canvas.current!, painter, match, stale, drawn), [painter]);
   const middle = (factor: number) => zoom(target, factor, painter.view.width / 2, painter.view.height / 2);
   return (
-    <section class="map" aria-label="Map">
+    <section class="map" aria-label={`Map ${name}`.trim()}>
       <canvas ref={canvas} class="map-canvas" tabIndex={0} role="img" aria-label={describe(match)} />
       {frame.value && <div class="map-box" style={boxStyle(frame.value)} />}
       {!drawn.value && <p class="map-empty">{match.timeline.value?.steps.length ? "No scene of this moment is here yet." : "Nothing has been played yet."}</p>}
@@ -46,6 +46,8 @@ export function MapView({ match }: { match: Match }) {
   );
 }
 
+const sameMap = () => new Set(matches.peek().map((m) => m.run.peek()?.line.map)).size === 1;
+
 /** Show the units that are chosen, or all of both sides. */
 function fit(painter: Painter): void {
   const units = painter.spots.filter((spot) => (chosen.value.size ? chosen.value.has(spot.unit.tag) : spot.tint !== 2));
@@ -53,7 +55,7 @@ function fit(painter: Painter): void {
 }
 
 const describe = (match: Match) =>
-  `Map of ${match.run.value?.line.map ?? "the match"}. Keys: W A S D move, plus and minus zoom, 0 shows all of it.`;
+  `Map of ${match.run.value?.line.map ?? "the match"}. Keys: W A S D move, plus and minus zoom, 0 shows all of it, U goes from unit to unit.`;
 
 const boxStyle = ([x0, y0, x1, y1]: readonly [number, number, number, number]) => ({
   left: `${Math.min(x0, x1)}px`,
@@ -81,6 +83,7 @@ function targetOf(painter: Painter, pointed: { value: Pointed | null }, frame: {
       chosen.value = new Set([...(add ? chosen.value : []), ...(spot ? [spot.unit.tag] : [])]);
       hover(x, y);
     },
+    next: (by) => (chosen.value = new Set(nextUnit(painter.spots, [...chosen.value][0], by))),
     box: (from, to, done) => {
       frame.value = done ? null : [...from, ...to];
       if (done) chosen.value = unitsIn(painter.spots, painter.view, from, to);
@@ -97,6 +100,7 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
   const draw = () => {
     request = 0;
     const { width, height } = canvas.getBoundingClientRect();
+    if (!width || !height) return;
     const dots = Math.min(devicePixelRatio, 2);
     if (canvas.width !== Math.round(width * dots) || canvas.height !== Math.round(height * dots)) {
       canvas.width = Math.round(width * dots);
@@ -105,10 +109,11 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
     const context = canvas.getContext("2d")!;
     context.setTransform(dots, 0, 0, dots, 0, 0);
     drawn.value = painter.paint(context, width, height, wish());
+    if (drawn.value) canvas.dataset.step = String(painter.step); // what is drawn, for tests and measurements
     if (drawn.value && !fitted && width > 0) {
       fitted = true;
       // a battle takes place in a small part of its map
-      if (!camera.value && matches.peek().length === 1 && !painter.spots.some(({ unit }) => is(unit, "STRUCTURE"))) fit(painter);
+      if (!camera.value && sameMap() && !painter.spots.some(({ unit }) => is(unit, "STRUCTURE"))) fit(painter);
     }
   };
   const stop = effect(() => {

@@ -30,7 +30,7 @@ export function Chosen({ match, painter }: { match: Match; painter: Painter }) {
   const spots = painter.spots.filter(({ unit }) => chosen.value.has(unit.tag));
   if (!spots.length) return null;
   return (
-    <aside class="chosen" aria-label="Chosen units">
+    <aside class="chosen" aria-label="Chosen units" aria-live="polite">
       <header>
         <strong>{summary(spots)}</strong>
         <button class="plain" aria-label="Choose none" onClick={() => (chosen.value = new Set())}>

@@ -36,23 +36,22 @@ export function drawOrders(context: Context, spots: readonly Spot[], byTag: Read
   context.globalAlpha = 1;
 }
 
-/** Draw the shots since the scene before, fading until the next one. */
+/** Draw the shots since the scene before, fading until the next one: each by itself, 70 in one path take 7 ms. */
 export function drawShots(context: Context, spots: readonly Spot[], byTag: ReadonlyMap<number, Spot>, view: View, colours: Colours, part: number): void {
   context.globalAlpha = 1 - part * 0.8;
-  context.lineCap = "round";
-  for (const [width, colour] of [[3.5, null], [1.2, colours.flash]] as const)
-    for (const tint of [0, 1] as const) {
-      context.beginPath();
-      for (const spot of spots) {
-        const target = byTag.get(spot.unit.target);
-        if (spot.tint !== tint || !target || !is(spot.unit, "FIRES")) continue;
-        context.moveTo(...at(view, spot.x, spot.y));
-        context.lineTo(...at(view, target.x, target.y));
-      }
+  context.lineCap = "butt";
+  for (const spot of spots) {
+    const target = byTag.get(spot.unit.target);
+    if (!target || !is(spot.unit, "FIRES")) continue;
+    context.beginPath();
+    context.moveTo(...at(view, spot.x, spot.y));
+    context.lineTo(...at(view, target.x, target.y));
+    for (const [width, colour] of [[3.5, colours.sides[spot.tint]], [1.2, colours.flash]] as const) {
       context.lineWidth = width;
-      context.strokeStyle = colour ?? colours.sides[tint];
+      context.strokeStyle = colour;
       context.stroke();
     }
+  }
   context.globalAlpha = 1;
 }
 

@@ -41,6 +41,8 @@ export class Painter {
   private creep: Made | null = null;
   private fog: Made | null = null;
   private frame: Frame | undefined;
+  private readonly still = document.createElement("canvas");
+  private stillOf: readonly unknown[] = [];
 
   /** `redraw` is called when a picture that had to be made is there. */
   constructor(private readonly match: Match, private readonly redraw: () => void) {}
@@ -57,23 +59,46 @@ export class Painter {
     return (this.frame = this.match.scenes.frame(this.match.step.value) ?? this.frame);
   }
 
+  /** The step whose scene is drawn; null before there is any. */
+  get step(): number | null {
+    return this.frame?.step ?? null;
+  }
+
   /** Draw the moment of the match; return false if there is no scene for it. */
   paint(context: CanvasRenderingContext2D, width: number, height: number, wish: Wish): boolean {
-    const { colours, off } = wish;
     this.view = viewOf(wish.camera, this.bounds(), width, height);
-    context.fillStyle = colours.ground;
-    context.fillRect(0, 0, width, height);
-    if (!off.has("terrain")) this.drawGround(context, colours);
     const frame = this.scene();
-    if (!frame) return false;
-    const tint = tints(frame, this.match.sides.value);
-    const sight = sightOf(this.match, frame, wish.eyes);
-    this.drawCreep(context, frame, sight, wish);
-    if (!off.has("resources")) this.drawResources(context, frame, colours);
-    if (!off.has("power")) drawPower(context, frame, tint, this.view, colours);
-    if (!off.has("fog")) this.drawFog(context, frame, sight, colours);
-    this.drawMoving(context, frame, tint, sight, wish);
+    const sight = frame && sightOf(this.match, frame, wish.eyes);
+    this.keepStill(context, frame, sight, wish);
+    context.drawImage(this.still, 0, 0, width, height);
+    if (!frame || !sight) return false;
+    this.drawMoving(context, frame, tints(frame, this.match.sides.value), sight, wish);
     return true;
+  }
+
+  /** Draw what lies still between two scenes, unless it is drawn: scaling the ground takes longer than 400 units. */
+  private keepStill(context: CanvasRenderingContext2D, frame: Frame | undefined, sight: Sight | undefined, { camera, colours, eyes, off }: Wish): void {
+    const { width, height } = context.canvas;
+    const screens = sight?.screens.length ? this.match.moment.value : null;
+    const of = [frame, this.match.terrain.value, camera, colours, eyes, off, width, height, screens];
+    if (of.every((part, i) => part === this.stillOf[i])) return;
+    this.stillOf = of;
+    this.still.width = width;
+    this.still.height = height;
+    const still = this.still.getContext("2d")!;
+    still.setTransform(context.getTransform());
+    this.drawStill(still, frame, sight, colours, off);
+  }
+
+  private drawStill(context: CanvasRenderingContext2D, frame: Frame | undefined, sight: Sight | undefined, colours: Colours, off: ReadonlySet<Layer>): void {
+    context.fillStyle = colours.ground;
+    context.fillRect(0, 0, this.view.width, this.view.height);
+    if (!off.has("terrain")) this.drawGround(context, colours);
+    if (!frame || !sight) return;
+    if (!off.has("creep")) this.drawCreep(context, frame, sight, colours);
+    if (!off.has("resources")) this.drawResources(context, frame, colours);
+    if (!off.has("power")) drawPower(context, frame, tints(frame, this.match.sides.value), this.view, colours);
+    if (!off.has("fog")) this.drawFog(context, frame, sight, colours);
   }
 
   private drawMoving(context: CanvasRenderingContext2D, frame: Frame, tint: (player: number) => 0 | 1 | 2, sight: Sight, wish: Wish): void {
@@ -129,14 +154,14 @@ export class Painter {
       context.moveTo(left, i * scale + top);
       context.lineTo(64 * scale + left, i * scale + top);
     }
-    context.strokeStyle = colours.edge;
+    context.strokeStyle = colours.line;
     context.lineWidth = 1;
     context.stroke();
   }
 
-  private drawCreep(context: CanvasRenderingContext2D, frame: Frame, sight: Sight, { off, colours }: Wish): void {
+  private drawCreep(context: CanvasRenderingContext2D, frame: Frame, sight: Sight, colours: Colours): void {
     const terrain = this.match.terrain.value;
-    if (!terrain || !frame.creep || off.has("creep")) return;
+    if (!terrain || !frame.creep) return;
     const view = frame.creep;
     const known = frame.fog[sight.side];
     this.creep = this.made(this.creep, view, `${colours.creep} ${sight.side}`, () => tintOf(view, colours.creep, CREEP, known));
@@ -169,6 +194,7 @@ export class Painter {
     const made: Made = { source, colour, canvas: held?.canvas ?? null };
     void make().then((canvas) => {
       made.canvas = canvas;
+      this.stillOf = [];
       this.redraw();
     });
     return made;

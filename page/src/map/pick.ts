@@ -2,7 +2,7 @@
 
 import { placeAt, type View } from "./camera";
 import type { Spot } from "./spots";
-import { radius } from "./units";
+import { radius, role } from "./units";
 
 /** Pixels around a unit that still mean it. */
 const NEAR = 6;
@@ -12,6 +12,15 @@ export function unitAt(spots: readonly Spot[], view: View, px: number, py: numbe
   const [x, y] = placeAt(view, px, py);
   const under = spots.filter((s) => Math.hypot(s.x - x, s.y - y) * view.scale <= radius(s, view) + NEAR);
   return under.sort((a, b) => radius(a, view) - radius(b, view) || Math.hypot(a.x - x, a.y - y) - Math.hypot(b.x - x, b.y - y))[0];
+}
+
+/** Return the tag of the unit after another one, or before it: fighters first, side by side; none if there is no unit. */
+export function nextUnit(spots: readonly Spot[], tag: number | undefined, by: 1 | -1): number[] {
+  const order = (spot: Spot) => ["army", "other", "structure", "worker"].indexOf(role(spot)) * 4 + spot.tint;
+  const all = [...spots].filter((spot) => spot.tint !== 2).sort((a, b) => order(a) - order(b) || a.unit.tag - b.unit.tag);
+  const now = all.findIndex((spot) => spot.unit.tag === tag);
+  const next = now < 0 ? 0 : (now + by + all.length) % all.length;
+  return all.length ? [all[next].unit.tag] : [];
 }
 
 /** Return the tags of the units in a box of pixels. */

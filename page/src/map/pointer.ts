@@ -9,6 +9,8 @@ export interface Target {
   hover(px: number, py: number): void;
   leave(): void;
   pick(px: number, py: number, add: boolean): void;
+  /** Choose the unit after the one that is chosen, or the one before it. */
+  next(by: 1 | -1): void;
   box(from: readonly [number, number], to: readonly [number, number], done: boolean): void;
 }
 
@@ -86,6 +88,7 @@ function mapKey(target: Target, event: KeyboardEvent): boolean {
   else if (event.key === "+" || event.key === "=") zoom(target, 1.4, view.width / 2, view.height / 2);
   else if (event.key === "-") zoom(target, 1 / 1.4, view.width / 2, view.height / 2);
   else if (event.key === "0") camera.value = null;
+  else if (event.key === "u" || event.key === "U") target.next(event.shiftKey ? -1 : 1);
   else return false;
   return true;
 }

@@ -83,6 +83,7 @@ function Moment({ match }: { match: Match }) {
   const now = clock.at.value;
   const words = clock.axis.value === "time" ? clockText(now) : `step ${match.step.value}`;
   const hover = pointed.value;
+  const inside = now >= from && now <= to;
   return (
     <div class="moments">
       {hover !== null && (
@@ -91,7 +92,7 @@ function Moment({ match }: { match: Match }) {
         </span>
       )}
       <span
-        class="now"
+        class={`now ${inside ? "" : "outside"}`}
         role="slider"
         tabIndex={0}
         aria-label="Moment"
