@@ -29,6 +29,14 @@ export const hovered = signal(0);
 /** Units that were chosen on the map. */
 export const chosen = signal<ReadonlySet<number>>(new Set());
 
+/** The menu that is open over the page, if any. */
+export const menu = signal<"" | "layers" | "curves">("");
+
+/** Open a menu, or close it if it is open. */
+export function toggleMenu(name: "layers" | "curves"): void {
+  menu.value = menu.value === name ? "" : name;
+}
+
 export const first = computed<Match | undefined>(() => matches.value[0]);
 
 /** Turn a layer of the map on or off. */
