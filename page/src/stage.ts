@@ -48,9 +48,7 @@ export function toggleLayer(layer: Layer): void {
 
 /** Begin a page that follows its address, and whose address follows it. */
 export function begin(): void {
-  const read = () => {
-    if (location.hash !== written) void visit(readHash(location.hash));
-  };
+  const read = () => void visit(readHash(location.hash));
   addEventListener("hashchange", read);
   read();
   clock.run();
@@ -125,7 +123,6 @@ const stepsPerSecond = (times: readonly number[], steps: number) => {
   return length > 0 ? (steps - 1) / length : 1;
 };
 
-let written = "";
 let writing: ReturnType<typeof setTimeout> | undefined;
 
 /** Write the moment into the address, a few times a second at most: browsers refuse more than a hundred in 30 s. */
@@ -139,7 +136,7 @@ function keepAddress(): void {
   if (a && !a.timeline.value) return;
   clearTimeout(writing);
   writing = setTimeout(() => {
-    written = writeHash(to);
+    const written = writeHash(to);
     if (location.hash !== written) history.replaceState(null, "", written);
   }, 400);
 }
