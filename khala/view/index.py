@@ -40,7 +40,8 @@ create table sample(
     topic text not null, episode integer not null, side text not null, agent text not null, step integer not null,
     chunk integer not null, place integer not null, log_time_ns integer not null
 );
-create index sample_by_step on sample(topic, episode, side, agent, step);
+create index sample_of_agent on sample(topic, episode, side, agent, step);
+create index sample_of_step on sample(topic, episode, step);
 create table image(sha256 text primary key, chunk integer not null, place integer not null) without rowid;
 create table step(
     episode integer not null, step integer not null, data text not null, primary key (episode, step)

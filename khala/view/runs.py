@@ -163,8 +163,8 @@ class Opened:
     # --- parts --------------------------------------------------------------------------------------
 
     def indexed(self) -> float:
-        """Return the part of the recording that is indexed."""
-        if self.index.meta("ended") or self.index.meta("broken"):
+        """Return the part of the recording that is indexed; of one that is torn or grows, of what is whole of it."""
+        if any(self.index.meta(name) for name in ("ended", "broken", "caught_up")):
             return 1.0
         with contextlib.suppress(OSError):
             offset: int = self.index.meta("offset", 0)

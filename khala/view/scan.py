@@ -80,6 +80,10 @@ class Scanner:
         self._index, self._stopped = index, stopped
         self._name = secrets.token_hex(8)
         self._scan: Scan | None = None
+        self._seen = -1
+        """Size of the file that holds nothing new; -1 if it may."""
+        self._renew_s = 0.0
+        """When the lease must be renewed."""
         self._memory = Memory()
         self._sides: tuple[str, ...] = ()
         self._db = connect(index.path, SCHEMA)
@@ -93,6 +97,9 @@ class Scanner:
     def advance(self, within_s: float = BATCH_S) -> bool | None:
         """Index what follows; return whether there was anything, or None while another viewer does it."""
         with self._index.recording.open("rb") as file:
+            size = file.seek(0, 2)
+            if self._scan is not None and size == self._seen and time.time() < self._renew_s:
+                return False
             self._db.execute("begin immediate")
             try:
                 if not self._claim():
@@ -102,13 +109,15 @@ class Scanner:
                 before = scan.offset
                 batch = self._read(scan, file, within_s)
                 self._write(batch, scan, file)
+                if scan.offset == before:
+                    self._note("caught_up", value=True)
                 self._db.execute("commit")
             except BaseException:
                 self._scan = None  # what is in the index counts
                 with contextlib.suppress(sqlite3.Error):
                     self._db.execute("rollback")
                 raise
-        self._scan = scan
+        self._scan, self._seen = scan, size if scan.offset == before else -1
         return scan.offset > before
 
     @property
@@ -124,8 +133,13 @@ class Scanner:
             if until_s > time.time():
                 return False
             self._scan = None
-        self._note("writer", [self._name, time.time() + LEASE_S])
+        self._take_lease()
         return True
+
+    def _take_lease(self) -> None:
+        now_s = time.time()
+        self._renew_s = now_s + LEASE_S / 2
+        self._note("writer", [self._name, now_s + LEASE_S])
 
     def _resumed(self, file: BinaryIO) -> Scan:
         """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
@@ -136,11 +150,12 @@ class Scanner:
                 scan = Scan(state["offset"], keys=keys, expected=state["expected"])
                 scan.ended, scan.broken = state["ended"], state["broken"]
                 self._memory, self._sides = Memory.load(state["memory"]), tuple(state["sides"])
+                self._note("caught_up", value=False)
                 return scan
         for table in ("sample", "image", "step", "decision", "loss", "mark", "model", "meta"):
             self._db.execute(f"delete from {table} where true")  # noqa: S608  # our own names
         self._memory, self._sides = Memory(), ()
-        self._note("writer", [self._name, time.time() + LEASE_S])
+        self._take_lease()
         return Scan()
 
     # --- reading ------------------------------------------------------------------------------------

@@ -5,10 +5,11 @@ Fights are made of losses: deaths that follow each other closely in time and pla
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, get_args
+
+from pydantic_core import from_json
 
 from khala.view.digest import counted
 from khala.view.wire import Curve, CurveName, Mark, Timeline
@@ -78,7 +79,7 @@ def timeline(index: Index, episode: int) -> Timeline:
     """Return the time line of an episode, as far as it is indexed."""
     found = index.rows("select step, data from step where episode = ? order by step", episode)
     steps = [step for step, _ in found]
-    rows = [json.loads(data) for _, data in found]
+    rows: list[dict[str, Any]] = from_json(f"[{','.join(data for _, data in found)}]")
     loops = _loops(rows)
     times_s = {step: loop / LOOPS_PER_S for step, loop in zip(steps, loops, strict=True)}
     asked: dict[str, list[int]] = defaultdict(list)

@@ -73,7 +73,7 @@ const titleOf = (match: Match) => {
 function One({ match }: { match: Match }) {
   const [live] = lives.value;
   return (
-    <main class="one">
+    <main class="one" data-moment={match.moment.value?.step}>
       <Score match={match} />
       <MapView key={`${match.id}/${match.episode}`} match={match} />
       <Agents match={match} />

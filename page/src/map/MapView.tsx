@@ -109,6 +109,7 @@ function keepDrawn(canvas: HTMLCanvasElement, painter: Painter, match: Match, st
     const context = canvas.getContext("2d")!;
     context.setTransform(dots, 0, 0, dots, 0, 0);
     drawn.value = painter.paint(context, width, height, wish());
+    if (drawn.value) canvas.dataset.step = String(painter.step); // what is drawn, for tests and measurements
     if (drawn.value && !fitted && width > 0) {
       fitted = true;
       // a battle takes place in a small part of its map

@@ -55,6 +55,11 @@ export class Painter {
     return this.frame;
   }
 
+  /** The step whose scene is drawn; null before there is any. */
+  get step(): number | null {
+    return this.frame?.step ?? null;
+  }
+
   /** Draw the moment of the match; return false if there is no scene for it. */
   paint(context: CanvasRenderingContext2D, width: number, height: number, wish: Wish): boolean {
     this.view = viewOf(wish.camera, this.bounds(), width, height);

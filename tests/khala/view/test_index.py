@@ -143,6 +143,7 @@ def test_a_torn_recording_is_indexed_up_to_the_tear(path: Path) -> None:
     assert readable == 20
     assert found.index.rows("select count(*) from sample where topic = 'observation'") == [(readable,)]
     assert found.line().complete is False
+    assert found.indexed() == 1.0
 
 
 def test_a_damaged_recording_is_indexed_up_to_the_damage(path: Path) -> None:
