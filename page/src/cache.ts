@@ -23,10 +23,6 @@ export class Recent<V> {
       this.held.delete(oldest);
     }
   }
-
-  delete(key: string): void {
-    this.held.delete(key);
-  }
 }
 
 /**

@@ -2,9 +2,8 @@
 
 import { signal } from "@preact/signals";
 import * as clock from "./clock";
-import { layersOpen } from "./map/Tools";
 import { keyOf } from "./match";
-import { agent, first } from "./stage";
+import { agent, first, menu, toggleMenu } from "./stage";
 import { indexOf, momentOf } from "./time";
 
 export const helpOpen = signal(false);
@@ -60,14 +59,17 @@ const DOES: Record<string, (event: KeyboardEvent) => void> = {
   ",": () => toMark(false),
   ".": () => toMark(true),
   f: () => clock.follow(!clock.following.value),
-  m: () => (layersOpen.value = !layersOpen.value),
+  m: () => toggleMenu("layers"),
   "?": () => (helpOpen.value = !helpOpen.value),
 };
 
-/** Listen to the keys that no field takes. */
+/** Listen to the keys that no field takes; a click elsewhere closes a menu. */
 export function listenToKeys(): void {
+  addEventListener("pointerdown", (event) => {
+    if (!(event.target as HTMLElement).closest?.(".layers, .menu")) menu.value = "";
+  });
   addEventListener("keydown", (event) => {
-    if (event.key === "Escape") helpOpen.value = layersOpen.value = false;
+    if (event.key === "Escape") menu.value = "";
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || !first.value || isField(event)) return;
     const does = DOES[event.key] ?? (/^[1-9]$/.test(event.key) ? () => chooseAgent(Number(event.key)) : undefined);
     if (!does) return;

@@ -52,10 +52,10 @@ export class SceneStore {
   /** `path` is that of the episode; a page that `grows` is not kept while it is short. */
   constructor(private readonly path: string, private readonly grows: () => boolean) {}
 
-  /** Return the scene of a step, or the last one before it that is here. */
-  frame(step: number): Frame | undefined {
+  /** Return the scene of a step, or the last one of its page before it; null if there is none, undefined if not yet. */
+  frame(step: number): Frame | null | undefined {
     const page = this.pages.get(String(Math.floor(step / SCENES_AT_ONCE)));
-    return page?.findLast((frame) => frame.step <= step) ?? page?.[0];
+    return page && (page.findLast((frame) => frame.step <= step) ?? page[0] ?? null);
   }
 
   /** Ask for the scenes of a step, and then for those around it, first in the direction of play. */

@@ -29,6 +29,14 @@ export const hovered = signal(0);
 /** Units that were chosen on the map. */
 export const chosen = signal<ReadonlySet<number>>(new Set());
 
+/** The menu that is open over the page, if any. */
+export const menu = signal<"" | "layers" | "curves">("");
+
+/** Open a menu, or close it if it is open. */
+export function toggleMenu(name: "layers" | "curves"): void {
+  menu.value = menu.value === name ? "" : name;
+}
+
 export const first = computed<Match | undefined>(() => matches.value[0]);
 
 /** Turn a layer of the map on or off. */
@@ -40,9 +48,7 @@ export function toggleLayer(layer: Layer): void {
 
 /** Begin a page that follows its address, and whose address follows it. */
 export function begin(): void {
-  const read = () => {
-    if (location.hash !== written) void visit(readHash(location.hash));
-  };
+  const read = () => void visit(readHash(location.hash));
   addEventListener("hashchange", read);
   read();
   clock.run();
@@ -117,7 +123,6 @@ const stepsPerSecond = (times: readonly number[], steps: number) => {
   return length > 0 ? (steps - 1) / length : 1;
 };
 
-let written = "";
 let writing: ReturnType<typeof setTimeout> | undefined;
 
 /** Write the moment into the address, a few times a second at most: browsers refuse more than a hundred in 30 s. */
@@ -131,7 +136,7 @@ function keepAddress(): void {
   if (a && !a.timeline.value) return;
   clearTimeout(writing);
   writing = setTimeout(() => {
-    written = writeHash(to);
+    const written = writeHash(to);
     if (location.hash !== written) history.replaceState(null, "", written);
   }, 400);
 }

@@ -53,7 +53,6 @@ function read() {
     flash: of("flash"),
     bad: of("bad"),
     good: of("good"),
-    surface: of("surface"),
   };
 }
 

@@ -4,7 +4,7 @@ import { signal, useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { get } from "../api";
 import { writeHash } from "../hash";
-import { count } from "../words";
+import { whole } from "../words";
 import type { Library as LibraryAnswer } from "../wire";
 import { matching } from "./filter";
 import { RunTable } from "./RunTable";
@@ -41,7 +41,7 @@ export function Library() {
                 <p>{e.description}</p>
                 <progress max={Math.max(1, e.matches)} value={e.played} aria-label="Played" />
                 <span class="muted">
-                  {e.played} of {count(e.matches, "match").replace("matchs", "matches")} played
+                  {e.played} of {whole(e.matches)} matches played
                 </span>
               </li>
             ))}

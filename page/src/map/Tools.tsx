@@ -1,13 +1,9 @@
 /** Buttons over the map: whose eyes, which layers, how near. */
 
-import { signal } from "@preact/signals";
 import type { Match } from "../match";
-import { LAYERS, eyes, off, toggleLayer, type Layer } from "../stage";
+import { LAYERS, eyes, menu, off, toggleLayer, toggleMenu, type Layer } from "../stage";
 import { capital } from "../words";
 import { camera } from "./camera";
-
-/** Whether the list of layers is open; the key `m` opens it. */
-export const layersOpen = signal(false);
 
 const MEANING: Record<Layer, string> = {
   terrain: "ground, its height and walls",
@@ -40,7 +36,7 @@ export function Tools({ match, zoom, fit }: { match: Match; zoom: (factor: numbe
           ))}
         </select>
       </label>
-      <button aria-expanded={layersOpen.value} onClick={() => (layersOpen.value = !layersOpen.value)} title="Layers (m)">
+      <button class="menu" aria-expanded={menu.value === "layers"} onClick={() => toggleMenu("layers")} title="Layers (m)">
         Layers
       </button>
       <span class="joined">
@@ -55,7 +51,7 @@ export function Tools({ match, zoom, fit }: { match: Match; zoom: (factor: numbe
         </button>
         {camera.value && <button onClick={() => (camera.value = null)}>Whole map</button>}
       </span>
-      {layersOpen.value && (
+      {menu.value === "layers" && (
         <fieldset class="layers">
           <legend class="hidden">Layers</legend>
           {LAYERS.map((layer) => (

@@ -1,13 +1,11 @@
 /** Buttons of the clock, and which curves are shown. */
 
-import { signal } from "@preact/signals";
 import * as clock from "../clock";
 import { CHARTS, charts, toggleChart } from "../curves/series";
 import type { Match } from "../match";
 import { stepBy } from "../keys";
+import { menu, toggleMenu } from "../stage";
 import { clockText } from "../time";
-
-const choosing = signal(false);
 
 export function Controls({ matches }: { matches: readonly Match[] }) {
   const [match] = matches;
@@ -55,10 +53,10 @@ export function Controls({ matches }: { matches: readonly Match[] }) {
         </select>
       </label>
       <span class="anchor">
-        <button aria-expanded={choosing.value} onClick={() => (choosing.value = !choosing.value)}>
+        <button class="menu" aria-expanded={menu.value === "curves"} onClick={() => toggleMenu("curves")}>
           Curves
         </button>
-        {choosing.value && (
+        {menu.value === "curves" && (
           <fieldset class="layers above">
             <legend class="hidden">Curves</legend>
             {CHARTS.map((chart) => (
