@@ -6,7 +6,6 @@ Answers are bytes of JSON, made in threads: `khala.view.server` sends them, `kha
 from __future__ import annotations
 
 import contextlib
-import time
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeVar
 
@@ -146,8 +145,7 @@ class Opened:
         newest = self.index.rows("select episode, count(*) from step group by episode order by episode desc limit 1")
         episode, steps = newest[0] if newest else (0, 0)
         live = read_head(self.path).live
-        reported_ns = self.index.meta("reported_ns")
-        lag_s = max(0.0, time.time() - reported_ns / 1e9) if live and reported_ns else None
+        lag_s = self.index.meta("lag_s") if live else None
         return Progress(episode=episode, steps=steps, indexed=self.indexed(), live=live, lag_s=lag_s)
 
     @property

@@ -238,7 +238,7 @@ class Scanner:
         if self._memory.scenes:
             self._note("scenes", "whole" if self._memory.whole else "seen")
         if newest is not None:
-            self._note("reported_ns", newest)
+            self._note("lag_s", round(max(0.0, time.time() - newest / 1e9), 3))
 
     def _note(self, name: str, value: object) -> None:
         self._db.execute("insert or replace into meta values (?, ?)", (name, json.dumps(value)))

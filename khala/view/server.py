@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 WORTH_PACKING = 2_000
 """Bytes; shorter answers are not compressed."""
 PROGRESS_S = 0.2
-"""Between two lines of progress to a page at most; lag is counted anew in each."""
+"""Between two lines of progress to a page at most."""
 MOST_MESSAGE_BYTES = 16_384
 """Of what a page may send."""
 FIRST_LOOK_S = 0.5

@@ -371,7 +371,7 @@ class Progress(Frozen):
     indexed: float
     live: bool
     lag_s: float | None = None
-    """Seconds from the host's publication of the newest step to this line; None if nothing is live."""
+    """Seconds from the host's report of the newest step until it could be asked for; None if nothing is live."""
 
 
 class AdviceNote(Frozen):

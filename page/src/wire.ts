@@ -294,7 +294,9 @@ export interface Progress {
   steps: number;
   indexed: number;
   live: boolean;
-  /** Seconds from the host's publication of the newest step to this line; None if nothing is live. */
+  /**
+   * Seconds from the host's report of the newest step until it could be asked for; None if nothing is live.
+   */
   lag_s: number | null;
 }
 
