@@ -10,9 +10,16 @@ Lengths are counted in game loops (22.4 per second at the speed called "faster")
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from khala_protocol.field_words import field_words
+
+if TYPE_CHECKING:
+    from pydantic import GetJsonSchemaHandler
+    from pydantic.json_schema import JsonSchemaValue
+    from pydantic_core import CoreSchema
 
 SCHEMA_VERSION: Literal[1] = 1
 """Major version of the schema. A peer with another one is refused."""
@@ -82,7 +89,17 @@ Purpose = Literal["decision", "summary"]
 class Frozen(BaseModel):
     """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON lacks) are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Return the schema, with the sentence under each field as its description."""
+        schema = handler(core)
+        properties = handler.resolve_ref_schema(schema).get("properties", {})
+        words = field_words(cls)
+        for name in properties.keys() & words.keys():
+            properties[name].setdefault("description", words[name])
+        return schema
 
     def but(self, **changes: object) -> Self:
         """Return a copy with some fields replaced, unchecked.
