@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from khala_protocol.clock_rule import ClockRule  # pydantic evaluates it
 from khala_protocol.field_words import field_words
 
 if TYPE_CHECKING:
@@ -42,7 +43,6 @@ Alliance = Literal["own", "ally", "enemy", "neutral"]
 Outcome = Literal["win", "draw", "loss"]
 Ending = Literal["win", "draw", "loss", "aborted"]
 """How an episode ended for one side; `aborted` if the host ended it, because it could not be played as it should be."""
-ClockRule = Literal["frozen", "budget", "token", "realtime"]
 
 RejectionReason = Literal[
     "malformed",  # looks like a call, but is not one

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.cli import _until_interrupted, _why_not_valid
+from khala.commands import until_interrupted, why_not_valid
 from khala.local import _shares_of, _taken_off
 from khala.minds import Minds, minds_of, named_sides, spent_usd
 from khala_orchestrator.config import MatchConfig, load_task
@@ -128,13 +128,13 @@ def test_a_match_that_is_not_valid_says_so_without_markup(capsys: pytest.Capture
 
     match = MatchConfig(task=load_task("2s3z"), run="r")
     with pytest.raises(typer.Exit) as ended:
-        _until_interrupted(match, as_json=False, play=lambda _: play())
+        until_interrupted(match, as_json=False, play=lambda _: play())
     assert ended.value.exit_code == 3
     assert capsys.readouterr().err.endswith("\nnot valid: the [red] side left\n")
 
 
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
-    assert list(_why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
-    assert list(_why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
-    assert list(_why_not_valid([result("blue", "x")])) == ["x"]
-    assert list(_why_not_valid([result("blue"), result("red")])) == []
+    assert list(why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
+    assert list(why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
+    assert list(why_not_valid([result("blue", "x")])) == ["x"]
+    assert list(why_not_valid([result("blue"), result("red")])) == []
