@@ -137,23 +137,21 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.commands import until_interrupted  # noqa: PLC0415  # see there
-    from khala.local import play  # noqa: PLC0415
-    from khala.matches import new_or_resumed  # noqa: PLC0415
-    from khala.minds import Minds, minds_of, named_sides  # noqa: PLC0415
+    from khala.run import Wanted  # noqa: PLC0415  # see there
+    from khala.run import run as play  # noqa: PLC0415
 
-    config, past = new_or_resumed(
-        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
-        thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
-    )  # fmt: skip
-    common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
-    named = named_sides(side_model or (), blue=blue, red=red)
-    minds = minds_of([side.side for side in config.task.per_side()], common, named)
-    until_interrupted(
-        config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
-    )
+    match = {
+        "seed": seed, "episodes": episodes, "assemble_s": assemble, "executor": executor, "rule": clock,
+        "max_wait_s": max_wait, "step_loops": step_loops, "rhythm": rhythm, "thinking_loops": thinking_loops,
+        "speed": speed, "grace_s": grace, "max_steps": max_steps, "memory": memory, "images": images,
+        "opponent": opponent,
+    }  # fmt: skip
+    minds = {
+        "model": model, "model_name": model_name, "base_url": base_url, "policy": policy, "budget_usd": budget_usd,
+        "latency_s": latency, "fallback": fallback,
+    }  # fmt: skip
+    wanted = Wanted(task, resume, run, out, game, match, minds, side_model or (), {"blue": blue, "red": red})
+    play(wanted, as_json=as_json)
 
 
 def host(

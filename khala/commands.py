@@ -1,4 +1,4 @@
-"""The work of `khala run`, `khala host` and `khala doctor`, as far as `khala.local` does not do it.
+"""The work of `khala host` and `khala doctor`, and the end of `khala run`, which `khala.run` begins.
 
 `khala.cli` above has the options. It imports this module only to run a command: tasks and messages take half a second
 to import, and `--help` need not wait for that.
@@ -49,9 +49,14 @@ def until_interrupted(
     config: MatchConfig, as_json: bool, play: Callable[[Callable[[Wire], None]], Coroutine[Any, Any, list[Result]]]
 ) -> None:
     """Play with a live picture, print the results, and end in order on SIGINT and SIGTERM."""
-    screen = stderr_console()
-    with Progress(screen, config.task.max_steps) as progress:
+    with Progress(stderr_console(), config.task.max_steps) as progress:
         results = asyncio.run(cancelled_by_signal(play(progress)))
+    end(config, results, as_json=as_json)
+
+
+def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json: bool) -> None:
+    """Print the results of a match, or that a signal ended it, and exit with the code for it."""
+    screen = stderr_console()
     if isinstance(results, signal.Signals):
         screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)
         raise typer.Exit(SIGNALLED + results)

@@ -7,9 +7,14 @@ reference in the documentation and the schemas inside recordings need them.
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import itertools
-import textwrap
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 def field_words(model: type) -> dict[str, str]:
@@ -17,16 +22,21 @@ def field_words(model: type) -> dict[str, str]:
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
         if "__annotations__" in vars(base):
-            found |= _own(base)
+            found |= _of_module(base.__module__).get(base.__qualname__, {})
     return found
 
 
-def _own(model: type) -> dict[str, str]:
+@functools.cache
+def _of_module(name: str) -> Mapping[str, Mapping[str, str]]:
+    """Return the docstrings under the fields of each class at the top of a module, which is parsed once."""
     try:
-        source = inspect.getsource(model)
+        tree = ast.parse(inspect.getsource(sys.modules[name]))
     except (OSError, TypeError):  # made at run time, or installed without sources
         return {}
-    (definition,) = (node for node in ast.parse(textwrap.dedent(source)).body if isinstance(node, ast.ClassDef))
+    return {node.name: _of_class(node) for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+def _of_class(definition: ast.ClassDef) -> Mapping[str, str]:
     return {
         field.target.id: inspect.cleandoc(text.value.value)
         for field, text in itertools.pairwise(definition.body)

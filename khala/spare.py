@@ -2,7 +2,7 @@
 
 To import it takes a process half a second of a free core, and two on a busy machine; what it then becomes is `khala
 agent` or `khala llm` with the same arguments and environment as one that is started for the purpose. Each is for one
-use. `python -m khala.service.spare` is the process; `Spares` is the stock that its parent keeps.
+use. `python -m khala.spare` is the process; `Spares` is the stock that its parent keeps.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ async def _started() -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
-        "khala.service.spare",
+        "khala.spare",
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**environment.plain(), **named_parent()},
