@@ -18,6 +18,7 @@ import asyncio
 import contextlib
 import json
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -244,6 +245,167 @@ def listener(keys: Path, task: TaskConfig, agents: int) -> BusConfig:
     return BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(keys, "router"), zenoh=rules)
 
 
+@contextlib.contextmanager
+def endpoint() -> Iterator[str]:
+    """Yield the address of the scripted model, in a process of its own."""
+    command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as llm:
+        try:
+            assert llm.stdout is not None
+            yield str(json.loads(llm.stdout.readline())["base_url"])
+        finally:
+            llm.terminate()
+
+
+async def measure(self, steps: int, children: Children, options: list[str]) -> Measured:
+        """Start the agents, and play `steps` steps and one to warm up."""
+        names = [seat.agent for seat in self.seats]
+        for number, share in enumerate(shares(names, AGENT_PROCESSES)):
+            await children.start(f"{self.run}-{number}", "agent", *share, "--run", self.run, *options)
+        measured = Measured(len(names))
+        async with (
+            Announcer(self.bus, self.run, self.seats) as announcer,
+            Attendance(self.bus, self.run, self.seats) as roster,
+            Turn(self.bus, self.run, roster) as turn,
+        ):
+            log = await self.bus.subscribe(every_agent(self.run, Topic.EXCHANGE), Delivery.LOG, depth=4096)
+            listening = asyncio.create_task(self._listen(log))
+            await announcer.run(_card(self.run, self.task))
+            for agent in self.task.agents:
+                await announcer.brief(briefing(self.task, agent, self.run, 0))
+            await roster.assemble(self.seats, 120)
+            for number in range(steps + 1):
+                await self._step(turn, number, measured if number else Measured(0))
+            await log.close()
+            await listening
+        return measured
+
+    async def _step(self, turn: Turn, number: int, measured: Measured) -> None:
+        began = time.perf_counter()
+        seen = self.observer.observe(self.snapshot)
+        answers = await turn.ask(self._questions(seen, number, measured))
+        asked = time.perf_counter()
+        assert {answer.status for answer in answers.by_seat.values()} == {"ok"}
+        speeches = {seat.agent: parse(answer.text or "") for seat, answer in answers.by_seat.items()}
+        self.actor.joint(seen, speeches)
+        ended = time.perf_counter()
+        measured.step_s.append(ended - began)
+        await self._told()
+        for part, value in self._last(answers, asked - began).items():
+            measured.parts_s[part].append(value)
+        measured.parts_s["build"].append(asked - began - answers.publish_s - answers.wait_s)
+        measured.parts_s["merge"].append(ended - asked)
+
+    def original_s(self, base_url: str, steps: int) -> list[float]:
+        """Return the durations of the same steps in the way of the original."""
+        seen = self.observer.observe(self.snapshot)
+
+        def build() -> Iterator[str]:
+            nonlocal seen
+            seen = self.observer.observe(self.snapshot)
+            return (agent.text for agent in seen.agents.values())
+
+        def act(replies: list[str]) -> None:
+            speeches = {seat.agent: parse(reply) for seat, reply in zip(self.seats, replies, strict=True)}
+            self.actor.joint(seen, speeches)
+
+        return step_s(base_url, "silent", build, act, steps)
+
+    def _last(self, answers: Answers, ask_s: float) -> dict[str, float]:
+        """Return the parts of the agent whose reply came last."""
+
+        def arrival(item: tuple[Seat, Answer]) -> float:
+            return item[1].latency_s or 0.0
+
+        seat, answer = max(answers.by_seat.items(), key=arrival)
+        assert answer.reply is not None and answer.latency_s is not None
+        request = decode_as(ModelCall, self.exchanges[seat.agent])
+        return {
+            "before": ask_s - answer.latency_s,  # until its own observation was made and put
+            "bus": answer.latency_s - answer.reply.latency_s,
+            "agent": answer.reply.latency_s - request.latency_s,
+            "http": request.latency_s - LATENCY_S,
+        }
+
+    def _questions(self, side: SideObservation, number: int, measured: Measured) -> Iterator[Question]:
+        for seen in side.agents.values():
+            observation = Observation(
+                run=self.run, agent=seen.agent.name, side=self.task.side, episode=0, step=number,
+                game_loop=8 * number, answer_within_s=30, text=seen.text, view=seen.view,
+            )  # fmt: skip
+            measured.observation_bytes = measured.observation_bytes or len(observation.model_dump_json())
+            yield Question(observation)
+
+    async def _listen(self, log: Subscription[Sample]) -> None:
+        async for sample in log:
+            self.exchanges[parse_key(sample.key).agent or ""] = sample.payload  # as a host does, which only records it
+            self.arrived.set()
+
+    async def _told(self) -> None:
+        """Wait until the exchanges of the step are here; they may be a moment later than the replies."""
+        while len(self.exchanges) < len(self.seats):
+            self.arrived.clear()
+            async with asyncio.timeout(10):
+                await self.arrived.wait()
+
+
+class Everybodys(TeamRoster):
+    """The first agent's units for every agent: any number of agents, each with a whole battle to see."""
+
+    def __init__(self, agents: Sequence[AgentConfig]) -> None:
+        super().__init__(agents[:1])
+        self._first = agents[0].name
+
+    def teams(self, agent: str) -> tuple[Team, ...]:
+        return tuple(replace(team, agent=agent) for team in super().teams(self._first))
+
+    def idle_teams(self, agent: str) -> tuple[str, ...]:  # noqa: ARG002  # all have the same
+        return super().idle_teams(self._first)
+
+
+def crowd(task: TaskConfig, agents: int) -> TaskConfig:
+    """Return the task with copies of its agent."""
+    (first,) = task.agents
+    copies = (first.model_copy(update={"name": f"Agent{number}"}) for number in range(agents))
+    return task.model_copy(update={"agents": tuple(copies), "communication": False})
+
+
+def _card(run: str, task: TaskConfig) -> Run:
+    return Run(
+        run=run, task=task.name, map_name=task.map_spec.name, map_sha256="", seed=0, episodes=1, game="none",
+        executor="raw", clock=task.clock, agents=(), catalogue_sha256="", versions={},
+    )  # fmt: skip
+
+
+async def battle(task: TaskConfig) -> Snapshot:
+    """Return a snapshot from the middle of a battle."""
+    sc2path, _ = games.find("simulator")
+    async with game_of(MatchConfig(task=task, run="bench"), sc2path) as game:
+        (snapshot,) = await game.reset()
+        for _ in range(BATTLE_STEPS):
+            snapshot = (await game.act([[]], task.clock.step_loops))[0].snapshot
+    return snapshot
+
+
+def listener(keys: Path, task: TaskConfig, agents: int) -> BusConfig:
+    """Return the configuration of a host that listens over TLS, with certificates and access rules for its agents."""
+    make_authority(keys, ["127.0.0.1"])
+    names = [(task.side, agent.name) for agent in crowd(task, agents).agents]
+    for side, name in names:
+        certify_agent(keys, side, name)
+    rules = router_settings(names)
+    return BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(keys, "router"), zenoh=rules)
+
+
+async def endpoint_of(children: Children, ready: Path) -> str:
+    """Start the scripted model in a process of its own, and return its address."""
+    options = ("--port", "0", "--ready-file", str(ready), "--latency", str(LATENCY_S))
+    await children.start("llm", "llm", *options)
+    while not ready.exists():
+        await asyncio.sleep(0.05)
+    return str(json.loads(ready.read_text())["base_url"])
+
+
 async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool, tls: bool) -> list[Measured]:
     """Measure every number of agents, ours, over TLS as well if asked for, and the original's way."""
     task = load_task("2s3z")
@@ -251,22 +413,21 @@ async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bo
     found = []
     async with contextlib.AsyncExitStack() as stack:
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        children = await stack.enter_async_context(Children(logs))
-        llm = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S))
-        endpoint = LOOPBACK if tcp else stack.enter_context(local_endpoint())
-        links = [BusConfig(mode="router", listen=(endpoint,))]
+        base_url = stack.enter_context(endpoint())
+        here = LOOPBACK if tcp else stack.enter_context(local_endpoint())
+        links = [BusConfig(mode="router", listen=(here,))]
         links += [listener(logs / "keys", task, max(agents))] if tls else []
         buses = [await open_bus(link) for link in links]
         for bus in buses:
             stack.push_async_callback(bus.close)
         for count, bus in ((count, bus) for count in agents for bus in buses):
-            options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
+            options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", base_url]
             options += ["--tls", str(logs / "keys")] if bus is not buses[0] else []
             async with Children(logs) as workers:
                 bench = Bench(bus, f"bench-{count}", task, snapshot, count)
                 measured = await bench.measure(steps, workers, [*options, "--model-name", "silent"])
             measured.link = bus.endpoints[0].partition("/")[0]
-            measured.original_s = await asyncio.to_thread(bench.original_s, llm["base_url"], original_steps)
+            measured.original_s = await asyncio.to_thread(bench.original_s, base_url, original_steps)
             found.append(measured)
     return found
 

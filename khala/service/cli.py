@@ -74,9 +74,7 @@ def serve(
         typer.Option(min=0.1, help="Memory of all matches together.", show_default="80 % of the machine", metavar="X"),
     ] = None,
     warm: Annotated[int, typer.Option(min=0, help="Workers that wait, ready to play at once.", metavar="N")] = 1,
-    spares: Annotated[
-        int, typer.Option(min=0, help="Processes for agents and the scripted model in each of them.", metavar="N")
-    ] = 3,
+    spares: Annotated[int, typer.Option(min=0, help="Processes for agents in each of them.", metavar="N")] = 1,
     queue: Annotated[int, typer.Option(min=0, help="Matches that may wait; more are refused.", metavar="N")] = 100,
     game: Game = "simulator",
     out: Out = Path("runs"),

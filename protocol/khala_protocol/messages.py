@@ -34,6 +34,9 @@ MOST = 2**53
 MAX_DETAIL_CHARACTERS = 200
 """Longest reason for a fallback."""
 
+MAX_REPLY_CHARACTERS = 65_536
+"""The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
+
 MAX_ADVICE_CHARACTERS = 500
 """Longest message of an adviser."""
 

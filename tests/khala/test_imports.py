@@ -43,3 +43,13 @@ assert isinstance(rich_utils.Markdown("# x"), Markdown)
 assert isinstance(rich_utils.Traceback.from_exception(ValueError, ValueError("x"), None), Traceback)
 """
     imported(script + SHOW)
+
+
+def test_an_agent_imports_no_game_and_no_language_of_replies_before_its_first_observation() -> None:
+    heavy = {"cryptography", "httpx", "khala_bridge", "khala_protocol.speech", "mcap", "numpy", "pysc2", "scipy"}
+    assert imported(f"import khala.cli, khala_agents.commands\n{SHOW}") & heavy == set()
+
+
+def test_a_host_imports_no_client_of_models_and_nothing_that_draws_or_meets_guests() -> None:
+    heavy = {"aiohttp", "cryptography", "httpx", "khala_bridge.game.guest", "pysc2.lib.video_writer", "scipy"}
+    assert imported(f"import khala.local, khala.matches\n{SHOW}") & heavy == set()
