@@ -13,7 +13,7 @@ from pathlib import Path
 MEASUREMENTS = (
     "turn", "bus", "simulator_env", "simulator_engine", "simulator_memory", "observe", "abilities", "act",
     "recognition", "macro", "image", "http_client", "recording", "measures", "orphans", "strangers", "clocks",
-    "pace", "serve", "scenes",
+    "pace", "serve", "scenes", "start", "view",
     "faults", "resume", "soak", "mining", "crowds",
 )  # fmt: skip
 

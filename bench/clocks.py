@@ -34,8 +34,9 @@ from khala_agents.worker import run_workers
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
 from khala_protocol.bus.memory import MemoryBroker
+from khala_protocol.clock_rule import ClockRule
 from khala_protocol.keys import Topic
-from khala_protocol.messages import ClockRule, Report
+from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:

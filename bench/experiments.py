@@ -25,7 +25,7 @@ from typing import Any
 
 from aiohttp import web
 
-from khala.experiment.cli import words_of
+from khala.experiment.commands import words_of
 from khala.experiment.engine import Local
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner, pilot_of

@@ -44,8 +44,9 @@ from khala_protocol.access import REPLY_BYTES, router_settings
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig, TlsFiles, host_port_of
 from khala_protocol.bus.zenoh import open_bus
-from khala_protocol.certificates import agent_name, certify_agent, files_of, make_authority
+from khala_protocol.certificates import certify_agent, files_of, make_authority
 from khala_protocol.codec import encode
+from khala_protocol.common_names import agent_name
 from khala_protocol.keys import Topic, agent_key
 from khala_protocol.messages import Observation, Reply, View
 from khala_protocol.recording import Recorder

@@ -18,6 +18,7 @@ import asyncio
 import contextlib
 import json
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -244,6 +245,18 @@ def listener(keys: Path, task: TaskConfig, agents: int) -> BusConfig:
     return BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(keys, "router"), zenoh=rules)
 
 
+@contextlib.contextmanager
+def endpoint() -> Iterator[str]:
+    """Yield the address of the scripted model, in a process of its own."""
+    command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as llm:
+        try:
+            assert llm.stdout is not None
+            yield str(json.loads(llm.stdout.readline())["base_url"])
+        finally:
+            llm.terminate()
+
+
 async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool, tls: bool) -> list[Measured]:
     """Measure every number of agents, ours, over TLS as well if asked for, and the original's way."""
     task = load_task("2s3z")
@@ -251,22 +264,21 @@ async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bo
     found = []
     async with contextlib.AsyncExitStack() as stack:
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        children = await stack.enter_async_context(Children(logs))
-        llm = await children.start_ready("llm", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S))
-        endpoint = LOOPBACK if tcp else stack.enter_context(local_endpoint())
-        links = [BusConfig(mode="router", listen=(endpoint,))]
+        base_url = stack.enter_context(endpoint())
+        here = LOOPBACK if tcp else stack.enter_context(local_endpoint())
+        links = [BusConfig(mode="router", listen=(here,))]
         links += [listener(logs / "keys", task, max(agents))] if tls else []
         buses = [await open_bus(link) for link in links]
         for bus in buses:
             stack.push_async_callback(bus.close)
         for count, bus in ((count, bus) for count in agents for bus in buses):
-            options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", llm["base_url"]]
+            options = ["--side", task.side, "--connect", bus.endpoints[0], "--base-url", base_url]
             options += ["--tls", str(logs / "keys")] if bus is not buses[0] else []
             async with Children(logs) as workers:
                 bench = Bench(bus, f"bench-{count}", task, snapshot, count)
                 measured = await bench.measure(steps, workers, [*options, "--model-name", "silent"])
             measured.link = bus.endpoints[0].partition("/")[0]
-            measured.original_s = await asyncio.to_thread(bench.original_s, llm["base_url"], original_steps)
+            measured.original_s = await asyncio.to_thread(bench.original_s, base_url, original_steps)
             found.append(measured)
     return found
 

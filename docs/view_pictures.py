@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 OUT = Path(__file__).parent / "images" / "view"
 WIDE, PHONE = (1440, 900), (390, 844)
 QUALITY = 82
+Role = Literal["button", "checkbox", "link"]
+FIT: tuple[Role, str] = ("button", "Fit")
+CURVES: tuple[Role, str] = ("button", "Curves")
 SETTLED_MS = 2500
 """Until the pictures of the page have come and its map is drawn."""
 
@@ -42,8 +45,7 @@ class Picture:
         share: of the match, where the clock stands.
         size: of the window.
         dark: whether the page is dark.
-        link: added to the address of the moment.
-        click: buttons and tabs to click, by their names.
+        click: what to click, by its role and name.
     """
 
     name: str
@@ -51,8 +53,7 @@ class Picture:
     share: float = 0.5
     size: tuple[int, int] = WIDE
     dark: bool = False
-    link: str = ""
-    click: tuple[str, ...] = ()
+    click: tuple[tuple[Role, str], ...] = ()
 
 
 def battle(directory: Path) -> tuple[Path, ...]:
@@ -103,12 +104,12 @@ def khala(*arguments: str) -> None:
 
 
 PICTURES = (
-    Picture("battle", battle, 0.62),
-    Picture("full-game", full_game, 0.8, click=("Curves",)),
-    Picture("live", going_on, 1.0, dark=True),
+    Picture("battle", battle, 0.7, click=(FIT,)),
+    Picture("full-game", full_game, 0.85, click=(CURVES, ("checkbox", "Workers"), ("checkbox", "Supply"), CURVES)),
+    Picture("live", going_on, 1.0, dark=True, click=(FIT,)),
     Picture("two-runs", two_runs, 0.6),
-    Picture("experiment", experiment),
-    Picture("phone", battle, 0.62, size=PHONE),
+    Picture("experiment", experiment, click=(("link", "smoke"),)),
+    Picture("phone", battle, 0.7, size=PHONE, click=(FIT,)),
 )
 
 
@@ -126,12 +127,12 @@ def draw(browser: Browser, picture: Picture, directory: Path) -> Path:
         page.goto(viewer.address)
         page.wait_for_timeout(SETTLED_MS)
         if (moment := page.get_by_role("slider", name="Moment")).count():
-            last = int(re.findall(r"step \d+ of (\d+)", page.inner_text("body"))[0])
-            step = round(last * picture.share)
-            page.evaluate("step => { location.hash = location.hash.replace(/&s=\\d+/, '') + `&s=${step}` }", step)
-            moment.focus()
-        for name in picture.click:
-            page.get_by_role("button", name=name, exact=True).click()
+            last = float(moment.get_attribute("aria-valuemax") or 0)
+            box = moment.bounding_box()
+            assert box is not None
+            print(last, box)
+        for role, name in picture.click:
+            page.get_by_role(role, name=name, exact=True).click()
         page.wait_for_timeout(SETTLED_MS)
         pixels = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
         context.close()

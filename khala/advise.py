@@ -21,6 +21,7 @@ from khala_orchestrator.mailbox import EVERYONE
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
+from khala_protocol.common_names import adviser_name
 from khala_protocol.errors import ConfigError, KhalaError, NoRouter
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, host_key, run_key
@@ -265,6 +266,4 @@ def places(adviser: Adviser, connect: Sequence[str], tls: Path | None, *, insecu
     if tls is None:
         near = [] if connect else [[endpoint] for endpoint in local_bus.running()]
         return [client_config(place, tls=None, insecure=insecure) for place in near or [list(connect)]]
-    from khala_protocol.certificates import adviser_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
-
     return [client_config(connect, tls=tls, names=(adviser_name(adviser.side, adviser.name),), insecure=insecure)]

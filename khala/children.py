@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import signal
 import subprocess
 import sys
 from collections import deque
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from khala import environment
 from khala_protocol.errors import KhalaError
@@ -45,14 +44,12 @@ class Spawn(Protocol):
     """How a process comes to be."""
 
     async def __call__(
-        self, arguments: Sequence[str], environ: Mapping[str, str], log: Path, stdout: int
+        self, arguments: Sequence[str], environ: Mapping[str, str], log: Path
     ) -> asyncio.subprocess.Process:
         """Return a process that runs `khala <arguments>`, with this environment, and stderr at the end of `log`."""
 
 
-async def spawn(
-    arguments: Sequence[str], environ: Mapping[str, str], log: Path, stdout: int
-) -> asyncio.subprocess.Process:
+async def spawn(arguments: Sequence[str], environ: Mapping[str, str], log: Path) -> asyncio.subprocess.Process:
     """Start a new process; see `Spawn`."""
     with log.open("ab") as stderr:
         return await asyncio.create_subprocess_exec(
@@ -61,7 +58,7 @@ async def spawn(
             "khala",
             *arguments,
             stdin=subprocess.DEVNULL,
-            stdout=stdout,
+            stdout=subprocess.DEVNULL,
             stderr=stderr,
             env=environ,
             start_new_session=True,
@@ -94,26 +91,8 @@ class Children:
         """
         await self._add(name, arguments, environ).start()
 
-    async def start_ready(self, name: str, *arguments: str, within_s: float = 30.0) -> Any:
-        """Start `khala <arguments>` without keys, and return its first line on stdout, read as JSON.
-
-        Raises:
-            ChildDied: it ended, or printed nothing in time.
-        """
-        child = self._add(name, arguments, None)
-        process = await child.start(subprocess.PIPE)
-        assert process.stdout is not None
-        try:
-            async with asyncio.timeout(within_s):
-                line = await process.stdout.readline()
-        except TimeoutError:
-            raise ChildDied(f"`khala {arguments[0]}` was not ready within {within_s:g} s{child.quote()}") from None
-        if not line:
-            raise ChildDied(f"`khala {arguments[0]}` did not start{child.quote()}")
-        return json.loads(line)
-
     def start_again_with(self, name: str, *arguments: str) -> None:
-        """Have a child that fails started again with other arguments, such as the port that it got."""
+        """Have a child that fails started again with other arguments, such as what is left of a budget."""
         self._children[name].arguments = arguments
 
     async def keep(self, begun: asyncio.Event) -> None:
@@ -145,13 +124,12 @@ class _Child:
         self._begins_at = 0
         self._failures = 0
 
-    async def start(self, stdout: int = subprocess.DEVNULL) -> asyncio.subprocess.Process:
+    async def start(self) -> None:
         """Start the process."""
         self._log.touch(0o600)
         self._begins_at = self._log.stat().st_size
         self._started_s = asyncio.get_running_loop().time()
-        self._process = await self._spawn(self.arguments, self._environ, self._log, stdout)
-        return self._process
+        self._process = await self._spawn(self.arguments, self._environ, self._log)
 
     async def keep(self, begun: asyncio.Event) -> None:
         """Start the process again when it fails, see `Children.keep`."""

@@ -1,19 +1,16 @@
-"""The command line: mount the packages' commands, add those that need all packages, print errors as one sentence."""
+"""The command line: mount the packages' commands, add those that need all packages, print errors as one sentence.
 
-import asyncio
-import json
+A command imports what it needs when it runs: this module, and every module with options that it imports, knows no
+pydantic, no game and no bus. `tests/khala/test_imports.py` holds them to it.
+"""
+
 import logging
-import signal
 import sys
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-from rich.text import Text
 
 import khala_agents.cli
 import khala_orchestrator.cli
@@ -23,9 +20,9 @@ from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
 from khala.dataset.cli import app as dataset
-from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.cli import app as experiment
 from khala.fork.cli import FORK_EPILOG, fork
+from khala.help import Group
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.options import (
@@ -61,20 +58,14 @@ from khala.options import (
 )
 from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
 from khala.view.cli import VIEW_EPILOG, view
-from khala_orchestrator.cli import Insecure, Json, Listen, Tls, access_rules
-from khala_orchestrator.config import MatchConfig
-from khala_orchestrator.console import Progress, stderr_console
-from khala_protocol.bus.config import BusConfig
+from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_protocol.commandline import run_command
-from khala_protocol.errors import ConfigError
-from khala_protocol.joining import client_config, router_config
 from khala_protocol.keys import check_name
-from khala_protocol.messages import Result, Wire
-from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import VisibleFormatter
 
 app = typer.Typer(
     name="khala",
+    cls=Group,
     help="Teams of LLM agents play StarCraft II together over a message bus.",
     epilog="Begin with: khala run 2s3z_pair",
     no_args_is_help=True,
@@ -147,22 +138,21 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.local import play  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
-    from khala.matches import new_or_resumed  # noqa: PLC0415
-    from khala.minds import Minds, minds_of, named_sides  # noqa: PLC0415
+    from khala.run import Wanted  # noqa: PLC0415  # see there
+    from khala.run import run as play  # noqa: PLC0415
 
-    config, past = new_or_resumed(
-        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
-        thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
-    )  # fmt: skip
-    common = Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)
-    named = named_sides(side_model or (), blue=blue, red=red)
-    minds = minds_of([side.side for side in config.task.per_side()], common, named)
-    _until_interrupted(
-        config, as_json, lambda watch: play(config, minds, out / config.run, game=game, watch=watch, past=past)
-    )
+    match = {
+        "seed": seed, "episodes": episodes, "assemble_s": assemble, "executor": executor, "rule": clock,
+        "max_wait_s": max_wait, "step_loops": step_loops, "rhythm": rhythm, "thinking_loops": thinking_loops,
+        "speed": speed, "grace_s": grace, "max_steps": max_steps, "memory": memory, "images": images,
+        "opponent": opponent,
+    }  # fmt: skip
+    minds = {
+        "model": model, "model_name": model_name, "base_url": base_url, "policy": policy, "budget_usd": budget_usd,
+        "latency_s": latency, "fallback": fallback,
+    }  # fmt: skip
+    wanted = Wanted(task, resume, run, out, game, match, minds, side_model or (), {"blue": blue, "red": red})
+    play(wanted, as_json=as_json)
 
 
 def host(
@@ -200,6 +190,7 @@ def host(
 
     With --listen the host is its own router; with --connect it uses one, see `khala router`.
     """
+    from khala.commands import bus_of, until_interrupted  # noqa: PLC0415  # see there
     from khala.local import play_hosted  # noqa: PLC0415
     from khala.matches import new_or_resumed  # noqa: PLC0415
 
@@ -209,8 +200,8 @@ def host(
         thinking_loops=thinking_loops,
         speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
     )  # fmt: skip
-    bus = _bus(config, connect, listen, tls, insecure=insecure)
-    _until_interrupted(
+    bus = bus_of(config, connect, listen, tls, insecure=insecure)
+    until_interrupted(
         config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch, past=past)
     )
 
@@ -249,19 +240,9 @@ def advise(
 
 def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
     """Look at this machine as a match would, and say what to do."""
-    from khala.doctor import examine  # noqa: PLC0415
+    from khala import commands  # noqa: PLC0415  # see there
 
-    findings = list(examine(tls))
-    wrong = any(finding.state == "wrong" for finding in findings)
-    if as_json:
-        typer.echo(json.dumps({"ok": not wrong, "findings": [finding.as_dict() for finding in findings]}))
-    else:
-        marks = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "wrong": "[red]wrong[/]"}
-        table = Table(box=None, pad_edge=False, show_header=False)
-        for finding in findings:
-            table.add_row(marks[finding.state], finding.name, finding.found, f"[dim]{escape(finding.advice)}[/]")
-        Console().print(table)
-    raise typer.Exit(FAILED if wrong else DONE)
+    commands.doctor(tls, as_json=as_json)
 
 
 def version(value: bool) -> None:  # typer calls it with the flag
@@ -317,44 +298,3 @@ app.add_typer(knowledge, name="knowledge")
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
     run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
-
-
-def _bus(
-    match: MatchConfig, connect: list[str] | None, listen: list[str] | None, tls: Path | None, *, insecure: bool
-) -> BusConfig:
-    if connect and listen:
-        raise ConfigError("a host has a router or is one: give --connect or --listen, not both")
-    if listen:
-        rules = access_rules([match.task], match.run) if tls else None
-        return router_config(listen, tls=tls, insecure=insecure, rules=rules)
-    return client_config(connect or (), tls=tls, names=("host",), insecure=insecure)
-
-
-def _until_interrupted(
-    config: MatchConfig, as_json: bool, play: Callable[[Callable[[Wire], None]], Coroutine[Any, Any, list[Result]]]
-) -> None:
-    """Play with a live picture, print the results, and end in order on SIGINT and SIGTERM."""
-    screen = stderr_console()
-    with Progress(screen, config.task.max_steps) as progress:
-        results = asyncio.run(cancelled_by_signal(play(progress)))
-    if isinstance(results, signal.Signals):
-        screen.print(f"interrupted; what was played is in {config.record}", soft_wrap=True)
-        raise typer.Exit(SIGNALLED + results)
-    screen.print(f"recorded: `khala replay {config.record}` tells it", soft_wrap=True)
-    if as_json:
-        plain = [result.model_dump(mode="json") for result in results]
-        typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    if reasons := list(_why_not_valid(results)):
-        screen.print(Text.assemble(("not valid:", "bold red"), f" {'; '.join(reasons)}"), soft_wrap=True)
-        raise typer.Exit(NOT_VALID)
-
-
-def _why_not_valid(results: Sequence[Result]) -> Iterator[str]:
-    """Yield each reason once, after the name of the side if it is not every side's."""
-    sides: dict[str, list[str]] = {}
-    for result in results:
-        if not result.valid and result.side not in sides.setdefault(result.invalid_because, []):
-            sides[result.invalid_because].append(result.side)
-    every = {result.side for result in results}
-    for reason, those in sides.items():
-        yield reason if every == set(those) else f"{', '.join(those)}: {reason}"

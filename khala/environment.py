@@ -1,7 +1,7 @@
 """What the processes of a match find in their environment: what they need, and no key that is not theirs.
 
-An agent with a model gets the variables that the model's file names. The game and the scripted endpoint get neither
-keys nor proxies. A policy is code of the user, which may read anything, so its process gets all (see `khala.local`).
+An agent with a model gets the variables that the model's file names. The game gets neither keys nor
+proxies. A policy is code of the user, which may read anything, so its process gets all (see `khala.local`).
 """
 
 from __future__ import annotations

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from khala_orchestrator.cli import Json
 from khala_protocol.errors import ConfigError
@@ -98,6 +96,9 @@ def observer(
 @app.command()
 def show(directory: Directory, *, as_json: Json = False) -> None:
     """Show which certificates there are, and how long they are valid."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
     from khala_protocol.certificates import certificates  # noqa: PLC0415
 
     found = certificates(directory)

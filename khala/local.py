@@ -1,7 +1,8 @@
 """Everything of a match on this machine: the one module that knows all packages.
 
-The host runs in this process, with the game's PySC2 in one of its threads, and it is its own router. Agents run in
-their own processes and join over Zenoh, as they would from another machine; so does the scripted model's endpoint.
+The host runs in this process, with the game's PySC2 in one of its threads, and it is its own router; so does the
+endpoint of the scripted model. Agents run in their own processes and join over Zenoh, as they would from another
+machine.
 """
 
 from __future__ import annotations
@@ -11,14 +12,14 @@ import contextlib
 import logging
 from collections import Counter
 from dataclasses import dataclass
+from math import ceil
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
 
 from khala import games
 from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
-from khala.minds import groups_of, spent_usd
+from khala.minds import groups_of, scripted_endpoint, spent_usd
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -40,8 +41,12 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MAX_PROCESSES = 4
-"""Up to this many agents have a process each, more share them: a Python process costs half a second and 60 MB. Agents
-of two sides never share one, and each side gets half of the processes."""
+"""Up to this many agents with a policy have a process each, more share them: code of the user may compute, block or
+crash, and a Python process costs a second of processor time and 60 MB. Agents of two sides never share one, and each
+side gets half of the processes."""
+AGENTS_A_PROCESS = 16
+"""So many agents with a model share a process, since all they do is wait: 2 ms of processor time a decision. If it is
+killed, they are away together until it is started again, 2 s later, and the match goes on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +93,10 @@ async def play(
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
+        base_url = await scripted_endpoint(stack, groups_of(config.task, minds))
         children = await stack.enter_async_context(Children(directory, supplies.spawn))
         spent = spent_usd(past.recording) if past else {}
-        started = await _start_agents(children, config, minds, bus, spent)
+        started = await _start_agents(children, config, minds, bus, spent, base_url)
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
@@ -151,11 +157,14 @@ class _Share:
 
 
 async def _start_agents(
-    children: Children, config: MatchConfig, minds: Mapping[str, Minds], bus: ZenohBus, spent: Mapping[Seat, float]
+    children: Children,
+    config: MatchConfig,
+    minds: Mapping[str, Minds],
+    bus: ZenohBus,
+    spent: Mapping[Seat, float],
+    base_url: str | None,
 ) -> list[_Share]:
     groups = list(groups_of(config.task, minds))
-    scripted = [mind.latency_s for _, mind, _ in groups if mind.needs_endpoint]
-    base_url = await start_endpoint(children, scripted[0]) if scripted else None
     joined = ["--run", config.run, "--connect", bus.endpoints[0]]
     started = list(_shares_of(groups, joined, base_url))
     if any(spent.values()):
@@ -185,20 +194,16 @@ def _shares_of(
     sides = Counter(side for side, _, _ in groups)
     for side, count in sides.items():
         each = max(1, MAX_PROCESSES // len(sides) // count)
-        parts = [(mind, part) for of, mind, names in groups if of == side for part in shares(names, each)]
+        parts = [
+            (mind, part)
+            for of, mind, names in groups
+            if of == side
+            for part in shares(names, each if mind.policy else min(each, ceil(len(names) / AGENTS_A_PROCESS)))
+        ]
         for number, (mind, names) in enumerate(parts):
             process = f"agents-{number}" if len(sides) == 1 else f"agents-{side}-{number}"
             each_usd = None if mind.budget_usd is None else mind.budget_usd / len(parts)
             yield _Share(process, side, names, [*joined, *mind.options(base_url)], mind.environ, each_usd)
-
-
-async def start_endpoint(children: Children, latency_s: float) -> str:
-    """Start the scripted model, and return its address, which it keeps if it has to be started again."""
-    options = ("--json", "--latency", str(latency_s))
-    ready = await children.start_ready("llm", "llm", "--port", "0", *options)
-    base_url = str(ready["base_url"])
-    children.start_again_with("llm", "llm", "--port", str(urlsplit(base_url).port), *options)
-    return base_url
 
 
 async def _unless_one_dies(

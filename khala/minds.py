@@ -21,7 +21,8 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+    from contextlib import AsyncExitStack
 
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
@@ -134,6 +135,20 @@ def groups_of(task: TaskConfig, minds: Mapping[str, Minds]) -> Iterator[tuple[st
     for side in task.per_side():
         for mind, names in minds[side.side].groups([agent.name for agent in side.agents]):
             yield side.side, mind, names
+
+
+async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, Minds, Sequence[str]]]) -> str | None:
+    """Serve the scripted model in this process until the stack ends, if one of the groups asks it; return its address.
+
+    It needs a millisecond for an answer. A process of its own would take a second to start, and 68 MB.
+    """
+    latencies = [mind.latency_s for _, mind, _ in groups if mind.needs_endpoint]
+    if not latencies:
+        return None
+    from khala_agents.scripted.endpoint import Behaviour, Endpoint  # noqa: PLC0415  # aiohttp's server, only for this
+
+    endpoint = await stack.enter_async_context(Endpoint(Behaviour(latency_s=latencies[0])))
+    return endpoint.base_url
 
 
 def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> dict[str, Minds]:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from khala import games
 from khala.hosting import hosted
-from khala.minds import groups_of
+from khala.minds import groups_of, scripted_endpoint
 from khala_agents.llm.limits import Budget, own_turns
-from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.worker import run_workers
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus.memory import MemoryBroker
@@ -80,10 +79,7 @@ async def _policies(
 ) -> dict[str, dict[str, Policy]]:
     """Return the policies of all agents, by side; start the scripted endpoint if one asks it."""
     groups = list(groups_of(config.task, minds))
-    scripted = [mind.latency_s for _, mind, _ in groups if mind.needs_endpoint]
-    base_url = None
-    if scripted:
-        base_url = (await stack.enter_async_context(Endpoint(Behaviour(latency_s=scripted[0])))).base_url
+    base_url = await scripted_endpoint(stack, groups)
     budgets = {side: Budget(mind.budget_usd, source="the budget of the match") for side, mind in minds.items()}
     made: dict[str, dict[str, Policy]] = {side: {} for side in minds}
     for side, mind, names in groups:

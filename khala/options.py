@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from khala_protocol.messages import ClockRule
+from khala_protocol.clock_rule import ClockRule
 
 Task = Annotated[
     str | None, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")

@@ -25,6 +25,7 @@ from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.common_names import agent_name
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import BusError, ConfigError
 from khala_protocol.joining import client_config
@@ -71,7 +72,6 @@ class Place:
         """
         if self.tls is None:
             return [Link(client_config(self.connect, tls=None, insecure=self.insecure), list(names))]
-        from khala_protocol.certificates import agent_name  # noqa: PLC0415  # 60 ms, which links without TLS do without
 
         def link(name: str) -> Link:
             mine = (agent_name(side, name),)

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, ParamSpec
 from khala_agents.llm.client import LLMError
 from khala_agents.policy import Decision, Said
 from khala_agents.secret import scrub
-from khala_protocol.messages import MAX_DETAIL_CHARACTERS
-from khala_protocol.speech import MAX_REPLY_CHARACTERS
+from khala_protocol.messages import MAX_DETAIL_CHARACTERS, MAX_REPLY_CHARACTERS
 from khala_protocol.visible import visible
 
 if TYPE_CHECKING:

@@ -10,11 +10,10 @@ from __future__ import annotations
 import re
 from collections import deque
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from khala_protocol.messages import ChatMessage
-from khala_protocol.speech import parse
-from khala_protocol.speech.words import ANALYSIS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 MAX_THOUGHT_CHARACTERS = 200
 """Longest first sentence of an analysis; the rest is cut."""
 _THOUGHTS_END = re.compile(r"</\s*think(?:ing)?\s*>|◁/think▷", re.IGNORECASE)
-_ANALYSIS = re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*[:\uff1a]?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
 _SENTENCE = re.compile(r"[^\n]*?[.!?。](?=\s|$)|[^\n]*")
 
 
@@ -107,6 +105,8 @@ class Step:
     @classmethod
     def of(cls, observation: Observation, reply: str) -> Step:
         """Return what is kept of a step."""
+        from khala_protocol.speech import parse  # noqa: PLC0415  # its patterns take 0.15 s, for agents with a memory
+
         wrote = tuple(f"to {said.recipient}: {_line(said.text)}" for said in parse(reply).messages)
         new = tuple(message for message in observation.messages if not message.again)
         return cls(observation.view.time_s, first_sentence(reply), wrote, new)
@@ -160,13 +160,20 @@ def end_step(step: Step, observation: Observation) -> None:
 def first_sentence(reply: str) -> str:
     """Return the first sentence of a reply's analysis; of the reply, if it has no such heading; "" for mere calls."""
     said = _THOUGHTS_END.split(reply)[-1]
-    heading = _ANALYSIS.search(said)
+    heading = _analysis().search(said)
     rest = said[heading.end() :] if heading else said.lstrip()
     found = _SENTENCE.match(rest)
     sentence = _line(found[0] if found else "")
     if not heading and (sentence.startswith("<") or sentence.endswith(":")):
         return ""
     return _cut(sentence, MAX_THOUGHT_CHARACTERS)
+
+
+@cache
+def _analysis() -> re.Pattern[str]:
+    from khala_protocol.speech.words import ANALYSIS  # noqa: PLC0415  # as above
+
+    return re.compile(rf"^[*_#\s]*(?:{ANALYSIS})\b[*_\s]*[:\uff1a]?[*_]*\s*", re.IGNORECASE | re.MULTILINE)
 
 
 def minutes(seconds: float) -> str:

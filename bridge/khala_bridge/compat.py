@@ -100,7 +100,7 @@ with old_shuffle(), quiet_pygame(), late_video(), warnings.catch_warnings():
     warnings.simplefilter("ignore")
     from pysc2 import run_configs
     from pysc2.env import environment, lan_sc2_env, sc2_env
-    from pysc2.lib import actions, buffs, features, point, portspicker, protocol, units, upgrades
+    from pysc2.lib import actions, buffs, features, point, portspicker, protocol, remote_controller, units, upgrades
     from pysc2.maps import lib as maps
 
 __all__ = [
@@ -117,6 +117,7 @@ __all__ = [
     "protobuf_kind",
     "protocol",
     "quiet_pygame",
+    "remote_controller",
     "run_configs",
     "sc2_env",
     "units",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import inspect
 import io
-import itertools
 import json
 import re
 import tokenize
@@ -17,6 +16,7 @@ from pydantic import BaseModel, JsonValue
 from pydantic_core import PydanticUndefined, to_jsonable_python
 
 from docs.pages.markdown import anchor, code, prose, table
+from khala_protocol.field_words import field_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -55,13 +55,14 @@ class Describer:
     def fields(self, model: type[BaseModel], *, without: Iterable[str] = ()) -> str:
         """Return a table of the fields of a model."""
         hints = typing.get_type_hints(model, include_extras=True)
+        words = field_words(model)
         left_out = set(without)
         rows = [
             (
                 code(field.alias or name),
                 self._field(hints[name], field),
                 _default(field),
-                _null(field.description or ""),
+                _null(field.description or words.get(name, "")),
             )
             for name, field in model.model_fields.items()
             if name not in left_out
@@ -122,13 +123,7 @@ def attributes(model: type) -> list[tuple[str, str]]:
     Raises:
         LookupError: a field has none.
     """
-    (body,) = (node.body for node in ast.parse(inspect.getsource(model)).body if isinstance(node, ast.ClassDef))
-    texts = {
-        field.target.id: text.value.value
-        for field, text in itertools.pairwise(body)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
-    }
+    texts = field_words(model)
     own = [name for name in model.__annotations__ if name not in texts]
     if own:
         raise LookupError(f"{model.__name__} says nothing of {', '.join(own)}: write a docstring under each")

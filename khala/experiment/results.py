@@ -1,29 +1,28 @@
-"""The commands that read what was played: `khala experiment compare`, `report` and `export`."""
+"""The work of `khala experiment compare`, `report` and `export`, which read what was played.
+
+`khala.experiment.cli` above has the options.
+"""
+
+from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
 
-from khala.experiment.options import OUT, Directory, Out
-from khala_orchestrator.cli import Json
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.errors import ConfigError
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from khala.experiment.compare import Compared, Findings
     from khala.experiment.store import Store
 
-COMPARE_EPILOG = """
-Examples:\n
-    khala experiment compare smoke:player=skilled smoke:player=focus-fire\n
-    khala experiment compare monday tuesday --allow code\n
-    khala experiment compare pair:clock=frozen pair:clock=realtime --allow clock --measure win --measure tokens
-"""
-USUAL_MEASURES = ["win", "kd"]
+
 TO_SHOW_IT = (
     "To show it: with so many games more, a difference in wins that is as large as it seems here would be found in four"
     " of five experiments."
@@ -31,40 +30,14 @@ TO_SHOW_IT = (
 WIDE = 160
 """Characters of a line that no terminal shows."""
 
-One = Annotated[str, typer.Argument(help="DIR, or DIR:factor=value,factor=value.", show_default=False)]
-Allow = Annotated[
-    list[str] | None, typer.Option(help="A field in which the two may differ, such as clock.", metavar="FIELD")
-]
-Measure = Annotated[list[str], typer.Option(help="What is compared: win, or a column of the export.", metavar="NAME")]
-Format = Annotated[
-    Literal["markdown", "latex", "html", "all"], typer.Option("--format", help="In what the report is written.")
-]
-Into = Annotated[
-    Path | None,
-    typer.Option("--into", help="Directory of the report.", show_default="report, in that of the experiment"),
-]
-By = Annotated[
-    str, typer.Option(help="Factors whose values get a line each, with commas between.", show_default="all factors")
-]
-Parquet = Annotated[Path | None, typer.Option(help="File to write; needs the extra `data`.", metavar="FILE")]
-Csv = Annotated[Path | None, typer.Option(help="File to write.", metavar="FILE")]
 
-
-def compare(
-    a: One,
-    b: One,
-    *,
-    allow: Allow = None,
-    measure: Measure = USUAL_MEASURES,
-    out: Out = OUT,
-    as_json: Json = False,
-) -> None:
-    """Compare two selections of matches, paired by seed. Unlike runs are refused, with the fields that differ."""
+def compare(a: str, b: str, *, allow: Sequence[str], measures: Sequence[str], out: Path, as_json: bool) -> None:
+    """Print how two selections of matches compare."""
     from khala.experiment.compare import compare as compared  # noqa: PLC0415  # scipy takes a second
     from khala.experiment.numbers import plain  # noqa: PLC0415
     from khala.experiment.selection import select  # noqa: PLC0415
 
-    findings = compared(select(a, out), select(b, out), measures=measure, allow=allow or ())
+    findings = compared(select(a, out), select(b, out), measures=measures, allow=allow)
     if as_json:
         typer.echo(json.dumps(plain(findings)))
         return
@@ -75,16 +48,8 @@ def compare(
         screen.print(visible_line(line), soft_wrap=True)
 
 
-def report(
-    directory: Directory,
-    *,
-    formats: Format = "all",
-    into: Into = None,
-    by: By = "",
-    out: Out = OUT,
-    as_json: Json = False,
-) -> None:
-    """Make tables and figures of an experiment, with how it was played."""
+def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Path, as_json: bool) -> None:
+    """Write tables and figures of an experiment."""
     from khala.experiment.numbers import plain  # noqa: PLC0415
     from khala.experiment.report import FORMATS, write  # noqa: PLC0415
     from khala.experiment.report import report as reported  # noqa: PLC0415
@@ -101,8 +66,8 @@ def report(
         typer.echo(path)
 
 
-def export(directory: Directory, *, parquet: Parquet = None, csv: Csv = None, out: Out = OUT) -> None:
-    """Write a row for each episode and side: its factors, and everything that was measured."""
+def export(directory: Path, *, parquet: Path | None, csv: Path | None, out: Path) -> None:
+    """Write a row for each episode and side."""
     from khala.experiment.export import write_csv, write_parquet  # noqa: PLC0415
 
     if parquet is None and csv is None:
@@ -113,7 +78,7 @@ def export(directory: Directory, *, parquet: Parquet = None, csv: Csv = None, ou
             stderr_console().print(f"{write(store, path)} rows are in {path}", soft_wrap=True)
 
 
-def _opened(directory: Path, out: Path) -> "Store":
+def _opened(directory: Path, out: Path) -> Store:
     from khala.experiment.store import Store  # noqa: PLC0415
 
     return Store.opened(directory if directory.is_dir() else out / directory)
@@ -122,7 +87,7 @@ def _opened(directory: Path, out: Path) -> "Store":
 # --- the comparison in words --------------------------------------------------------------------------
 
 
-def _table(findings: "Findings") -> Table:
+def _table(findings: Findings) -> Table:
     table = Table(box=None, pad_edge=False, title=f"A {visible_line(findings.a)}, B {visible_line(findings.b)}")
     for i, column in enumerate(("task", "measure", "A", "B", "A against B", "p", "corrected", "games", "to show it")):
         table.add_column(column, justify="left" if i < 2 else "right", no_wrap=i < 2)
@@ -131,7 +96,7 @@ def _table(findings: "Findings") -> Table:
     return table
 
 
-def _cells(one: "Compared") -> tuple[str, ...]:
+def _cells(one: Compared) -> tuple[str, ...]:
     from khala.experiment import numbers  # noqa: PLC0415
 
     estimate = {"win": numbers.share_with, "kd": numbers.ratio_with}.get(one.measure, numbers.number_with)
@@ -140,7 +105,7 @@ def _cells(one: "Compared") -> tuple[str, ...]:
     return (one.task, one.measure, estimate(one.a), estimate(one.b), _effect(one), *p, games, _more(one))
 
 
-def _effect(one: "Compared") -> str:
+def _effect(one: Compared) -> str:
     from khala.experiment import numbers  # noqa: PLC0415
 
     if one.test is None:
@@ -150,11 +115,11 @@ def _effect(one: "Compared") -> str:
     return (numbers.points_with if one.measure == "win" else numbers.difference_with)(one.test.effect)
 
 
-def _more(one: "Compared") -> str:
+def _more(one: Compared) -> str:
     return f"{max(1, one.games_for_power - one.games)} more" if one.games_for_power else ""
 
 
-def _remarks(findings: "Findings") -> list[str]:
+def _remarks(findings: Findings) -> list[str]:
     tests = list(dict.fromkeys(one.test.test for one in findings.compared if one.test))
     lines = [f"Intervals of 95 %. {', '.join(tests)}; corrected for {len(findings.compared)} tests after Holm."]
     if any(one.games_for_power for one in findings.compared):

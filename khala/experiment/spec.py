@@ -21,9 +21,10 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, JsonValue, field_validator, model_validator
 
 from khala_bridge.task.maps import Difficulty, Race  # noqa: TC001  # pydantic evaluates them
+from khala_protocol.clock_rule import ClockRule  # noqa: TC001  # pydantic evaluates it
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
-from khala_protocol.messages import ClockRule, Frozen, MemoryRule
+from khala_protocol.messages import Frozen, MemoryRule
 
 MOST_MATCHES = 100_000
 MOST_SEEDS = 10_000

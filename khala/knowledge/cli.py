@@ -5,8 +5,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from khala_bridge.knowledge.facts import VERSIONS
-from khala_bridge.knowledge.lookup import find, long
 from khala_orchestrator.cli import Json
 from khala_protocol.errors import KhalaError
 
@@ -46,6 +44,8 @@ def show(
     Names are PySC2's; upper case, blanks and underscores do not matter. Agents read a shorter form in their
     observations.
     """
+    from khala_bridge.knowledge.lookup import find, long  # noqa: PLC0415  # the facts are not for --help
+
     found = find(name, version)
     if as_json:
         typer.echo(json.dumps([one.model_dump(mode="json", exclude_defaults=True) for one in found]))
@@ -67,6 +67,7 @@ def write(
     bridge/khala_bridge/data/knowledge/words, are written by hand; the numbers in them follow the facts automatically.
     """
     from khala.knowledge import files  # noqa: PLC0415  # the tables and PySC2's names: seconds that --help need not wait
+    from khala_bridge.knowledge.facts import VERSIONS  # noqa: PLC0415
 
     versions = [version] if version else VERSIONS
     if not check:

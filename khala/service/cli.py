@@ -1,18 +1,12 @@
 """The commands of the service: `khala serve` is one, the others ask it. `khala.cli` mounts them."""
 
-import asyncio
-import contextlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
-from khala.exit_codes import DONE, FAILED, NOT_VALID
 from khala.options import (
     Assemble,
     BaseUrl,
@@ -42,23 +36,7 @@ from khala.options import (
     ThinkingLoops,
 )
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
-from khala_orchestrator.console import Progress, stderr_console, stdout_console
-from khala_protocol.bus.config import BusConfig
-from khala_protocol.errors import ConfigError, NoRouter
-from khala_protocol.joining import client_config, router_config
-from khala_protocol.service import MatchCard, Stop, Submit
-from khala_protocol.signals import stop_on_signal
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
-
-    from khala.service.daemon import Listener
-    from khala_protocol.bus import Bus
-
-T = TypeVar("T")
-
-ENDINGS_THAT_FAIL = frozenset({"failed", "refused", "stopped"})
-STATES = {"running": "cyan", "done": "green", "failed": "bold red", "refused": "red", "stopped": "yellow"}
+from khala_protocol.errors import ConfigError
 
 SERVE_EPILOG = """
 Examples:\n
@@ -96,9 +74,7 @@ def serve(
         typer.Option(min=0.1, help="Memory of all matches together.", show_default="80 % of the machine", metavar="X"),
     ] = None,
     warm: Annotated[int, typer.Option(min=0, help="Workers that wait, ready to play at once.", metavar="N")] = 1,
-    spares: Annotated[
-        int, typer.Option(min=0, help="Processes for agents and the scripted model in each of them.", metavar="N")
-    ] = 3,
+    spares: Annotated[int, typer.Option(min=0, help="Processes for agents in each of them.", metavar="N")] = 1,
     queue: Annotated[int, typer.Option(min=0, help="Matches that may wait; more are refused.", metavar="N")] = 100,
     game: Game = "simulator",
     out: Out = Path("runs"),
@@ -123,76 +99,13 @@ def serve(
     `khala submit` orders a match, `khala matches` lists them, `khala watch` shows one, `khala stop` ends one. With
     --tls only the certificate of a host may order and stop; one of an observer lists and watches.
     """
-    from khala.service import logs, memory  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
-    from khala.service.book import Limits  # noqa: PLC0415
-    from khala_protocol.access import service_settings  # noqa: PLC0415
+    from khala.service import commands  # noqa: PLC0415  # see there
 
-    logs.set_up(as_json=log_json)
-    memory_mb = int(memory_gb * 1024) if memory_gb else memory.machine_mb() * 8 // 10
-    limits = Limits(matches or os.cpu_count() or 1, memory_mb, queue, trusts=trust)
-    config = router_config(listen or (), tls=tls, insecure=insecure, rules=service_settings() if tls else None)
-    arguments = ["--game", game, "--spares", str(spares), *(["--log-json"] if log_json else [])]
-    traced = otlp is not None or any(name.startswith("OTEL_EXPORTER_OTLP") for name in os.environ)
-    asyncio.run(_serve(config, limits, out, drain_s, warm, arguments, metrics, otlp, traced=traced, as_json=as_json))
-
-
-async def _serve(
-    config: BusConfig,
-    limits: Any,
-    out: Path,
-    drain_s: float,
-    warm: int,
-    arguments: list[str],
-    metrics: int | None,
-    otlp: str | None,
-    *,
-    traced: bool,
-    as_json: bool,
-) -> None:
-    from khala.local_bus import local_endpoint  # noqa: PLC0415
-    from khala.service import memory  # noqa: PLC0415
-    from khala.service.daemon import Service  # noqa: PLC0415
-    from khala.service.pool import Pool, Worker  # noqa: PLC0415
-    from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415
-
-    stop = stop_on_signal()
-    async with contextlib.AsyncExitStack() as stack:
-        socket = stack.enter_context(local_endpoint())
-        bus = await open_bus(config.model_copy(update={"listen": (*config.listen_on, socket)}))
-        stack.push_async_callback(bus.close)
-        listeners, port = _listeners(stack, metrics, otlp, traced=traced)
-        pool = await stack.enter_async_context(Pool(warm, lambda: Worker.start(arguments)))
-        service = Service(
-            bus, BusConfig(connect=(socket,)), pool.take, out, limits, drain_s, listeners, exchanges=traced,
-            used_mb=lambda: memory.rss_mb(os.getpid()),
-        )  # fmt: skip
-        endpoints = [one for one in bus.endpoints if one != socket]
-        about = {"endpoints": endpoints, "matches": limits.matches, "memory_mb": limits.memory_mb, "metrics_port": port}
-        if as_json:
-            typer.echo(json.dumps(about))
-        words = f"service at {', '.join(endpoints)}: {limits.matches} matches at once; Ctrl-C ends it"
-        stderr_console().print(words, soft_wrap=True)
-        await service.run(stop)
-
-
-def _listeners(
-    stack: contextlib.AsyncExitStack, metrics: int | None, otlp: str | None, *, traced: bool
-) -> "tuple[list[Listener], int | None]":
-    listeners: list[Listener] = []
-    port = None
-    if metrics is not None:
-        from khala.service.metrics import Metrics  # noqa: PLC0415
-
-        counted = Metrics()
-        port = counted.serve(metrics)
-        listeners.append(counted)
-    if traced:
-        from khala.service import traces  # noqa: PLC0415  # 0.2 s
-
-        spans = traces.Traces(traces.otlp(otlp))
-        stack.callback(spans.close)
-        listeners.append(spans)
-    return listeners, port
+    commands.serve(
+        listen=listen or (), tls=tls, insecure=insecure, matches=matches, memory_gb=memory_gb, warm=warm, spares=spares,
+        queue=queue, game=game, out=out, trust=trust, metrics=metrics, otlp=otlp, drain_s=drain_s, log_json=log_json,
+        as_json=as_json,
+    )  # fmt: skip
 
 
 def submit(
@@ -237,7 +150,8 @@ def submit(
     """
     from khala.matches import new, refuse_others  # noqa: PLC0415
     from khala.minds import Minds, named_sides  # noqa: PLC0415
-    from khala.service import client  # noqa: PLC0415
+    from khala.service import client, commands  # noqa: PLC0415  # see there
+    from khala_protocol.service import Submit  # noqa: PLC0415
 
     if task is None and resume is None:
         raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume")
@@ -258,85 +172,33 @@ def submit(
         sides=named_sides(side_model or (), blue=blue, red=red),
         resume=resume is not None,
     )
-    card = _ask(connect, tls, insecure, ("host",), lambda bus: client.submit(bus, order))
+    card = commands.ask(connect, tls, insecure, ("host",), lambda bus: client.submit(bus, order))
     typer.echo(json.dumps(card.model_dump(mode="json")) if as_json else card.run)
 
 
 def matches(*, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False) -> None:
     """List the matches of a service: those that wait, those that run, and the last that are over."""
-    from khala.service import client  # noqa: PLC0415
+    from khala.service import commands  # noqa: PLC0415  # see there
 
-    found = _ask(connect, tls, insecure, ("host", "observer"), client.listed)
-    if as_json:
-        typer.echo(json.dumps(found.model_dump(mode="json", exclude={"v", "run", "kind"})))
-        return
-    table = Table(box=None, pad_edge=False)
-    for name in ("match", "task", "owner", "state", "progress", "result"):
-        table.add_column(name, overflow="fold")
-    for card in found.matches:
-        progress = f"step {card.step} of episode {card.episode + 1}/{card.episodes}" if card.step else ""
-        result = ", ".join(card.outcomes) or card.reason
-        state = Text(card.state, STATES.get(card.state, ""))
-        table.add_row(*map(Text, (card.run, card.task, card.owner)), state, progress, Text(result))
-    stdout_console().print(table)
+    commands.matches(connect, tls=tls, insecure=insecure, as_json=as_json)
 
 
 def watch(
     run: Name, *, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False
 ) -> None:
     """Show a match of a service live, until it is over."""
-    from khala.service import client  # noqa: PLC0415
+    from khala.service import commands  # noqa: PLC0415  # see there
 
-    with Progress(stderr_console()) as progress:
-        card = _ask(connect, tls, insecure, ("host", "observer"), lambda bus: client.watch(bus, run, progress))
-    _end(card, as_json=as_json)
-    raise typer.Exit(_exit_code(card))
-
-
-def _exit_code(card: MatchCard) -> int:
-    if card.state in ENDINGS_THAT_FAIL:
-        return FAILED
-    return NOT_VALID if card.reason else DONE  # a match that is done has a reason only if it is not valid
+    commands.watch(run, connect, tls=tls, insecure=insecure, as_json=as_json)
 
 
 def stop(
     run: Name, *, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False
 ) -> None:
     """Stop a match of a service; its recording stays, and `khala submit --resume` goes on with it."""
-    from khala.service import client  # noqa: PLC0415
+    from khala.service import client, commands  # noqa: PLC0415  # see there
+    from khala_protocol.service import Stop  # noqa: PLC0415
 
     order = Stop(run=run, number=client.new_number())
-    _end(_ask(connect, tls, insecure, ("host",), lambda bus: client.stop(bus, order)), as_json=as_json)
-
-
-def _end(card: MatchCard, *, as_json: bool) -> None:
-    if as_json:
-        typer.echo(json.dumps(card.model_dump(mode="json")))
-    else:
-        words = ": ".join(filter(None, (f"{card.run} {card.state}", ", ".join(card.outcomes), card.reason)))
-        stderr_console().print(words, soft_wrap=True)
-
-
-def _ask(
-    connect: list[str] | None,
-    tls: Path | None,
-    insecure: bool,  # an option, passed on
-    names: tuple[str, ...],
-    ask: "Callable[[Bus], Coroutine[Any, Any, T]]",
-) -> T:
-    from khala.service.client import NoService  # noqa: PLC0415
-    from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415  # loads the native library
-
-    config = client_config(connect or (), tls=tls, names=names, insecure=insecure)
-
-    async def asked() -> T:
-        try:
-            bus = await open_bus(config)
-        except NoRouter as error:
-            raise NoService(f"{error.found}: `khala serve` starts a service, --connect says where one is") from None
-        try:
-            return await ask(bus)
-        finally:
-            await bus.close()
-
-    return asyncio.run(asked())
+    card = commands.ask(connect, tls, insecure, ("host",), lambda bus: client.stop(bus, order))
+    commands.end(card, as_json=as_json)

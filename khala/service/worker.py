@@ -20,7 +20,7 @@ from khala.local import Supplies, play
 from khala.matches import resumed
 from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala.service import logs
-from khala.service.spare import Spares
+from khala.spare import Spares
 from khala_bridge.game.env import Launched
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, load_task

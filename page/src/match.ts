@@ -102,7 +102,8 @@ export class Match {
 
   /** Return the value of a curve at the moment, if it is known. */
   now(name: Curve["name"], side: string): number | null {
-    return this.curve(name, side)?.[this.index.value] ?? null;
+    const curve = this.curve(name, side);
+    return curve?.[this.index.value] ?? curve?.[this.index.value - 1] ?? null; // the newest step of a live match has none yet
   }
 
   private watch(): void {

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from khala_protocol.certificates import HOST, OBSERVER, adviser_name, agent_name
+from khala_protocol.common_names import HOST, OBSERVER, adviser_name, agent_name
 from khala_protocol.keys import EVERY_ORDER, ROOT, Topic, check_name
 from khala_protocol.service import MAX_ORDER_BYTES
 

@@ -33,6 +33,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from khala_protocol.bus.certificate import Certificate, command_for, read
 from khala_protocol.bus.config import TlsFiles
+from khala_protocol.common_names import AUTHORITY, HOST, OBSERVER, ROUTER, adviser_name, agent_name
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-AUTHORITY, ROUTER, HOST, OBSERVER = "authority", "router", "host", "observer"
 DEFAULT_DAYS = 365
 AUTHORITY_DAYS = 3650
 BEGINS_EARLIER = timedelta(days=1)
@@ -48,16 +48,6 @@ BEGINS_EARLIER = timedelta(days=1)
 LONGEST_NAME = 64
 """Of a common name, in characters (RFC 5280, ub-common-name)."""
 THIS_MACHINE = ("localhost", "127.0.0.1", "::1")
-
-
-def agent_name(side: str, agent: str) -> str:
-    """Return the common name of an agent's certificate."""
-    return f"agent:{check_name(side, 'side')}/{check_name(agent, 'agent')}"
-
-
-def adviser_name(side: str, adviser: str) -> str:
-    """Return the common name of an adviser's certificate."""
-    return f"adviser:{check_name(side, 'side')}/{check_name(adviser, 'adviser')}"
 
 
 def make_authority(directory: Path, hosts: Iterable[str] = (), *, days: int = DEFAULT_DAYS) -> list[Path]:

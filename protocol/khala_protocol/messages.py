@@ -11,9 +11,17 @@ Lengths are counted in game loops (22.4 per second at the speed called "faster")
 from __future__ import annotations
 
 from enum import IntFlag
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from khala_protocol.clock_rule import ClockRule  # pydantic evaluates it
+from khala_protocol.field_words import field_words
+
+if TYPE_CHECKING:
+    from pydantic import GetJsonSchemaHandler
+    from pydantic.json_schema import JsonSchemaValue
+    from pydantic_core import CoreSchema
 
 SCHEMA_VERSION: Literal[1] = 1
 """Major version of the schema. A peer with another one is refused."""
@@ -27,6 +35,9 @@ MOST = 2**53
 MAX_DETAIL_CHARACTERS = 200
 """Longest reason for a fallback."""
 
+MAX_REPLY_CHARACTERS = 65_536
+"""The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
+
 MAX_ADVICE_CHARACTERS = 500
 """Longest message of an adviser."""
 
@@ -36,7 +47,6 @@ Alliance = Literal["own", "ally", "enemy", "neutral"]
 Outcome = Literal["win", "draw", "loss"]
 Ending = Literal["win", "draw", "loss", "aborted"]
 """How an episode ended for one side; `aborted` if the host ended it, because it could not be played as it should be."""
-ClockRule = Literal["frozen", "budget", "token", "realtime"]
 
 RejectionReason = Literal[
     "malformed",  # looks like a call, but is not one
@@ -83,7 +93,17 @@ Purpose = Literal["decision", "summary"]
 class Frozen(BaseModel):
     """Base of all parts of messages: immutable; unknown fields, infinity and NaN (which JSON lacks) are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Return the schema, with the sentence under each field as its description."""
+        schema = handler(core)
+        properties = handler.resolve_ref_schema(schema).get("properties", {})
+        words = field_words(cls)
+        for name in properties.keys() & words.keys():
+            properties[name].setdefault("description", words[name])
+        return schema
 
     def but(self, **changes: object) -> Self:
         """Return a copy with some fields replaced, unchecked.

@@ -14,7 +14,8 @@ from khala_protocol.speech import parse
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_protocol.messages import Briefing, ClockRule, Observation
+    from khala_protocol.clock_rule import ClockRule
+    from khala_protocol.messages import Briefing, Observation
 
 SYSTEM = """\
 # Who you are

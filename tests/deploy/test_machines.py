@@ -214,7 +214,7 @@ from collections import Counter
 from pathlib import Path
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
-from khala_protocol.certificates import agent_name
+from khala_protocol.common_names import agent_name
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, run_key
 

@@ -7,7 +7,6 @@ import contextlib
 import json
 import os
 import select
-import signal
 import subprocess
 import sys
 import time
@@ -15,12 +14,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
-import httpx
 import pytest
 
 from khala import environment
 from khala.children import ChildDied, Children
-from khala.local import _Share, start_endpoint
+from khala.local import _Share
 from khala_agents.config import ModelConfig
 from khala_protocol import parent_watch
 from khala_protocol.messages import Usage
@@ -87,7 +85,7 @@ def test_a_killed_match_leaves_no_process_and_only_its_host_had_the_key(tmp_path
     processes = Processes(tmp_path)
     with processes.playing("run", "2s3z", "--latency", "0.05") as host:
         found = processes.environs()
-        assert len(found) == 4  # host, game, endpoint, agent
+        assert len(found) == 3  # host, game, agent
         assert [pid for pid, text in found.items() if KEY.encode() in text] == [host.pid]
         host.kill()
         host.wait()
@@ -167,22 +165,6 @@ async def test_a_child_that_fails_again_and_again_has_failed_for_good_in_its_las
     assert "started again" not in str(died.value)
     assert (tmp_path / "wrong.log").read_text().count("there is no module") == 2
     assert (tmp_path / "wrong.log").stat().st_mode & 0o777 == 0o600
-
-
-@pytest.mark.slow
-async def test_the_scripted_endpoint_comes_back_at_its_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    processes = Processes(tmp_path)
-    monkeypatch.setenv("KHALA_CACHE", processes.environ["KHALA_CACHE"])
-    async with Children(tmp_path) as children:
-        base_url = await start_endpoint(children, 0.0)
-        (endpoint,) = processes.environs()
-        os.kill(endpoint, signal.SIGKILL)
-        processes.left_after(GONE_S)
-        keeping = asyncio.create_task(children.keep(await begun()))
-        transport = httpx.AsyncHTTPTransport(retries=7)  # with growing pauses, 32 s in all
-        async with httpx.AsyncClient(transport=transport) as client:
-            assert (await client.get(f"{base_url}/models")).status_code == 200
-        keeping.cancel()
 
 
 def test_a_process_that_is_started_again_may_spend_what_its_agents_left() -> None:

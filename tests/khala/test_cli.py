@@ -18,7 +18,7 @@ import pytest
 
 from khala.cli import main
 from khala.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
-from khala.service.cli import _exit_code
+from khala.service.commands import exit_code
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 from khala_protocol.service import MatchCard
@@ -125,7 +125,7 @@ def test_the_table_of_exit_codes_has_all_of_them() -> None:
     ("state", "reason", "code"), [("done", "", 0), ("done", "not valid: x", 3), ("failed", "x", 1), ("stopped", "", 1)]
 )
 def test_who_watches_a_match_ends_as_it_did(state: Any, reason: str, code: int) -> None:
-    assert _exit_code(MatchCard(run="r", number="1", task="t", state=state, reason=reason)) == code
+    assert exit_code(MatchCard(run="r", number="1", task="t", state=state, reason=reason)) == code
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.cli import _until_interrupted, _why_not_valid
+from khala.commands import until_interrupted, why_not_valid
 from khala.local import _shares_of, _taken_off
 from khala.minds import Minds, minds_of, named_sides, spent_usd
 from khala_orchestrator.config import MatchConfig, load_task
@@ -55,8 +55,7 @@ def test_both_sides_may_spend_the_same() -> None:
     groups = [(side, mind, ["A", "B", "C"]) for side, mind in minds.items()]
     shares = [share for share in _shares_of(groups, [], None) if share.side == "red"]
     assert [(share.process, share.names, share.left_usd) for share in shares] == [
-        ("agents-red-0", ["A", "C"], 0.75),
-        ("agents-red-1", ["B"], 0.75),
+        ("agents-red-0", ["A", "B", "C"], 1.5),
     ]
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
 
@@ -64,10 +63,28 @@ def test_both_sides_may_spend_the_same() -> None:
 def test_an_agent_may_have_a_model_of_its_own_and_a_process_for_it() -> None:
     mixed = Minds(policy="silent", agents={"B": "scripted/skilled", "D": "scripted/skilled"})
     shares = list(_shares_of([("blue", *group) for group in mixed.groups(["A", "B", "C", "D"])], [], "http://here"))
-    assert [share.names for share in shares] == [["A"], ["C"], ["B"], ["D"]]
-    assert [share.options[1] for share in shares] == ["silent", "silent", "scripted", "scripted"]
+    assert [share.names for share in shares] == [["A"], ["C"], ["B", "D"]]
+    assert [share.options[1] for share in shares] == ["silent", "silent", "scripted"]
     with pytest.raises(ConfigError, match="there is no agent 'E': the agents are A, B"):
         Minds(agents={"E": "openai"}).groups(["A", "B"])
+
+
+@pytest.mark.parametrize(
+    ("mind", "agents", "sizes"),
+    [
+        (Minds(), 1, [1]),
+        (Minds(model="openai"), 16, [16]),
+        (Minds(model="openai"), 17, [9, 8]),
+        (Minds(), 128, [32, 32, 32, 32]),
+        (Minds(policy="mine:decide"), 3, [1, 1, 1]),
+        (Minds(policy="skilled"), 6, [2, 2, 1, 1]),
+    ],
+)
+def test_agents_that_wait_for_a_model_share_a_process_and_code_of_the_user_does_not(
+    mind: Minds, agents: int, sizes: list[int]
+) -> None:
+    names = [f"A{number}" for number in range(agents)]
+    assert [len(share.names) for share in _shares_of([("blue", mind, names)], [], None)] == sizes
 
 
 def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(tmp_path: Path) -> None:
@@ -128,13 +145,13 @@ def test_a_match_that_is_not_valid_says_so_without_markup(capsys: pytest.Capture
 
     match = MatchConfig(task=load_task("2s3z"), run="r")
     with pytest.raises(typer.Exit) as ended:
-        _until_interrupted(match, as_json=False, play=lambda _: play())
+        until_interrupted(match, as_json=False, play=lambda _: play())
     assert ended.value.exit_code == 3
     assert capsys.readouterr().err.endswith("\nnot valid: the [red] side left\n")
 
 
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
-    assert list(_why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
-    assert list(_why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
-    assert list(_why_not_valid([result("blue", "x")])) == ["x"]
-    assert list(_why_not_valid([result("blue"), result("red")])) == []
+    assert list(why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
+    assert list(why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
+    assert list(why_not_valid([result("blue", "x")])) == ["x"]
+    assert list(why_not_valid([result("blue"), result("red")])) == []

@@ -70,7 +70,7 @@ def test_options_that_say_something_else_are_refused_by_name(out: Path, given: d
 
 
 def test_a_service_goes_on_with_a_match_as_it_was_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("khala.service.cli._ask", lambda *_: pytest.fail("nothing should be asked"))
+    monkeypatch.setattr("khala.service.commands.ask", lambda *_: pytest.fail("nothing should be asked"))
     with pytest.raises(ConfigError, match=r"leave out the task 2s3z, --seed 3, or begin a new one"):
         app(["submit", "2s3z", "--resume", "lost", "--run", "lost", "--seed", "3"], standalone_mode=False)
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from khala_orchestrator.cli import access_rules, people, replay, router, tasks
+from khala_orchestrator.cli import replay, router, tasks
+from khala_orchestrator.commands import access_rules, people
 from khala_orchestrator.config import load_task
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus

@@ -12,7 +12,6 @@ import pytest
 from khala_protocol.bus import certificate
 from khala_protocol.bus.config import BusConfig, check
 from khala_protocol.certificates import (
-    agent_name,
     certificates,
     certify_agent,
     certify_observer,
@@ -20,6 +19,7 @@ from khala_protocol.certificates import (
     issue,
     make_authority,
 )
+from khala_protocol.common_names import agent_name
 from khala_protocol.errors import BusError, ConfigError, WrongKey
 
 if TYPE_CHECKING:

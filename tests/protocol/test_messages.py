@@ -68,6 +68,12 @@ def test_every_message_carries_version_and_run() -> None:
     assert all({"v", "run", "kind"} <= set(model.model_fields) for model in MESSAGE_TYPES)
 
 
+def test_a_schema_has_the_sentences_under_the_fields_also_inherited_and_nested_ones() -> None:
+    schema = Reply.model_json_schema()
+    assert schema["properties"]["run"]["description"] == "Name of the run; the same as in the key."
+    assert schema["$defs"]["Usage"]["properties"]["cost_usd"]["description"].startswith("None")
+
+
 def test_no_part_can_be_changed_or_widened(subtests: pytest.Subtests) -> None:
     for part in PARTS:
         with subtests.test(part.__name__):

@@ -4,6 +4,9 @@ Each agent has its own client, and so its own connections: a cancelled call dist
 connections is not limited, `khala_agents.llm.limits` holds requests back. `refresh` discards the client between
 episodes, with whatever cancelled calls left behind. HTTP/2 stays off: a few long calls gain nothing from it.
 
+httpx and aiohttp take 0.4 s to import, and a host that looks whether a model file is right makes no request: they are
+imported when an endpoint connects.
+
 Above it are `openai_compatible` and `anthropic`, which know what the bytes mean.
 """
 
@@ -18,7 +21,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-import httpx
 from pydantic_core import from_json
 
 from khala_agents.llm.address import LOOPBACK, checked_address
@@ -33,18 +35,17 @@ from khala_agents.llm.client import (
     Unreachable,
 )
 from khala_agents.llm.retry import is_retried
-from khala_agents.llm.transport import CONNECT_S, AiohttpTransport, BodyTooLarge
 from khala_agents.secret import excerpt
 
 if TYPE_CHECKING:
     import ssl
     from collections.abc import Mapping
 
+    import httpx
     from pydantic import SecretStr
 
 log = logging.getLogger(__name__)
 
-_TIMEOUT = httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None)  # a whole try has its own limit
 _WARM_TIMEOUT_S = 5.0
 _SPENT_CODES = frozenset(
     {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
@@ -88,6 +89,10 @@ class HttpEndpoint:
         Raises:
             LLMError: there was no answer within `timeout_s` seconds, or its status is an error.
         """
+        import httpx  # noqa: PLC0415  # see above
+
+        from khala_agents.llm.transport import BodyTooLarge  # noqa: PLC0415
+
         try:
             async with asyncio.timeout(timeout_s):
                 response = await self._connected().post(self.address + path, content=body)
@@ -118,6 +123,8 @@ class HttpEndpoint:
         Raises:
             Unauthorized: the endpoint refuses the key.
         """
+        import httpx  # noqa: PLC0415  # see above
+
         with suppress(httpx.HTTPError, TimeoutError):
             async with asyncio.timeout(_WARM_TIMEOUT_S):
                 response = await self._connected().get(self.address + "/models")
@@ -132,10 +139,14 @@ class HttpEndpoint:
 
     def _connected(self) -> httpx.AsyncClient:
         if self._client is None:
+            import httpx  # noqa: PLC0415  # see above
+
+            from khala_agents.llm.transport import CONNECT_S, AiohttpTransport  # noqa: PLC0415
+
             self._client = httpx.AsyncClient(
                 headers=self._headers,
                 transport=AiohttpTransport(_tls(), proxies=urlsplit(self.address).hostname not in LOOPBACK),
-                timeout=_TIMEOUT,
+                timeout=httpx.Timeout(connect=CONNECT_S, write=30.0, read=None, pool=None),  # a try has its own
                 trust_env=False,  # the transport reads the environment
             )
         return self._client
@@ -191,4 +202,6 @@ def _words(error: httpx.TransportError) -> str:
 
 @cache
 def _tls() -> ssl.SSLContext:
+    import httpx  # noqa: PLC0415  # see above
+
     return httpx.create_ssl_context()  # 28 ms: once per process, not once per agent

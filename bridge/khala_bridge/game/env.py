@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+import time
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from absl import flags
 
-from khala_bridge.compat import maps, run_configs, sc2_env
+from khala_bridge.compat import maps, remote_controller, run_configs, sc2_env
 from khala_bridge.errors import GameError
 from khala_bridge.game.game import GameConfig, check_install
 
@@ -25,11 +26,17 @@ if TYPE_CHECKING:
     from khala_bridge.state import Forfeit
     from khala_bridge.task.maps import MapSpec
 
-_environment = threading.Lock()
+_environment = threading.RLock()
+_LISTENS_AFTER_S = 0.2
+"""The simulator listens 0.05 s after its start, 0.15 s on a busy machine. Who comes later waits for a second more."""
 
 
 class Launched:
-    """A process of the game that has no map yet: it takes any, and so can be started before the match is known."""
+    """A process of the game that has no map yet: it takes any, and so can be started before the match is known.
+
+    PySC2 tries to connect as soon as it has started a process, is refused, and sleeps for a second. Here it connects
+    when the process is taken, which most often listens by then.
+    """
 
     def __init__(self, sc2path: Path, environment: dict[str, str] | None = None) -> None:
         """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
@@ -38,16 +45,26 @@ class Launched:
         with _sc2path(sc2path), explained("the game could not be started"):
             run_config = run_configs.get()
             run_config.env = environment_of(run_config, environment)
-            self._process: Any = run_config.start(want_rgb=False)
+            self._process: Any = run_config.start(want_rgb=False, connect=False)
+        self._started_s = time.monotonic()
 
     def take(self) -> Any:
-        """Return the process, once, and only if it still runs; the taker ends it."""
+        """Return the process, connected, once, and only if it still runs; the taker ends it."""
         process, self._process = self._process, None
-        return process if process is not None and process.running else None
+        if process is None or not process.running:
+            return None
+        time.sleep(max(0.0, self._started_s + _LISTENS_AFTER_S - time.monotonic()))
+        try:  # as `StarcraftProcess` does
+            process._controller = remote_controller.RemoteController(process.host, process.port, process)  # noqa: SLF001
+        except BaseException:
+            process.close()
+            raise
+        return process
 
     def close(self) -> None:
         """End the process, if nobody took it."""
-        if (process := self.take()) is not None:
+        process, self._process = self._process, None
+        if process is not None:
             process.close()
 
 
@@ -75,13 +92,17 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
     def _launch_game(self) -> None:
         draws = any(interface.HasField("render") for interface in self._interface_options)
         alone = self._num_agents == 1 and not draws  # several players have ports in their command lines
-        if self._launched is not None and alone and (process := self._launched.take()) is not None:
-            self._ports: list[int] = []
-            self._sc2_procs = [process]
-            self._controllers = [process.controller]
+        if not alone:
+            self._run_config.env = environment_of(self._run_config, self._config.environment)
+            super()._launch_game()
             return
-        self._run_config.env = environment_of(self._run_config, self._config.environment)
-        super()._launch_game()
+        process = self._launched and self._launched.take()
+        process = process or Launched(self._config.sc2path, self._config.environment).take()
+        if process is None:
+            raise GameError("it ended as soon as it was started")
+        self._ports: list[int] = []
+        self._sc2_procs = [process]
+        self._controllers = [process.controller]
 
 
 class Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped

@@ -16,7 +16,6 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.compat import features, portspicker, run_configs, sc2_env
 from khala_bridge.errors import GameError
 from khala_bridge.game.env import Env, environment_of, started
-from khala_bridge.game.guest import Guest
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.lan import LanGame
 from khala_bridge.game.manners import LanPorts
@@ -24,6 +23,7 @@ from khala_bridge.game.manners import LanPorts
 if TYPE_CHECKING:
     from khala_bridge.game.env import Launched
     from khala_bridge.game.game import GameConfig
+    from khala_bridge.game.guest import Guest
     from khala_bridge.state import Forfeit
 
 
@@ -108,6 +108,8 @@ class GuestEnv(_MeetingEnv):
         super()._launch_game()
 
     def _meet(self, join: sc_pb.RequestJoinGame) -> None:
+        from khala_bridge.game.guest import Guest  # noqa: PLC0415  # aiohttp: 0.3 s, for guests alone
+
         (host,) = self._controllers
         theirs = self._run_config.start(extra_ports=list(self._lan_ports[2:]), want_rgb=False)
         self._sc2_procs = [self._sc2_procs[0], theirs]

@@ -36,7 +36,7 @@ _HOST_PORT = re.compile(
 class TlsFiles(BaseModel):
     """Our identity, and the authority that we trust; each file in PEM."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     ca: Path
     """Certificate of the authority that signed the other side's certificate."""
@@ -54,7 +54,7 @@ class BusConfig(BaseModel):
     The default is a client of a router on this machine.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     mode: Literal["client", "router", "peer"] = "client"
     """`client` has one link, to a router; `router` joins clients and may itself publish; `peer` needs no router."""

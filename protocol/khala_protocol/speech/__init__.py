@@ -60,8 +60,9 @@ These are the rules of tolerance, in addition to those of headings (H, `khala_pr
 | S35 | brackets or none around the call of a standing order; no "until" | `<Standing(<Stop()>, 4:30)>` |
 """
 
+from khala_protocol.messages import MAX_REPLY_CHARACTERS
 from khala_protocol.speech.arguments import render, written
-from khala_protocol.speech.reader import MAX_REPLY_CHARACTERS, parse
+from khala_protocol.speech.reader import parse
 from khala_protocol.speech.said import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.thoughts import thought_of
 

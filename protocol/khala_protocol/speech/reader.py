@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
-from khala_protocol.messages import Call, Rejection
+from khala_protocol.messages import MAX_REPLY_CHARACTERS, Call, Rejection
 from khala_protocol.speech.arguments import read_arguments
 from khala_protocol.speech.calls import (
     FORGET,
@@ -61,9 +61,6 @@ if TYPE_CHECKING:
 
     Said: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke
 
-
-MAX_REPLY_CHARACTERS = 65_536
-"""The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
 
 MAX_LINES = 4_000
 """Number of lines that are read, without empty ones: 33 000 of them, as many as fit, would take a third of a second."""

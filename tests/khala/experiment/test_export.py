@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from khala.cli import app
-from khala.experiment.cli import shipped
+from khala.experiment.commands import shipped
 from khala.experiment.measures import Measures
 from khala.experiment.plan import plan
 from khala.experiment.spec import Experiment

@@ -1,8 +1,9 @@
 """Processes that have imported all that an agent needs, and wait to be told which one to be.
 
-To import it takes a process half a second of a free core, and two on a busy machine; what it then becomes is `khala
-agent` or `khala llm` with the same arguments and environment as one that is started for the purpose. Each is for one
-use. `python -m khala.service.spare` is the process; `Spares` is the stock that its parent keeps.
+To import it takes a process a second of a free core, and more on a busy machine; what it then becomes is `khala agent`
+with the same arguments and environment as one that is started for the purpose. Each is for one use. `khala run` starts
+one before it imports anything itself; a worker of `khala serve` has some in stock. `python -m khala.spare` is the
+process; `Spares` is the stock that its parent keeps.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from types import TracebackType
 
-NEEDED = ("khala.cli", "khala_agents.commands")
-"""Modules of the command line, which knows the service and so is above it, and of what it does for agents."""
+NEEDED = ("khala.cli", "khala_agents.commands", "khala_agents.llm.transport")
+"""Modules of the command line, which is above this one, and of what it does for agents."""
 
 
 class Spares:
@@ -60,31 +61,26 @@ class Spares:
             await process.stdout.readline()
 
     async def __call__(
-        self, arguments: Sequence[str], environ: Mapping[str, str], log: Path, stdout: int
+        self, arguments: Sequence[str], environ: Mapping[str, str], log: Path
     ) -> asyncio.subprocess.Process:
         """Turn a process of the stock into `khala <arguments>`; start one if there is none."""
         while self._stock:
             process = self._stock.popleft()
-            job = {
-                "arguments": arguments,
-                "environ": dict(environ),
-                "log": str(log),
-                "silent": stdout != subprocess.PIPE,
-            }
+            job = {"arguments": arguments, "environ": dict(environ), "log": str(log)}
             with contextlib.suppress(ConnectionError):
                 assert process.stdin is not None
                 process.stdin.write(json.dumps(job).encode() + b"\n")
                 await process.stdin.drain()
                 process.stdin.close()
                 return process
-        return await spawn(arguments, environ, log, stdout)
+        return await spawn(arguments, environ, log)
 
 
 async def _started() -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
-        "khala.service.spare",
+        "khala.spare",
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**environment.plain(), **named_parent()},
@@ -105,15 +101,14 @@ def main() -> None:
     job = json.loads(line)
     os.environ.clear()
     os.environ.update({name: value for name, value in job["environ"].items() if name != PARENT})
-    _redirect(Path(job["log"]), silent=job["silent"])
+    _redirect(Path(job["log"]))
     sys.argv = ["khala", *job["arguments"]]
     runpy.run_module("khala", run_name="__main__")
 
 
-def _redirect(log: Path, *, silent: bool) -> None:
-    ends = [(Path(os.devnull), os.O_RDONLY, 0), (log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 2)]
-    if silent:
-        ends.append((Path(os.devnull), os.O_WRONLY, 1))
+def _redirect(log: Path) -> None:
+    nothing = Path(os.devnull)
+    ends = ((nothing, os.O_RDONLY, 0), (nothing, os.O_WRONLY, 1), (log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 2))
     for path, flags, number in ends:
         opened = os.open(path, flags, 0o600)
         os.dup2(opened, number)

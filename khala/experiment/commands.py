@@ -1,0 +1,231 @@
+"""The work of `khala experiment run`, `resume`, `list`, `show`, `status` and `index`.
+
+`khala.experiment.cli` above has the options. It imports this module only to run a command: tasks and PySC2's names take
+a second to import, and `--help` need not wait for that.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import json
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.table import Table
+
+from khala.exit_codes import FAILED, NOT_VALID, SIGNALLED
+from khala.experiment.plan import plan
+from khala.experiment.spec import Experiment
+from khala.experiment.store import Store
+from khala_configs import CONFIGS
+from khala_orchestrator.console import stderr_console, stdout_console
+from khala_protocol.configfile import load
+from khala_protocol.errors import ConfigError
+from khala_protocol.signals import cancelled_by_signal
+
+if TYPE_CHECKING:
+    from khala.experiment.engine import Engine
+    from khala.experiment.plan import PlannedMatch
+    from khala.experiment.runner import Estimate, Runner
+
+SHIPPED = "experiments"
+
+
+def run(file: str, out: Path, options: dict[str, Any]) -> None:
+    """Play the matches of an experiment that were not played yet."""
+    path = path_of(file)
+    experiment = load(path, Experiment)
+    _play(experiment, Store(out / experiment.name), path, **options)
+
+
+def resume(directory: Path, out: Path, options: dict[str, Any]) -> None:
+    """Go on with an experiment, as its directory has it."""
+    store = _opened(directory, out)
+    _play(store.experiment(), store, None, **options)
+
+
+def list_shipped(*, as_json: bool) -> None:
+    """List the shipped experiments."""
+    found = {name: load(path, Experiment) for name, path in shipped().items()}
+    if as_json:
+        typer.echo(json.dumps({name: one.description for name, one in found.items()}))
+        return
+    table = Table(box=None, pad_edge=False)
+    for column in ("experiment", "about"):
+        table.add_column(column)
+    for name, one in found.items():
+        table.add_row(name, one.description)
+    stdout_console().print(table)
+
+
+def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
+    """Show what an experiment would play."""
+    experiment = load(path_of(file), Experiment)
+    matches = plan(experiment, game=game)
+    _print_cells(experiment, matches, Store(out / experiment.name), as_json=as_json)
+
+
+def status(directory: Path, *, game: str, out: Path, as_json: bool) -> None:
+    """Show how far an experiment is."""
+    store = _opened(directory, out)
+    experiment = store.experiment()
+    _print_cells(experiment, plan(experiment, game=game), store, as_json=as_json)
+
+
+def index(directory: Path, *, out: Path) -> None:
+    """Make the index of an experiment again."""
+    store = _opened(directory, out)
+    stderr_console().print(f"{store.rebuild()} matches are in {store.directory / 'index.sqlite'}", soft_wrap=True)
+
+
+def path_of(file: str) -> Path:
+    """Return the path of an experiment's file.
+
+    Raises:
+        ConfigError: it is neither a shipped experiment nor a file.
+    """
+    if file.endswith((".yaml", ".yml")):
+        return Path(file)
+    if file in (found := shipped()):
+        return found[file]
+    raise ConfigError(f"there is no experiment {file!r}: there are {', '.join(found)}; a .yaml file works too")
+
+
+def shipped() -> dict[str, Path]:
+    """Return the shipped experiments by name."""
+    return {path.stem: path for path in sorted((CONFIGS / SHIPPED).glob("*.yaml"))}
+
+
+def _opened(directory: Path, out: Path) -> Store:
+    return Store.opened(directory if directory.is_dir() else out / directory)
+
+
+# --- playing -----------------------------------------------------------------------------------------
+
+
+def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any) -> None:
+    matches = plan(experiment, game=given["game"])
+    if file is not None:
+        store.begin(file)
+    with store.locked():
+        engine = _engine(given, store)
+        playing = _until_done(experiment, store, engine, matches, given)
+        done = asyncio.run(cancelled_by_signal(playing))
+    if isinstance(done, signal.Signals):
+        stderr_console().print(f"interrupted: `khala experiment resume {store.directory}` goes on", soft_wrap=True)
+        raise typer.Exit(SIGNALLED + done)
+    _say_how_it_ended(store, matches, done, as_json=given["as_json"])
+
+
+async def _until_done(
+    experiment: Experiment, store: Store, engine: Engine, matches: list[PlannedMatch], given: dict[str, Any]
+) -> Runner:
+    from khala.experiment.progress import Watcher  # noqa: PLC0415
+    from khala.experiment.runner import Runner, pilot_of  # noqa: PLC0415
+
+    changes = {} if given["budget_usd"] is None else {"usd": given["budget_usd"]}
+    budget = experiment.budget.model_copy(update=changes)
+    async with engine:
+        runner = Runner(experiment, store, engine, budget, processes=given["processes"])
+        if given["pilot"]:
+            pilot = pilot_of(matches, given["pilot"])
+            with Watcher(stderr_console(), runner, pilot, "pilot") as watcher:
+                runner.see = watcher
+                await runner.play(pilot)
+            if runner.stopped or not await asyncio.to_thread(_goes_on, runner, matches, yes=given["yes"]):
+                return runner
+        with Watcher(stderr_console(), runner, matches, experiment.name) as watcher:
+            runner.see = watcher
+            await runner.play(matches)
+    return runner
+
+
+def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
+    estimate = runner.estimate(matches)
+    if not runner.knows_anything:
+        runner.stopped = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
+        return False
+    stderr_console().print(words_of(estimate), soft_wrap=True)
+    limit = runner.budget.usd
+    if limit is not None and estimate.usd is not None and runner.spent.usd + estimate.usd > limit:
+        runner.stopped = (
+            f"with the rest it would cost more than the budget of {limit:g} USD: raise it, or leave out --pilot to "
+            f"play as much as it allows"
+        )
+        return False
+    if yes or not estimate.matches or not sys.stdin.isatty():
+        return True
+    if typer.confirm("Play them?", default=True, err=True):
+        return True
+    runner.stopped = "you said no after the pilot"
+    return False
+
+
+def words_of(estimate: Estimate) -> str:
+    """Return an estimate as a sentence."""
+    money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
+    return (
+        f"after the pilot: {estimate.matches} matches are left, about {money}{estimate.tokens / 1e6:.3g} M tokens and "
+        f"{estimate.hours:.2g} hours"
+    )
+
+
+def _engine(given: dict[str, Any], store: Store) -> Engine:
+    from khala.experiment.engine import Local, slots_of_this_machine  # noqa: PLC0415
+
+    if given["on"] == "local":
+        return Local(given["jobs"] or slots_of_this_machine(), game=given["game"], logs=store.logs)
+    if given["on"] == "ray":
+        from khala.experiment.ray_engine import Ray  # noqa: PLC0415
+
+        return Ray(given["jobs"], game=given["game"], address=given["address"], recordings=given["recordings"])
+    raise ConfigError(f"there is no engine {given['on']!r}: give local or ray", source="--on")
+
+
+def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner, *, as_json: bool) -> None:
+    played = store.played()
+    states = [played[match.key].state if match.key in played else "missing" for match in matches]
+    counts = {state: states.count(state) for state in ("done", "invalid", "crashed", "missing") if state in states}
+    screen = stderr_console()
+    if as_json:
+        said = {"directory": str(store.directory), "matches": counts, "cost_usd": runner.spent.usd}
+        typer.echo(json.dumps(said | {"tokens": runner.spent.tokens, "stopped": runner.stopped}))
+    screen.print(f"{', '.join(f'{number} {state}' for state, number in counts.items())}; "
+                 f"`khala experiment report {store.directory}` makes the tables", soft_wrap=True)  # fmt: skip
+    if runner.stopped:
+        screen.print(f"not all were played: {runner.stopped}", style="yellow", soft_wrap=True)
+    if counts.get("crashed"):
+        raise typer.Exit(FAILED)
+    if counts.get("invalid") or counts.get("missing"):
+        raise typer.Exit(NOT_VALID)
+
+
+def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Store, *, as_json: bool) -> None:
+    played = store.played()
+    rows: dict[tuple[str, ...], dict[str, Any]] = {}
+    for match in matches:
+        row = rows.setdefault(tuple(match.cell.values()), dict(match.cell) | {"matches": 0, "done": 0, "invalid": 0,
+                              "crashed": 0, "cost_usd": 0.0, "causes": []})  # fmt: skip
+        row["matches"] += 1
+        if (one := played.get(match.key)) is not None:
+            row[one.state] += 1
+            row["cost_usd"] += one.cost_usd or 0.0
+            row["causes"] += [one.cause] if one.cause and one.cause not in row["causes"] else []
+    if as_json:
+        plain = [dataclasses.asdict(one) for one in played.values() if one.state != "done"]
+        typer.echo(json.dumps({"cells": list(rows.values()), "not_done": plain}, default=str))
+        return
+    table = Table(box=None, pad_edge=False, title=f"{experiment.name}: {len(matches)} matches")
+    for column in (*experiment.factors, "done", "not valid", "crashed", "USD", "why"):
+        table.add_column(column)
+    for row in rows.values():
+        names = [str(row.get(factor, "")) for factor in experiment.factors]
+        done = f"{row['done']} of {row['matches']}"
+        costs = f"{row['cost_usd']:.4f}" if row["cost_usd"] else ""
+        numbers = [done, *(str(row[state] or "") for state in ("invalid", "crashed"))]
+        table.add_row(*names, *numbers, costs, "; ".join(row["causes"]))
+    stdout_console().print(table)
