@@ -11,13 +11,13 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 END_S = 20.0
@@ -74,3 +74,18 @@ def browsing() -> Iterator[Browser]:
             yield browser
         finally:
             browser.close()
+
+
+def steps_of(page: Page) -> list[int]:
+    """Return the steps of the first episode of the match that a page shows."""
+    run = page.url.partition("a=")[2].partition("&")[0]
+    found: dict[str, Any] = page.evaluate(
+        "path => fetch(path).then(answer => answer.json())", f"/api/runs/{run}/episodes/0/timeline"
+    )
+    return list(found["steps"])
+
+
+def go_to(page: Page, step: int) -> None:
+    """Have a page show a step, by the link that holds it."""
+    page.evaluate("step => { location.hash = location.hash.replace(/&s=\\d+/, '') + `&s=${step}` }", step)
+    page.wait_for_selector(f"canvas[data-step='{step}']")

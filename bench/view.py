@@ -26,11 +26,11 @@ import tempfile
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import psutil
 
-from bench.browser import Viewer, browsing, viewing
+from bench.browser import Viewer, browsing, steps_of, viewing
 from bench.long_recording import lengthen, played
 from bench.processes import Processes, free_port
 from khala_agents.scripted.players import PLAYERS
@@ -163,7 +163,7 @@ def _wait_for_index(page: Page) -> None:
 
 
 def _scrubbed(page: Page, viewer: Viewer, found: Opened) -> Opened:
-    steps = _steps(page)
+    steps = steps_of(page)
     chance = random.Random(1)
     jumps = [page.evaluate(JUMP, chance.choice(steps)) for _ in range(JUMPS)]
     return Opened(
@@ -175,14 +175,6 @@ def _scrubbed(page: Page, viewer: Viewer, found: Opened) -> Opened:
             "tab_mb": page.context.new_cdp_session(page).send("Runtime.getHeapUsage")["usedSize"] / 1e6,
         }
     )
-
-
-def _steps(page: Page) -> list[int]:
-    run = page.url.partition("a=")[2].partition("&")[0]
-    line: dict[str, Any] = page.evaluate(
-        "path => fetch(path).then(r => r.json())", f"/api/runs/{run}/episodes/0/timeline"
-    )
-    return list(line["steps"])
 
 
 # --- units ------------------------------------------------------------------------------------------

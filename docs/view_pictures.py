@@ -6,7 +6,6 @@ Each picture is the page itself in Chromium, at a moment that a link names. Matc
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 import tempfile
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import cv2
 import numpy as np
 
-from bench.browser import browsing, viewing
+from bench.browser import browsing, go_to, steps_of, viewing
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
@@ -126,11 +125,9 @@ def draw(browser: Browser, picture: Picture, directory: Path) -> Path:
         page = context.new_page()
         page.goto(viewer.address)
         page.wait_for_timeout(SETTLED_MS)
-        if (moment := page.get_by_role("slider", name="Moment")).count():
-            last = float(moment.get_attribute("aria-valuemax") or 0)
-            box = moment.bounding_box()
-            assert box is not None
-            print(last, box)
+        if page.get_by_role("slider", name="Moment").count():
+            steps = steps_of(page)
+            go_to(page, steps[round((len(steps) - 1) * picture.share)])
         for role, name in picture.click:
             page.get_by_role(role, name=name, exact=True).click()
         page.wait_for_timeout(SETTLED_MS)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench.browser import CHROMIUM, Viewer, browsing, viewing
+from bench.browser import CHROMIUM, Viewer, browsing, go_to, viewing
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report, Scene
 from khala_protocol.recording import Recorder, Recording
@@ -92,12 +92,6 @@ def answer(page: Page, path: str) -> Any:
 
 def shown_step(page: Page) -> int:
     return int(page.get_by_role("slider", name="Moment").get_attribute("aria-valuenow") or -1)
-
-
-def go_to(page: Page, step: int) -> None:
-    """Go to a step by the link that holds it."""
-    page.evaluate("step => { location.hash = location.hash.replace(/([#&])s=\\d+/, `$1s=${step}`) }", step)
-    page.wait_for_function("step => document.body.innerText.includes(`step ${step} of`)", arg=step)
 
 
 # --- what a reader does -----------------------------------------------------------------------------
