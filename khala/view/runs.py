@@ -162,11 +162,14 @@ class Opened:
 
     def indexed(self) -> float:
         """Return the part of the recording that is indexed; of one that is torn or grows, of what is whole of it."""
-        if any(self.index.meta(name) for name in ("ended", "broken", "caught_up")):
+        if self.index.meta("ended") or self.index.meta("broken"):
             return 1.0
         with contextlib.suppress(OSError):
+            size = max(1, self.path.stat().st_size)
+            if self.index.meta("caught_up") == size:
+                return 1.0
             offset: int = self.index.meta("offset", 0)
-            return round(min(1.0, offset / max(1, self.path.stat().st_size)), 4)
+            return min(0.9999, round(offset / size, 4))
         return 0.0
 
     def line(self) -> RunLine:

@@ -110,7 +110,7 @@ class Scanner:
                 batch = self._read(scan, file, within_s)
                 self._write(batch, scan, file)
                 if scan.offset == before:
-                    self._note("caught_up", value=True)
+                    self._note("caught_up", size)
                 self._db.execute("commit")
             except BaseException:
                 self._scan = None  # what is in the index counts
@@ -150,7 +150,7 @@ class Scanner:
                 scan = Scan(state["offset"], keys=keys, expected=state["expected"])
                 scan.ended, scan.broken = state["ended"], state["broken"]
                 self._memory, self._sides = Memory.load(state["memory"]), tuple(state["sides"])
-                self._note("caught_up", value=False)
+                self._note("caught_up", 0)
                 return scan
         for table in ("sample", "image", "step", "decision", "loss", "mark", "model", "meta"):
             self._db.execute(f"delete from {table} where true")  # noqa: S608  # our own names

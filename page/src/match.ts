@@ -56,7 +56,7 @@ export class Match {
   async grow(progress: Progress): Promise<void> {
     this.lag.value = progress.live ? progress.lag_s : null;
     const known = this.timeline.value;
-    const ended = this.isLive() && !progress.live;
+    const ended = !progress.live && progress.indexed >= 1; // the last line that comes
     if (ended || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
     if (known && !ended && progress.episode === this.episode && known.steps.length >= progress.steps) return;
     await this.take(this.timeline, `${this.path}/timeline`).catch(() => undefined); // its first step is not read yet

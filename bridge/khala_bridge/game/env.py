@@ -99,7 +99,7 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
         process = self._launched and self._launched.take()
         process = process or Launched(self._config.sc2path, self._config.environment).take()
         if process is None:
-            raise GameError("it ended as soon as it was started")
+            raise GameError("the game could not be started: it ended before it listened")
         self._ports: list[int] = []
         self._sc2_procs = [process]
         self._controllers = [process.controller]
