@@ -46,10 +46,12 @@ export class SceneStore {
   /** Counts arrivals, so that what was drawn without a scene is drawn again. */
   readonly arrived = signal(0);
   private readonly pages = new Recent<Frame[]>(PAGES);
+  /** Pages that were asked for when nothing more was to come: short ones stay short. */
+  private readonly final = new Set<number>();
   private readonly under_way = new Set<number>();
   private wanted: number[] = [];
 
-  /** `path` is that of the episode; a page that `grows` is not kept while it is short. */
+  /** `path` is that of the episode; a page that was short while it `grows` is asked for again. */
   constructor(private readonly path: string, private readonly grows: () => boolean) {}
 
   /** Return the scene of a step, or the last one of its page before it; null if there is none, undefined if not yet. */
@@ -71,7 +73,7 @@ export class SceneStore {
     const held = this.pages.get(String(page));
     if (!held) return true;
     const end = Math.min(last, (page + 1) * SCENES_AT_ONCE - 1);
-    return this.grows() && (held[held.length - 1]?.step ?? -1) < end;
+    return !this.final.has(page) && (held[held.length - 1]?.step ?? -1) < end;
   }
 
   private ask(): void {
@@ -86,9 +88,11 @@ export class SceneStore {
   private async load(page: number): Promise<void> {
     this.under_way.add(page);
     const from = page * SCENES_AT_ONCE;
+    const final = !this.grows();
     try {
       const answer = await get<Scenes>(`${this.path}/scenes?from=${from}&to=${from + SCENES_AT_ONCE - 1}`);
       this.pages.set(String(page), answer.scenes.map(frameOf));
+      if (final) this.final.add(page);
     } catch {
       this.pages.set(String(page), []); // the map then says that there is no scene
     }

@@ -82,8 +82,9 @@ function goToPending(): void {
   if (pending === null || !match || !timeline?.steps.length) return;
   const there = timeline.steps[timeline.steps.length - 1] >= pending;
   if (!there && match.grows()) return;
-  clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, pending)));
-  pending = null;
+  const step = pending;
+  pending = null; // first, so that the address follows
+  clock.go(momentOf(timeline, clock.axis.value, indexOf(timeline, step)));
 }
 
 async function openMatches(to: Link): Promise<void> {

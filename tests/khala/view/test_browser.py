@@ -125,6 +125,8 @@ def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: Brow
     other.wait_for_function("() => document.body.innerText.includes('step 13 of')")
     page.keyboard.press("Home")
     page.wait_for_function("() => document.body.innerText.includes('step 0 of')")
+    go_to(page, 20)
+    page.wait_for_function("() => location.hash.includes('s=20')")
 
 
 def test_play_moves_the_clock_to_the_end_and_stops_there(context: BrowserContext, golden: Viewer) -> None:
