@@ -56,12 +56,14 @@ def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> Experime
     made, played = report(store), list(store.played().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
     recordings = [directory / one.recording for one in played if one.recording]
+    line = line_of(directory)
+    said = [words for words in made.document.paragraphs if words != line.description]
     return ExperimentView(
-        line=line_of(directory),
+        line=line,
         factors=table.columns[: table.words],
         columns=table.columns[table.words :],
         rows=tuple(_rows(table, made.summaries, played, directory)),
-        notes=(*made.document.paragraphs, *made.document.warnings, table.note),
+        notes=(*said, *made.document.warnings, table.note),
         runs=tuple(lines(recordings, below)),
     )
 
