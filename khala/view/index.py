@@ -16,6 +16,7 @@ import os
 import re
 import sqlite3
 import threading
+import weakref
 import zlib
 from collections import OrderedDict
 from pathlib import Path
@@ -102,6 +103,7 @@ class Index:
         """Whether it must be removed, so that it is made again."""
         prepare(self.path)
         self._db = connect(self.path)
+        weakref.finalize(self, self._db.close)
 
     def close(self) -> None:
         """Close it, and remove it if it is broken; who still asks gets an error."""
