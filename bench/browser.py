@@ -76,13 +76,15 @@ def browsing() -> Iterator[Browser]:
             browser.close()
 
 
+def answer(page: Page, path: str) -> Any:
+    """Return what the server answers to a page that shows a match, by a path below that match."""
+    run = page.url.partition("a=")[2].partition("&")[0]
+    return page.evaluate("path => fetch(path).then(answer => answer.json())", f"/api/runs/{run}{path}")
+
+
 def steps_of(page: Page) -> list[int]:
     """Return the steps of the first episode of the match that a page shows."""
-    run = page.url.partition("a=")[2].partition("&")[0]
-    found: dict[str, Any] = page.evaluate(
-        "path => fetch(path).then(answer => answer.json())", f"/api/runs/{run}/episodes/0/timeline"
-    )
-    return list(found["steps"])
+    return list(answer(page, "/episodes/0/timeline")["steps"])
 
 
 def go_to(page: Page, step: int) -> None:

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import psutil
 
-from bench.browser import Viewer, browsing, steps_of, viewing
+from bench.browser import Viewer, answer, browsing, steps_of, viewing
 from bench.long_recording import lengthen, played
 from bench.processes import Processes, free_port
 from khala_agents.scripted.players import PLAYERS
@@ -157,8 +157,7 @@ def opened(browser: Browser, path: Path, decisions: int) -> Iterator[Opened]:
 
 
 def _wait_for_index(page: Page) -> None:
-    run = page.url.partition("a=")[2].partition("&")[0]
-    while page.evaluate("run => fetch(`/api/runs/${run}`).then(r => r.json())", run)["indexed"] < 1:
+    while answer(page, "")["indexed"] < 1:
         page.wait_for_timeout(200)
 
 

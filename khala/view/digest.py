@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import WORKERS, is_structure, knowledge
 from khala_protocol.messages import MOST, UnitFlag
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ OPPONENT = "opponent"
 """The side of an opponent that Khala does not play."""
 LATE = {"late": "late", "gone": "late", "malformed": "late", "fallback": "fallback"}
 """The kind of mark of an agent's status."""
-WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
 
 
 @dataclass(slots=True)
@@ -228,16 +227,18 @@ def number(value: object) -> float | None:
     return value if isinstance(value, int | float) and abs(value) <= MOST else None
 
 
+def tag_number(tag: str) -> int:
+    """Return a tag as a number; 0 for a text that is none."""
+    try:
+        return int(tag, 16)
+    except ValueError:
+        return 0
+
+
 def value_of(kind: str) -> float:
     """Return the minerals and vespene that a type of unit costs; 0 for an unknown one."""
     facts = knowledge().get(kind)
     return facts.value if facts else 0.0
-
-
-def is_structure(kind: str) -> bool:
-    """Return True if it is a type of structures."""
-    facts = knowledge().get(kind)
-    return facts is not None and facts.structure
 
 
 def _from_player(player: Json, side: str) -> Json:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from khala.view.runs import Opened
     from khala.view.sources import Sources
+    from khala_orchestrator.transcript import StepSelection
 
 MOST_BYTES = 50 * MB
 """Of the file: browsers and mail servers take more badly."""
@@ -69,15 +70,14 @@ class _Packer:
             )
 
 
-def export(sources: Sources, page: str, path: Path, *, first: int, last: int | None, agents: Collection[str]) -> int:
+def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, agents: Collection[str]) -> int:
     """Write the answers of the opened runs into a file with the page, and return its size in bytes.
 
     Args:
         sources: with one or two runs.
         page: as it was built.
         path: of the file.
-        first: step of each episode.
-        last: the last one; None for all.
+        steps: of each episode.
         agents: whose long texts are wanted: names, or `side/name`; all of them if none is named.
 
     Raises:
@@ -93,7 +93,7 @@ def export(sources: Sources, page: str, path: Path, *, first: int, last: int | N
         run = sources.open(line.id, lambda: None)
         try:
             whole(run.index)
-            for name, answer in _answers(run, first, last, agents):
+            for name, answer in _answers(run, steps, agents):
                 packer.add(f"runs/{run.id}{name}", answer)
         except OSError as error:
             raise ConfigError(f"{run.path} cannot be read: {error.strerror}") from None
@@ -107,7 +107,7 @@ def export(sources: Sources, page: str, path: Path, *, first: int, last: int | N
     return len(text)
 
 
-def _answers(run: Opened, first: int, last: int | None, agents: Collection[str]) -> Iterator[tuple[str, bytes]]:
+def _answers(run: Opened, part: StepSelection, agents: Collection[str]) -> Iterator[tuple[str, bytes]]:
     """Yield the answers of a run that the page may ask for, by their paths below it."""
     view: dict[str, Any] = json.loads(run.view())
     seats = [(one["side"], one["name"]) for one in view["agents"]]
@@ -118,7 +118,7 @@ def _answers(run: Opened, first: int, last: int | None, agents: Collection[str])
         begin = f"/episodes/{episode}"
         asked: set[tuple[int, str, str]] = set()
         timeline = run.timeline(episode)
-        steps = [step for step in json.loads(timeline)["steps"] if _is_in(step, first, last)]
+        steps = [step for step in json.loads(timeline)["steps"] if part.holds(step)]
         yield f"{begin}/timeline", timeline
         yield f"{begin}/terrain", run.terrain(episode)
         for start in sorted({step - step % SCENES_AT_ONCE for step in steps}):
@@ -143,10 +143,6 @@ def _pictures(run: Opened, digests: Collection[str]) -> Iterator[tuple[str, byte
         except (NotThere, KhalaError):
             continue
         yield f"/images/{digest}", json.dumps(f"data:{kind};base64,{base64.b64encode(data).decode()}").encode()
-
-
-def _is_in(step: int, first: int, last: int | None) -> bool:
-    return step >= first and (last is None or step <= last)
 
 
 def _together(page: str, data: str) -> str:

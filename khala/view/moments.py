@@ -10,6 +10,7 @@ import json
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from khala.view.deeds import Screen, deeds
+from khala.view.digest import tag_number
 from khala.view.wire import Asked, Decision, Deed, Letter, Moment, SideMoment, TeamMark
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
@@ -197,7 +198,7 @@ class Moments:
     def _teams(self, seen: Observation) -> Iterator[TeamMark]:
         size = round(self._briefing(seen)[0] * self._scale, 2)
         for team in seen.view.teams:
-            tags = tuple(_tag(unit.tag) for unit in team.units)
+            tags = tuple(tag_number(unit.tag) for unit in team.units)
             yield TeamMark(name=team.name, tags=tags, minimap=team.minimap, screen=size)
 
     def _deeds(self, reply: str, report: AgentReport | None, seen: Observation) -> tuple[Deed, ...]:
@@ -230,10 +231,3 @@ class Moments:
 
 def _letter(one: Any, step: int) -> Letter:
     return Letter(sender=one.sender, recipient=one.recipient, text=one.text, step=step, again=one.again)
-
-
-def _tag(tag: str) -> int:
-    try:
-        return int(tag, 16)
-    except ValueError:
-        return 0

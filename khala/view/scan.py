@@ -273,11 +273,9 @@ class Scanning:
                 while not self._stop.is_set() and not scanner.done:
                     found = scanner.advance(within_s)
                     within_s = BATCH_S
-                    if found:
-                        self._changed()
-                    else:
+                    if not found:
                         self._stop.wait(BUSY_S if found is None else POLL_S)
-                    if found is None:
+                    if found is not False:
                         self._changed()
                 self._changed()
         except (OSError, sqlite3.Error) as error:

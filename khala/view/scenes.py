@@ -10,8 +10,8 @@ import contextlib
 from functools import cache
 from typing import TYPE_CHECKING
 
-from khala.view.digest import WORKERS, value_of
-from khala_bridge.knowledge import is_armed, knowledge
+from khala.view.digest import tag_number, value_of
+from khala_bridge.knowledge import WORKERS, is_armed, knowledge
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
@@ -94,9 +94,9 @@ class _Known:
                 self._see(unit, enemy, side)
         for event in (*view.events, *(event for team in view.teams for event in team.events)):
             if event.what == "died":
-                self._units.pop(_tag(event.tag), None)
+                self._units.pop(tag_number(event.tag), None)
         for landmark in view.landmarks:
-            if landmark.what == "structure" and _tag(landmark.tag) not in self._units:
+            if landmark.what == "structure" and tag_number(landmark.tag) not in self._units:
                 self._see(_standing(landmark), own, side)
         if view.counts is not None or side not in self._views:  # those who lead know most
             self._views[side] = view
@@ -126,7 +126,7 @@ class _Known:
         return self._player(others[0]) if others else len(self._sides) + 1
 
     def _see(self, unit: UnitView, player: int, side: str) -> None:
-        tag = _tag(unit.tag)
+        tag = tag_number(unit.tag)
         at, known = self._units.get(tag, (-1, None))
         mark = _mark(unit, player, self._scale)
         if known is not None and at == self._loop:
@@ -170,7 +170,7 @@ def _mark(unit: UnitView, player: int, scale: float) -> UnitMark:
     order = unit.orders[0] if unit.orders else None
     to = (order.minimap if order else None) or _NOWHERE
     return UnitMark(
-        tag=_tag(unit.tag),
+        tag=tag_number(unit.tag),
         type=unit.type,
         player=player,
         x=unit.minimap[0],
@@ -186,7 +186,7 @@ def _mark(unit: UnitView, player: int, scale: float) -> UnitMark:
         flags=_flags(unit),
         seen_by=0,
         order=unit.order or "",
-        target=_tag(order.target) if order and order.target else 0,
+        target=tag_number(order.target) if order and order.target else 0,
         to_x=to[0],
         to_y=to[1],
     )
@@ -234,11 +234,3 @@ def _radius(name: str, scale: float) -> float:
 def _race(marks: Sequence[UnitMark]) -> str:
     found = (knowledge().get(mark.type) for mark in marks)
     return next((facts.race for facts in found if facts is not None and facts.race != "neutral"), "")
-
-
-def _tag(tag: str) -> int:
-    """Return a tag as a number; 0 for a text that is none."""
-    try:
-        return int(tag, 16)
-    except ValueError:
-        return 0

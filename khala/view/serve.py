@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import signal
 import socket
 import ssl
@@ -24,6 +23,7 @@ from khala.view.server import Server, page
 from khala.view.sources import Sources, find
 from khala_orchestrator.console import stderr_console
 from khala_orchestrator.transcript import StepSelection
+from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config
 from khala_protocol.signals import cancelled_by_signal
@@ -74,8 +74,7 @@ def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[st
     """
     if look.connect:
         raise ConfigError("an export is of a recording: name one, or look at the match without --export")
-    part = StepSelection.of(None, steps)
-    size = export(find(look.given, RUNS), page(), path, first=part.first, last=part.last, agents=agents)
+    size = export(find(look.given, RUNS), page(), path, steps=StepSelection.of(None, steps), agents=agents)
     stderr_console().print(f"{path}: {size / 1e6:.1f} MB, opens in a browser without a server", soft_wrap=True)
 
 
@@ -85,7 +84,7 @@ def guard_of(look: Look) -> Guard:
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near = is_loopback(look.host)
+    near = is_near(look.host)
     if not near and not look.password and look.https is None:
         raise ConfigError(
             f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
@@ -94,14 +93,9 @@ def guard_of(look: Look) -> Guard:
     return Guard(password=look.password, names=LOOPBACK if near else (), secure=look.https is not None)
 
 
-def is_loopback(host: str) -> bool:
-    """Return True if only this machine can reach the address."""
-    if host.casefold() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return False
+def is_near(host: str) -> bool:
+    """Return True if only this machine can reach an address, as people write it."""
+    return is_loopback(host.strip("[]").casefold())
 
 
 def _tls(look: Look) -> ssl.SSLContext | None:

@@ -230,7 +230,7 @@ class Server:
         return socket
 
     async def _say_progress(self, socket: web.WebSocketResponse, opened: Opened) -> None:
-        """Send the newest progress whenever there is more, and again while a match is live, for its lag."""
+        """Send the newest progress whenever there is more, and each second: a host that died ends a match silently."""
         with contextlib.suppress(ConnectionError):
             while not socket.closed:
                 changed = self._changed.get(opened.id)

@@ -10,7 +10,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from khala_bridge.act.aim import RealScreen
-from khala_bridge.state.teams import WORKERS
+from khala_bridge.knowledge import WORKERS
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator

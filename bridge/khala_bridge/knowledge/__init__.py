@@ -11,7 +11,19 @@ the game does not say of an enemy, and what an order costs and needs.
 """
 
 from khala_bridge.knowledge.facts import VERSION, VERSIONS
-from khala_bridge.knowledge.load import RACES, abilities, ability_of, buffs, is_armed, knowledge, stand_ins, upgrades
+from khala_bridge.knowledge.load import (
+    RACES,
+    WORKERS,
+    abilities,
+    ability_of,
+    buffs,
+    is_armed,
+    is_structure,
+    is_worker,
+    knowledge,
+    stand_ins,
+    upgrades,
+)
 from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts, WeaponFacts
 from khala_bridge.knowledge.prompt import advice, short
 
@@ -19,6 +31,7 @@ __all__ = [
     "RACES",
     "VERSION",
     "VERSIONS",
+    "WORKERS",
     "AbilityFacts",
     "BuffFacts",
     "UnitFacts",
@@ -29,6 +42,8 @@ __all__ = [
     "advice",
     "buffs",
     "is_armed",
+    "is_structure",
+    "is_worker",
     "knowledge",
     "short",
     "stand_ins",

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts
 
 RACES: Final = ("protoss", "terran", "zerg")
+WORKERS: Final = frozenset({"Probe", "SCV", "Drone", "MULE"})
+"""Types that gather, as they are when they do."""
 
 
 def knowledge(version: str = VERSION) -> dict[str, UnitFacts]:
@@ -62,6 +64,20 @@ def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFa
 def stand_ins(name: str, version: str = VERSION) -> frozenset[str]:
     """Return the types that meet a requirement of this structure: itself, and its stand-ins (a Hive for a Lair)."""
     return frozenset({name, *(kind.name for kind in unit_facts(version).values() if name in kind.counts_as)})
+
+
+@functools.cache
+def is_structure(unit_type: str) -> bool:
+    """Return True if a type is a structure; unknown types are not."""
+    known = unit_facts(VERSION).get(unit_type)
+    return known is not None and known.structure
+
+
+@functools.cache
+def is_worker(unit_type: str) -> bool:
+    """Return True if a type of unit gathers; unknown types do not."""
+    known = unit_facts(VERSION).get(unit_type)
+    return known is not None and known.worker
 
 
 def is_armed(unit_type: str) -> bool:

@@ -10,9 +10,9 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import is_armed, knowledge
+from khala_bridge.knowledge import is_armed, is_structure, is_worker, knowledge
 from khala_bridge.observe.body import rounded
-from khala_bridge.observe.chronicle import PASSING, is_structure, is_worker
+from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Army, ArmyPart, Toll
 

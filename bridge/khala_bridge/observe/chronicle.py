@@ -8,13 +8,12 @@ those at which no agent looks; so it reads the snapshot itself and makes no view
 
 from __future__ import annotations
 
-import functools
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import is_structure
 from khala_bridge.observe.body import rounded
 from khala_protocol.messages import LOOPS_PER_S, EnemyCount, Event
 
@@ -211,17 +210,3 @@ def _is_done(unit: Unit) -> bool:
 
 def _units_first(name: str) -> tuple[bool, str]:
     return is_structure(name), name
-
-
-@functools.cache
-def is_worker(name: str) -> bool:
-    """Return True if a type of unit gathers; unknown types do not."""
-    known = knowledge().get(name)
-    return known is not None and known.worker
-
-
-@functools.cache
-def is_structure(name: str) -> bool:
-    """Return True if a type is a structure; unknown types are not."""
-    known = knowledge().get(name)
-    return known is not None and known.structure

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import abilities, knowledge
-from khala_bridge.observe.chronicle import is_worker
+from khala_bridge.knowledge import abilities, is_worker, knowledge
 from khala_bridge.observe.landmarks import GAS_STRUCTURES
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Economy

@@ -11,8 +11,9 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from khala_bridge.auto.places import is_held
+from khala_bridge.knowledge import is_structure
 from khala_bridge.observe.body import rounded
-from khala_bridge.observe.chronicle import PASSING, is_structure
+from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.observe.scene import on_screen, screen_of
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import Landmark

@@ -11,9 +11,9 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import abilities, knowledge
+from khala_bridge.knowledge import abilities, is_structure, knowledge
 from khala_bridge.observe.body import rounded
-from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING, is_structure
+from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING
 from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeCount, WarpGates
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import functools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from khala_bridge.knowledge import is_structure, is_worker
 from khala_bridge.observe.army import is_of_army
-from khala_bridge.observe.chronicle import is_structure, is_worker
 from khala_protocol.messages import UnitFlag, UnitMark
 
 if TYPE_CHECKING:

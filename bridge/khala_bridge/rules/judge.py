@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from khala_bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins, upgrades
+from khala_bridge.knowledge import abilities, ability_of, is_armed, is_structure, knowledge, stand_ins, upgrades
 from khala_bridge.rules.cost import facts_for, is_free, price_of
 from khala_bridge.rules.unavailable import Unavailable, rank
 from khala_bridge.rules.weapons import can_shoot, is_attack
@@ -225,7 +225,7 @@ def _price(case: _Case) -> Unavailable | None:
 def _taken(case: _Case) -> Unavailable | None:
     """Return a reason if an earlier call of the turn uses it; structures can do several things."""
     unit, does = case.unit, case.facts.does
-    goes_on = does == "build" or (does != "warp_in" and _is_structure(unit.type))
+    goes_on = does == "build" or (does != "warp_in" and is_structure(unit.type))
     if goes_on or unit.tag not in case.ledger.busy:
         return None
     return Unavailable("taken", unit.type, unit.tag)
@@ -242,7 +242,7 @@ def _occupied(case: _Case) -> Unavailable | None:
 def _queue(case: _Case) -> Unavailable | None:
     """Return a reason if its production queue is full."""
     unit, ledger = case.unit, case.ledger
-    if case.facts.does not in QUEUED or not _is_structure(unit.type):
+    if case.facts.does not in QUEUED or not is_structure(unit.type):
         return None
     places = REACTOR_QUEUE if unit.addon in stand_ins("Reactor") else QUEUE
     full = unit.orders + ledger.queued[unit.tag] >= places or unit.tag in ledger.changing
@@ -258,7 +258,7 @@ def _attached(case: _Case) -> Unavailable | None:
 def _work(case: _Case) -> Unavailable | None:
     """Return a reason if it has orders, and this one must be done at once."""
     unit, ledger = case.unit, case.ledger
-    if case.facts.does not in AT_ONCE or not _is_structure(unit.type):
+    if case.facts.does not in AT_ONCE or not is_structure(unit.type):
         return None
     idle = not unit.orders and not ledger.queued[unit.tag] and unit.tag not in ledger.changing
     return None if idle else Unavailable("at_work", unit.type, unit.tag)
@@ -278,9 +278,3 @@ def _cooldown(case: _Case) -> Unavailable | None:
 def _otherwise(case: _Case) -> Unavailable:
     """Return the game itself as the reason: nothing known speaks against it."""
     return Unavailable("game", case.unit.type, case.unit.tag, has=case.unit.orders)
-
-
-@functools.cache
-def _is_structure(unit_type: str) -> bool:
-    known = knowledge().get(unit_type)
-    return known is not None and known.structure

@@ -35,6 +35,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from khala_bridge.knowledge import WORKERS
 from khala_bridge.knowledge.forms import form_of
 from khala_bridge.names import unit_name
 
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from khala_bridge.state import PlayerState, Unit
     from khala_bridge.task.config import AgentConfig, TeamConfig, TeamKind
 
-WORKERS = frozenset({"Probe", "SCV", "Drone", "MULE"})
 TRANSPORTS = frozenset({"WarpPrism", "WarpPrismPhasing", "Medivac", "OverlordTransport"})
 SMALL_GROUP = 4
 NEAR_HEAD = 15.0

@@ -184,7 +184,11 @@ def is_local(endpoint: str) -> bool:
     """Return whether only this machine can reach the endpoint."""
     if transport_of(endpoint) == "unixsock-stream":
         return True
-    host, _ = host_port_of(endpoint)
+    return is_loopback(host_port_of(endpoint)[0])
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine can reach a host, a name or an address without brackets."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

@@ -77,10 +77,10 @@ class Scan:
                 kind, content, end = head
                 match kind:
                     case Opcode.HEADER:
-                        ours = Header.read(_stream(content)).library.startswith(LIBRARY)
+                        ours = Header.read(stream_of(content)).library.startswith(LIBRARY)
                         self.expected = 0 if ours else -1
                     case Opcode.CHUNK:
-                        chunk = Chunk.read(_stream(content))
+                        chunk = Chunk.read(stream_of(content))
                         self._budget.take(chunk)
                         yield PlacedChunk(self.offset, end, chunk_bytes(chunk))
                     case Opcode.FOOTER:
@@ -98,7 +98,7 @@ class Scan:
             for kind, place, content in _records(chunk.data):
                 self._budget.take_record()
                 if kind == Opcode.CHANNEL:
-                    channel = Channel.read(_stream(bytes(content)))
+                    channel = Channel.read(stream_of(bytes(content)))
                     self.keys[channel.id] = channel.topic
                 elif kind == Opcode.MESSAGE:
                     sample = _placed(place, content)
@@ -120,7 +120,7 @@ def chunk_at(file: BinaryIO, offset: int) -> bytes:
     head = record_at(file, offset, file.seek(0, 2))
     if head is None or head[0] != Opcode.CHUNK:
         raise McapError("there is no chunk at this place")
-    chunk = Chunk.read(_stream(head[1]))
+    chunk = Chunk.read(stream_of(head[1]))
     Budget().take(chunk)
     return chunk_bytes(chunk)
 
@@ -160,7 +160,7 @@ def footer(file: BinaryIO) -> Footer | None:
     file.seek(size - MAGIC_SIZE - length)
     data = file.read()
     is_one = data.startswith(_HEAD.pack(Opcode.FOOTER, 20)) and data.endswith(MCAP0_MAGIC)
-    return Footer.read(_stream(data[_HEAD.size : length])) if is_one else None
+    return Footer.read(stream_of(data[_HEAD.size : length])) if is_one else None
 
 
 def record_at(file: BinaryIO, offset: int, size: int) -> tuple[int, bytes, int] | None:
@@ -196,5 +196,6 @@ def _placed(place: int, content: memoryview) -> Placed:
     return Placed(number, sequence, log_time_ns, place, bytes(content[_SAMPLE.size :]))
 
 
-def _stream(content: bytes) -> ReadDataStream:
+def stream_of(content: bytes) -> ReadDataStream:
+    """Return the content of a record as mcap reads it."""
     return ReadDataStream(BytesIO(content))

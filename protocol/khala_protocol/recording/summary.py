@@ -8,15 +8,13 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from dataclasses import dataclass, field
-from io import BytesIO
 from typing import TYPE_CHECKING, BinaryIO
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Statistics, SummaryOffset
 
 from khala_protocol.errors import RecordingError
-from khala_protocol.recording.chunks import Scan, chunk_at, footer, record_at, samples_of
+from khala_protocol.recording.chunks import Scan, chunk_at, footer, record_at, samples_of, stream_of
 from khala_protocol.recording.reader import require_recording
 from khala_protocol.recording.unpack import BROKEN
 
@@ -80,7 +78,7 @@ class Summary:
         if end is None or not end.summary_offset_start:
             return None
         groups = [
-            SummaryOffset.read(_stream(content))
+            SummaryOffset.read(stream_of(content))
             for kind, content in _records(file, end.summary_offset_start, size) if kind == Opcode.SUMMARY_OFFSET
         ]  # fmt: skip
         keys: dict[int, str] = {}
@@ -91,12 +89,12 @@ class Summary:
             for kind, content in _records(file, group.group_start, group.group_start + group.group_length):
                 match kind:
                     case Opcode.CHANNEL:
-                        channel = Channel.read(_stream(content))
+                        channel = Channel.read(stream_of(content))
                         keys[channel.id] = channel.topic
                     case Opcode.CHUNK_INDEX:
                         chunks.append(_chunk(content))
                     case Opcode.STATISTICS:
-                        found = Statistics.read(_stream(content))
+                        found = Statistics.read(stream_of(content))
                         times = found.message_start_time, found.message_end_time
                         counts.update({keys[one]: n for one, n in found.channel_message_counts.items() if one in keys})
         return cls(path, size, True, keys, counts, *times, tuple(chunks))
@@ -142,7 +140,3 @@ def _chunk(content: bytes) -> tuple[int, frozenset[int]]:
     _, _, offset, _, size = _CHUNK.unpack_from(content)
     pairs = content[_CHUNK.size : _CHUNK.size + size]
     return offset, frozenset(channel for channel, _ in _PAIR.iter_unpack(pairs))
-
-
-def _stream(content: bytes) -> ReadDataStream:
-    return ReadDataStream(BytesIO(content))

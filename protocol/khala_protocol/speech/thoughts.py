@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import re
 
+from khala_protocol.messages import MAX_REPLY_CHARACTERS
 from khala_protocol.speech.headings import ReplySection, heading_at
 from khala_protocol.speech.marks import to_ascii
 
-MAX_THOUGHT_CHARACTERS = 65_536
-"""As much of a reply as is read at all."""
 _REASONED = re.compile(r"</\s*+(?:think(?:ing)?|thoughts?|reasoning)\s*+>|\[/THINK\]|◁/think▷", re.IGNORECASE)
 _LINE = re.compile(r"^", re.MULTILINE)
 
@@ -21,7 +20,7 @@ def thought_of(reply: str) -> str:
 
     A reasoning block belongs to it. It is all of the reply if there is no such heading.
     """
-    text = to_ascii(reply[:MAX_THOUGHT_CHARACTERS])
+    text = to_ascii(reply[:MAX_REPLY_CHARACTERS])
     reasoned = _REASONED.search(text)
     begin, end = 0, len(text)
     for line in _LINE.finditer(text, reasoned.end() if reasoned else 0):

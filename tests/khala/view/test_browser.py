@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench.browser import CHROMIUM, Viewer, browsing, go_to, viewing
+from bench.browser import CHROMIUM, Viewer, answer, browsing, go_to, steps_of, viewing
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report, Scene
 from khala_protocol.recording import Recorder, Recording
@@ -85,15 +85,6 @@ def asked_hosts(page: Page) -> set[str]:
     return {url.partition("/api")[0].partition("/?")[0].rstrip("/") for url in page.asked}  # type: ignore[attr-defined]
 
 
-def answer(page: Page, path: str) -> Any:
-    """Return what the server answers to the page."""
-    return page.evaluate("path => fetch(path).then(answer => answer.json())", f"/api/{path}")
-
-
-def shown_step(page: Page) -> int:
-    return int(page.get_by_role("slider", name="Moment").get_attribute("aria-valuenow") or -1)
-
-
 # --- what a reader does -----------------------------------------------------------------------------
 
 
@@ -133,7 +124,7 @@ def test_play_moves_the_clock_to_the_end_and_stops_there(context: BrowserContext
     page = opened(context, golden.address)
     page.get_by_label("Speed").select_option(label="×16")
     page.get_by_role("button", name="Play").click()
-    last = len(answer(page, _episode(page) + "/timeline")["steps"]) - 1
+    last = len(steps_of(page)) - 1
     page.wait_for_function("last => document.body.innerText.includes(`step ${last} of`)", arg=last)
     page.get_by_role("button", name="Play").wait_for()
 
@@ -154,7 +145,7 @@ def test_what_stands_on_the_page_is_what_the_recording_says(context: BrowserCont
             column.get_by_text(" ".join(said.text.split())[:80]).first.wait_for()
             column.get_by_role("tab", name="Decision").click()
             assert column.get_by_role("img", name="accepted").count() == len(agent.accepted)
-        units = answer(page, f"{_episode(page)}/scenes?from={step}&to={step}")["scenes"][0]["units"]
+        units = answer(page, f"/episodes/0/scenes?from={step}&to={step}")["scenes"][0]["units"]
         assert units == json.loads(scenes[step].model_dump_json())["units"]
 
 
@@ -267,9 +258,3 @@ def test_the_keyboard_alone_reaches_everything(context: BrowserContext, golden: 
     page.get_by_role("dialog").wait_for()
     page.keyboard.press("Escape")
     page.get_by_role("dialog").wait_for(state="detached")
-
-
-def _episode(page: Page) -> str:
-    run = re.search(r"a=(\w+)", page.url)
-    assert run is not None
-    return f"runs/{run.group(1)}/episodes/0"

@@ -16,6 +16,7 @@ from khala.view.export import TooLarge, export
 from khala.view.guard import policy_of
 from khala.view.library import run_id
 from khala.view.sources import Sources
+from khala_orchestrator.transcript import StepSelection
 from khala_protocol.errors import ConfigError
 from tests.khala.view.made import AGENT, HOSTILE, STEPS, make, opened
 
@@ -29,7 +30,7 @@ def write(tmp_path: Path, *names: str, **options: Any) -> tuple[str, dict[str, A
     """Return the file of an export, and the answers in it."""
     paths = [make(tmp_path / f"{name}.mcap") for name in names or ("made",)]
     out = tmp_path / "out.html"
-    whole: dict[str, Any] = {"first": 0, "last": None, "agents": ()} | options
+    whole: dict[str, Any] = {"steps": StepSelection(), "agents": ()} | options
     assert export(Sources("made", None, paths), PAGE, out, **whole) == out.stat().st_size
     text = out.read_text()
     found = re.search(r'<script type="application/json" id="khala-data">([A-Za-z0-9+/=]+)</script>', text)
@@ -76,7 +77,7 @@ def test_its_policy_lets_it_ask_nobody(tmp_path: Path) -> None:
 
 
 def test_a_part_is_written_without_the_rest(tmp_path: Path) -> None:
-    _, answers = write(tmp_path, first=10, last=20, agents=("Nobody",))
+    _, answers = write(tmp_path, steps=StepSelection(first=10, last=20), agents=("Nobody",))
     steps = [int(name.rsplit("/", 1)[1]) for name in answers if re.search(r"/steps/\d+$", name)]
     assert steps == list(range(10, 21))
     assert not any("/agents/" in name for name in answers)
@@ -89,7 +90,7 @@ def test_too_much_for_one_file_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_a_page_that_is_not_built_and_a_directory_are_no_exports(tmp_path: Path) -> None:
-    whole: dict[str, Any] = {"first": 0, "last": None, "agents": ()}
+    whole: dict[str, Any] = {"steps": StepSelection(), "agents": ()}
     with pytest.raises(ConfigError, match="make page"):
         export(Sources("made", None, [make(tmp_path / "made.mcap")]), "<p>", tmp_path / "out.html", **whole)
     with pytest.raises(ConfigError, match="one recording or two"):

@@ -10,7 +10,7 @@ import pytest
 
 from khala.view import library
 from khala.view.library import found_in, lines, read_head, run_id
-from khala.view.serve import Look, guard_of, is_loopback
+from khala.view.serve import Look, guard_of, is_near
 from khala.view.sources import Sources, find
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording, summary
@@ -125,7 +125,7 @@ def test_without_runs_the_command_says_what_to_do(tmp_path: Path) -> None:
      ("::", False), ("10.0.0.5", False), ("table", False)],
 )  # fmt: skip
 def test_only_this_machine_may_look_without_a_password(host: str, near: bool) -> None:
-    assert is_loopback(host) is near
+    assert is_near(host) is near
     look = Look(given=(), host=host)
     if near:
         assert "127.0.0.1" in guard_of(look).names

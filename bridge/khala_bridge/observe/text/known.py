@@ -5,8 +5,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import advice, knowledge, short
-from khala_bridge.observe.chronicle import is_structure
+from khala_bridge.knowledge import advice, is_structure, knowledge, short
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from khala_bridge.observe.chronicle import is_structure, is_worker
+from khala_bridge.knowledge import is_structure, is_worker
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2, n, percent, point, whole
 
