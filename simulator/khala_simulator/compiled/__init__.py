@@ -23,7 +23,14 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("casts", "construction", "engagement", "harvest")
+SYSTEMS: Final = (
+    "casts",
+    "collision",
+    "construction",
+    "engagement",
+    "harvest",
+    "movement",
+)
 """The systems that have a module here."""
 
 
