@@ -27,9 +27,12 @@ SYSTEMS: Final = (
     "casts",
     "collision",
     "construction",
+    "death",
     "engagement",
     "harvest",
     "movement",
+    "regeneration",
+    "weapons",
 )
 """The systems that have a module here."""
 
