@@ -25,7 +25,10 @@ help: ## List the targets
 	$(PYTHON) -m venv .uv
 	.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
 
-.venv/.ready: pyproject.toml uv.lock $(filter .uv/bin/uv,$(UV))
+# A C compiler, where there is one, builds the simulator's compiled systems; see docs/design/engine.md.
+ENGINE := simulator/pyproject.toml simulator/setup.py $(wildcard simulator/khala_simulator/compiled/*.p*)
+
+.venv/.ready: pyproject.toml uv.lock $(ENGINE) $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
 	$(UV) sync --quiet --frozen --inexact --python $(PYTHON)
 	@touch $@

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from khala_simulator import compiled
 from khala_simulator.systems import (
     acquire,
     area_effects,
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.players import PlayerSetup
 
-SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
+RULES: Final[tuple[Callable[[World], None], ...]] = (
     death.bury,  # what a debug command killed since the last loop
     opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
@@ -79,6 +80,8 @@ SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     vision.look,
     triggers.run,  # the map's own script, which may end the game
 )
+SYSTEMS: Final = compiled.chosen(RULES)
+"""The rules as they are played: compiled where that was built."""
 
 
 def new_game(
@@ -105,12 +108,16 @@ def new_game(
     return world
 
 
-def advance(world: World, loops: int = 1) -> int:
-    """Advance by up to ``loops`` game loops; return how many, fewer when the game ends on the way."""
+def advance(world: World, loops: int = 1, systems: Sequence[Callable[[World], None]] | None = None) -> int:
+    """Advance by up to ``loops`` game loops; return how many, fewer when the game ends on the way.
+
+    ``systems`` are ``SYSTEMS`` unless the caller, such as a test, names others.
+    """
+    chosen = SYSTEMS if systems is None else systems
     for done in range(loops):
         if world.ended:
             return done
         world.loop += 1
-        for system in SYSTEMS:
+        for system in chosen:
             system(world)
     return loops

@@ -57,9 +57,9 @@ def kinds(catalog: Catalog) -> tuple[Bools, Bools, Bools]:
 
 
 @lru_cache(maxsize=4)
-def _outlines(catalog: Catalog) -> Floats:
+def outlines(catalog: Catalog) -> Floats:
     """Return (4, rows) of each type: half its footprint's width and height, |x| + |y| at its corners, its radius."""
-    return np.array([_outline(catalog, unit) for unit in catalog.units]).T
+    return np.ascontiguousarray(np.array([_outline(catalog, unit) for unit in catalog.units]).T)
 
 
 def _outline(catalog: Catalog, unit: UnitType) -> tuple[float, float, float, float]:
@@ -122,7 +122,7 @@ def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
 
     Edges touch at the radius that clients see; before a corner of the walls that stands farther out, at the walls.
     """
-    half_x, half_y, diagonal, radius = _outlines(world.catalog).take(world.type.take(targets), 1)
+    half_x, half_y, diagonal, radius = outlines(world.catalog).take(world.type.take(targets), 1)
     offset = np.abs(world.pos.take(targets, 0) - world.pos.take(slots, 0))
     distance = np.maximum(geometry.length(offset), 1e-9)
     across, along = np.maximum(offset.T / distance, 1e-9)

@@ -50,7 +50,7 @@ def measure(world: World) -> None:
     if some(world.needs_target[:n]):
         _follow(world)
     if some(world.casts[:n]):
-        _approach(world)
+        approach(world)
     if world.harvesting:
         _haul(world)
     if some(world.returning[:n]):
@@ -158,7 +158,7 @@ def _haul(world: World) -> None:
         world.wants[slots] = offset[:, 0] ** 2 + offset[:, 1] ** 2 > stop_at * stop_at
 
 
-def _approach(world: World) -> None:
+def approach(world: World) -> None:
     """Make casters walk until their ability reaches, and stand from then on unless they have to follow."""
     for slot in which(world.casts[: world.top]).tolist():
         target = int(world.order_target[slot])

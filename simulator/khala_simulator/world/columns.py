@@ -207,6 +207,7 @@ class UnitColumns:
 
     def __init__(self) -> None:
         self.capacity = 0
+        self.native: object | None = None  # the arrays as compiled code sees them, bound when it needs them
 
     def grow(self, capacity: int) -> None:
         """Make room for ``capacity`` slots; the values stay, the arrays are new."""
@@ -216,6 +217,7 @@ class UnitColumns:
                 array[: self.capacity] = getattr(self, name)
             setattr(self, name, array)
         self.capacity = capacity
+        self.native = None
 
     def clear(self, slot: int) -> None:
         """Make a slot unused."""
