@@ -22,7 +22,7 @@ from khala_simulator.world.casts import Cast
 from khala_simulator.world.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from khala_simulator.tables.catalog import Ability
     from khala_simulator.world.world import World
@@ -114,6 +114,19 @@ def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
     """Return the abilities that a unit can use now, by ascending id; ``free`` ignores cost and cooldown."""
     card = world.catalog.abilities_of(int(world.type[slot]))
     return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
+
+
+def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
+    """Return the abilities that at least one of these units can use now, by ascending id; each is asked until one can.
+
+    Thirty selected units of five types have some 500 abilities on their cards, of which 60 differ.
+    """
+    found: dict[int, Ability] = {}
+    for slot in slots:
+        for ability in world.catalog.abilities_of(int(world.type[slot])):
+            if ability.id not in found and casting.refusal(world, slot, ability) is ActionResult.SUCCESS:
+                found[ability.id] = ability
+    return [found[number] for number in sorted(found)]
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
