@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from s2clientprotocol import error_pb2
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.economy import requirements
 from khala_simulator.tables.abilities import Aim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
@@ -117,16 +118,22 @@ def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
 
 
 def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
-    """Return the abilities that at least one of these units can use now, by ascending id; each is asked until one can.
+    """Return the abilities that at least one of a player's units can use now, by ascending id.
 
-    Thirty selected units of five types have some 500 abilities on their cards, of which 60 differ.
+    Each is asked until one unit can, or until what is missing is missing to all: thirty selected units of five types
+    have 500 abilities on their cards, of which 60 differ.
     """
-    found: dict[int, Ability] = {}
+    found: dict[int, Ability | None] = {}  # None: no unit of this player can
     for slot in slots:
         for ability in world.catalog.abilities_of(int(world.type[slot])):
-            if ability.id not in found and casting.refusal(world, slot, ability) is ActionResult.SUCCESS:
+            if ability.id in found:
+                continue
+            why = casting.refusal(world, slot, ability)
+            if why is ActionResult.SUCCESS:
                 found[ability.id] = ability
-    return [found[number] for number in sorted(found)]
+            elif why is ActionResult.TECH_REQUIREMENTS_NOT_MET and requirements.missing_to_all(world, slot, ability):
+                found[ability.id] = None
+    return [ability for _, ability in sorted(found.items()) if ability is not None]
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
