@@ -15,7 +15,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api import ui, wire
-from khala_simulator.api.abilities import result_of, usable
+from khala_simulator.api.abilities import result_of, usable_by_any
 from khala_simulator.api.effects import seen_buffs
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.raw import Units, write_image
@@ -99,9 +99,8 @@ def _write_abilities(observation: sc.Observation, seat: PlayerSeat) -> None:
     """Write the abilities that the selection can use now; none for a foreign unit."""
     world = seat.world
     own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
-    found = {ability.id: ability for slot in own for ability in usable(world, slot)}
-    for number in sorted(found):
-        observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
+    for ability in usable_by_any(world, own):
+        observation.abilities.add(ability_id=ability.id, requires_point=ability.requires_point)
 
 
 def _attacked(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
