@@ -32,6 +32,7 @@ SYSTEMS: Final = (
     "harvest",
     "movement",
     "regeneration",
+    "triggers",
     "weapons",
 )
 """The systems that have a module here."""
