@@ -61,7 +61,7 @@ slow: install-tests ## All long tests: whole tables, more examples, those of PyS
 
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
-	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
+	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
 check: install-tests ## Lint, format, types and import contracts

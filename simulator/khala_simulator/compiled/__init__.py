@@ -23,7 +23,18 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("engagement",)
+SYSTEMS: Final = (
+    "casts",
+    "collision",
+    "construction",
+    "death",
+    "engagement",
+    "harvest",
+    "movement",
+    "regeneration",
+    "triggers",
+    "weapons",
+)
 """The systems that have a module here."""
 
 

@@ -62,12 +62,14 @@ class Surface:
             if dx and dy
         ]
         self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
-        self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+        # (height + 1, width + 1) how many cells are free below and to the left
+        self.sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
         self._fields: dict[int, _Field] = {}
         self._places: dict[tuple[float, ...], tuple[Ints, Floats]] = {}
         # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
         self._steps: list[int] = self._free_steps(blocked).tolist()
         self._edges = _edges(self.width)
+        self.native: object | None = None  # its cells as compiled code sees them
 
     def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
         """Return (cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
@@ -151,7 +153,7 @@ class Surface:
         np.minimum(high, self._last + 1, out=high)
         left, right = low[:, 0], high[:, 0]
         below, above = low[:, 1] * (self.width + 1), high[:, 1] * (self.width + 1)
-        s = self._sums
+        s = self.sums
         free = s.take(above + right) - s.take(below + right) - s.take(above + left) + s.take(below + left)
         size = high - low
         result: Bools = np.equal(free, size[:, 0] * size[:, 1])
