@@ -1,4 +1,9 @@
-"""What a measurement says: figures with a name and a unit. The processes of a measurement import it, so it is small."""
+"""What a measurement says: figures that are kept, compared and limited.
+
+A module of `bench` takes part with two things: `--json`, and a function `measures` that makes figures of the object
+that `--json` prints. Above it: `bench.results` keeps figures, `bench.limits` judges them. It imports next to nothing:
+the processes of a measurement import it, too.
+"""
 
 from __future__ import annotations
 
