@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden page picture clean
+.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -89,6 +89,9 @@ page: install ## Build khala/view/assets/index.html, the page of `khala view`, f
 
 bench: install ## Measure what docs/measurements.md claims
 	$(RUN)python -m bench
+
+limits: install ## Fail if a ratio that is measured within one run is beyond its limit
+	$(RUN)python -m bench limits
 
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
 	$(RUN)python -m bench.scenarios
