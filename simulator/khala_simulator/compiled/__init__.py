@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("casts", "construction", "death", "engagement", "harvest", "regeneration", "weapons")
+SYSTEMS: Final = ("acquire", "casts", "construction", "death", "engagement", "harvest", "regeneration", "weapons")
 """The systems that have a module here."""
 
 
