@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("acquire", "casts", "construction", "death", "engagement", "harvest", "regeneration", "weapons")
+SYSTEMS: Final = (
+    "acquire", "casts", "construction", "death", "engagement", "harvest", "hits", "missiles", "regeneration", "weapons",
+)  # fmt: skip
 """The systems that have a module here."""
 
 
