@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
+SYSTEMS: Final = (
     "casts",
     "collision",
     "construction",
