@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("collision", "engagement", "movement", "navigation")
+SYSTEMS: Final = ("avoidance", "collision", "engagement", "movement", "navigation")
 """The systems that have a module here."""
 
 
