@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
-SYSTEMS: Final = (
+    "avoidance",
     "casts",
     "collision",
     "construction",
@@ -32,6 +32,7 @@ SYSTEMS: Final = (
     "engagement",
     "harvest",
     "movement",
+    "navigation",
     "regeneration",
     "triggers",
     "weapons",

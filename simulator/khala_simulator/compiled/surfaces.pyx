@@ -24,6 +24,8 @@ cdef class Grid:
             np.ascontiguousarray(surface.walls_low),
             np.ascontiguousarray(surface.walls_high),
             np.ascontiguousarray(surface.sums),
+            np.ascontiguousarray(surface.part),
+            np.array(surface.steps, dtype=np.uint8),
         )
         self.flat, self.open, self.spiked = (
             <boolean*>start(self.arrays[0]), <boolean*>start(self.arrays[1]), <boolean*>start(self.arrays[2])
@@ -33,7 +35,9 @@ cdef class Grid:
             self.spikes[i] = <boolean*>start(self.arrays[3 + i])
             self.corners[i].x, self.corners[i].y = surface.spikes[i][0]
         self.walls_low, self.walls_high = <Point*>start(self.arrays[7]), <Point*>start(self.arrays[8])
-        self.sums = <int64_t*>start(self.arrays[9])
+        self.sums, self.part = <int64_t*>start(self.arrays[9]), <int64_t*>start(self.arrays[10])
+        self.steps = <boolean*>start(self.arrays[11])
+        self.fields = {}
 
     def __reduce__(self):
         """Return what makes None: a copy of a surface is read anew."""
