@@ -124,8 +124,9 @@ def measured(folder: Path, python: str) -> dict[str, dict[str, Any]]:
 
 
 def main() -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        environment = Path(folder) / "environment"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        environment = folder / "environment"
         run(UV, "venv", "--quiet", "--python", sys.executable, environment, cwd=folder)
         python = str(environment / "bin" / "python")
         run(
@@ -142,7 +143,7 @@ def main() -> None:
             "numpy",
             cwd=folder,
         )
-        rows = measured(Path(folder), python)
+        rows = measured(folder, python)
     table = Table("compiler", *(f"us for {size}" for size in SIZES), "ms to start", "MB", "same result")
     for name, row in rows.items():
         times = (f"{us:.1f}" for us in row["us"])

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
+    "acquire",
     "avoidance",
     "casts",
     "collision",
@@ -31,6 +32,8 @@ SYSTEMS: Final = (
     "death",
     "engagement",
     "harvest",
+    "hits",
+    "missiles",
     "movement",
     "navigation",
     "regeneration",
