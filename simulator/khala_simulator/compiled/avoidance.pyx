@@ -6,6 +6,7 @@ from khala_simulator.compiled.columns cimport Columns, Point, boolean, columns_o
 from khala_simulator.compiled.numbers cimport count, floats, ints, length, most, new_floats, new_ints, new_points
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, grid_of
 
+from khala_simulator.compiled.flow import Flow
 from khala_simulator.systems import avoidance as rules
 from khala_simulator.systems import flanking
 from khala_simulator.tables.mechanics import MECHANICS
@@ -55,7 +56,7 @@ def find_headings(world):
             slot = ints(turning)[i]
             if flows(c, slot):
                 c.detour[slot] = 1 if c.detour[slot] > 0 else -1
-        flanking.lead(world, turning[:due])
+        flanking.lead(world, turning[:due], Flow)
     look(world, c, ints(turning), due)
 
 

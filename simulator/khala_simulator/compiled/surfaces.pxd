@@ -26,6 +26,7 @@ cdef class Grid:
     cdef int64_t* part
     cdef boolean* steps  # (cells,) bit i says that a step to the i-th neighbour is free
 
+cdef Grid read(object surface)
 cdef Grid bound(object ground, int64_t layer)
 
 cdef inline Grid grid_of(object ground, int64_t layer):

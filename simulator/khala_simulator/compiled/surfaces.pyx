@@ -49,9 +49,14 @@ cdef void* start(object array):
     return cnp.PyArray_DATA(<cnp.ndarray>array)
 
 
-cdef Grid bound(object ground, int64_t layer):
-    surface = pathfinding.surface(ground, Layer(layer))
+cdef Grid read(object surface):
+    """Return a surface as it is read here."""
     if surface.native is None:
         surface.native = Grid(surface)
-    (<list>ground.native)[layer] = surface.native
-    return surface.native
+    return <Grid>surface.native
+
+
+cdef Grid bound(object ground, int64_t layer):
+    cdef Grid grid = read(pathfinding.surface(ground, Layer(layer)))
+    (<list>ground.native)[layer] = grid
+    return grid
