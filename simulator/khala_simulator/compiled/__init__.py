@@ -36,6 +36,7 @@ SYSTEMS: Final = (
     "missiles",
     "movement",
     "navigation",
+    "orders",
     "regeneration",
     "triggers",
     "weapons",
