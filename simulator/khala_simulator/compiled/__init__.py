@@ -25,6 +25,7 @@ ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
     "acquire",
+    "autocast",
     "avoidance",
     "casts",
     "collision",
@@ -36,6 +37,7 @@ SYSTEMS: Final = (
     "missiles",
     "movement",
     "navigation",
+    "orders",
     "regeneration",
     "triggers",
     "weapons",
