@@ -16,7 +16,7 @@ from khala_simulator.abilities import commands
 from khala_simulator.abilities.registry import SKILLS, SMARTS
 from khala_simulator.abilities.skill import touching
 from khala_simulator.economy import payments, supply
-from khala_simulator.economy.requirements import met, same_for_all
+from khala_simulator.economy.requirements import met
 from khala_simulator.tables import prices
 from khala_simulator.tables.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
@@ -86,12 +86,6 @@ def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
     if not (met(world, slot, ability.requires) and met(world, slot, ability.shown_if)):
         return ActionResult.TECH_REQUIREMENTS_NOT_MET
     return ActionResult.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
-
-
-def closed_to_all(world: World, slot: int, ability: Ability) -> bool:
-    """Return whether a unit can't use an ability now for a reason that no other unit of its owner is free of."""
-    tech = ability.requires
-    return ability.effect not in ORDINARY and same_for_all(tech) and not met(world, slot, tech)
 
 
 def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:

@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.compiled.columns cimport Columns, columns_of
 
 from khala_simulator.abilities import casting
+from khala_simulator.economy.requirements import missing_to_all
 from khala_simulator.systems import autocast as rules
 from khala_simulator.tables.mechanics import MECHANICS
 
@@ -26,7 +27,9 @@ def look_out(world):
                 key = (c.owner[slot], number)
                 hopeless = closed.get(key)
                 if hopeless is None:
-                    hopeless = closed[key] = casting.closed_to_all(world, slot, world.catalog.ability(number))
+                    ability = world.catalog.ability(number)
+                    hopeless = ability.effect not in casting.ORDINARY and missing_to_all(world, slot, ability)
+                    closed[key] = hopeless
                 if not hopeless and rules.attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
                     closed.clear()
                     break

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 FINISHED, EVERYBODY = 0, 1
 ALIAS: Final = "Alias_"
-HERE: Final = "_here"  # ends the state of an add-on of the unit's own
 NATURES: Final[dict[str, Callable[[World, int], bool]]] = {
     "IsTransportOverlord": lambda world, slot: world.unit_type(slot).name == "OverlordTransport",
     "WidowMineArmed": lambda world, slot: world.unit_type(slot).name == "WidowMineBurrowed",
@@ -43,7 +42,6 @@ def met(world: World, slot: int, need: Need | None) -> bool:
     return _count(world, slot, need) > 0
 
 
-<<<<<<< HEAD
 def missing_to_all(world: World, slot: int, ability: Ability) -> bool:
     """Return whether an ability's condition fails for a unit for a reason that all units of its owner share."""
     return any(
@@ -57,14 +55,6 @@ def _of_the_player(need: Need) -> bool:
     """Return whether a condition has the same value for all units of a player: no part looks at the unit itself."""
     itself = need.kind == "behavior" or (need.kind == "unit" and need.state.endswith("_here"))
     return not itself and all(map(_of_the_player, need.parts))
-=======
-def same_for_all(need: Need | None) -> bool:
-    """Return whether a condition holds for all units of a player or for none: it does not look at the unit itself."""
-    if need is None:
-        return True
-    own = need.kind == "behavior" or need.state.endswith(HERE)
-    return not own and all(same_for_all(part) for part in need.parts)
->>>>>>> 603ea882 (Compile who has nothing to use by autocast)
 
 
 def _count(world: World, slot: int, need: Need) -> float:
@@ -116,7 +106,7 @@ def _upgrades(world: World, slot: int, need: Need) -> float:
 def _units(world: World, slot: int, need: Need) -> float:
     rows = counts_as(world.catalog, need.name.removeprefix(ALIAS), alias=need.name.startswith(ALIAS))
     player = int(world.owner[slot])
-    if need.state.endswith(HERE):
+    if need.state.endswith("_here"):
         return float(world.addon[slot] >= 0 and int(world.type[world.addon[slot]]) in rows)
     counted = _tally(world)[FINISHED if need.state == "done" else EVERYBODY, player]
     found = float(sum(counted[row] for row in rows))
