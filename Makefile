@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests check format types test pysc2 slow numpy cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,9 +59,12 @@ pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the 
 slow: install-tests ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
+numpy: install-tests ## The tests of the simulator's rules without the compiled systems
+	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) tests/simulator/engine tests/simulator/api
+
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
-	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
+	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
 check: install-tests ## Lint, format, types and import contracts
