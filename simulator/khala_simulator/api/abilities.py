@@ -123,17 +123,23 @@ def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
     Each is asked until one unit can, or until what is missing is missing to all: thirty selected units of five types
     have 500 abilities on their cards, of which 60 differ.
     """
-    found: dict[int, Ability | None] = {}  # None: no unit of this player can
+    found: dict[int, Ability] = {}
+    open_: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
     for slot in slots:
-        for ability in world.catalog.abilities_of(int(world.type[slot])):
+        row = int(world.type[slot])
+        asked = open_[row] if row in open_ else world.catalog.abilities_of(row)
+        open_[row] = []
+        for ability in asked:
             if ability.id in found:
                 continue
             why = casting.refusal(world, slot, ability)
             if why is ActionResult.SUCCESS:
                 found[ability.id] = ability
-            elif why is ActionResult.TECH_REQUIREMENTS_NOT_MET and requirements.missing_to_all(world, slot, ability):
-                found[ability.id] = None
-    return [ability for _, ability in sorted(found.items()) if ability is not None]
+            elif why is ActionResult.NOT_SUPPORTED or (why is ActionResult.TECH_REQUIREMENTS_NOT_MET and requirements.missing_to_all(world, slot, ability)):
+                continue
+            else:
+                open_[row].append(ability)
+    return [ability for _, ability in sorted(found.items())]
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
