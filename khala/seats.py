@@ -165,6 +165,26 @@ class SeatedMatch:
             return self._ended.popleft()
         return Turn(asked=self._questions.seen(), reports=self._take_reports())
 
+    async def news(self) -> Turn:
+        """Wait until something is new, and return all that there is: for agents of the caller with paces of their own.
+
+        An agent is asked, its time for an answer is over, a step is reported, or an episode has ended. `asked` has
+        every agent that waits for an answer now, one that was returned before as well.
+
+        Raises:
+            KhalaError: as in `turn`.
+        """
+        assert self._playing is not None
+        if not (self._ended or self._playing.done()):
+            await self._questions.changed.wait()
+        self._questions.changed.clear()
+        if self._ended:
+            return self._ended.popleft()
+        if self._playing.done():
+            self._playing.result()
+            return Turn(over=True)
+        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+
     def act(self, seat: Seat, said: Said) -> None:
         """Answer for an agent: with a reply, or a reply with its usage.
 
@@ -191,6 +211,7 @@ class SeatedMatch:
     def _watch(self, message: Wire) -> None:
         if isinstance(message, Report) and message.side in self._sides:
             self._reports.append(message)
+            self._questions.changed.set()
         elif isinstance(message, Result):
             self._results.append(message)
             if len(self._results) == len(self._config.task.per_side()):
@@ -273,6 +294,7 @@ class _OpenQuestions:
         finally:
             if self._open.get(seat) is question:  # it was cancelled: too late, or a newer one is there
                 del self._open[seat]
+                self.changed.set()
 
     def close(self, seat: Seat, said: Said) -> None:
         """Answer a question.

@@ -24,13 +24,20 @@ if TYPE_CHECKING:
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
+    "acquire",
+    "autocast",
+    "avoidance",
     "casts",
     "collision",
     "construction",
     "death",
     "engagement",
     "harvest",
+    "hits",
+    "missiles",
     "movement",
+    "navigation",
+    "orders",
     "regeneration",
     "triggers",
     "weapons",

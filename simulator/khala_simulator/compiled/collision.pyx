@@ -8,8 +8,8 @@ from khala_simulator.compiled.contacts cimport Crowd, Pair, crowd_of
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_ints, new_points
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, grid_of
 
+from khala_simulator.compiled import avoidance
 from khala_simulator.movement import contacts
-from khala_simulator.systems import avoidance
 from khala_simulator.systems import collision as rules
 from khala_simulator.tables.mechanics import MECHANICS
 

@@ -24,6 +24,8 @@ cdef class Grid:
             np.ascontiguousarray(surface.walls_low),
             np.ascontiguousarray(surface.walls_high),
             np.ascontiguousarray(surface.sums),
+            np.ascontiguousarray(surface.part),
+            np.array(surface.steps, dtype=np.uint8),
         )
         self.flat, self.open, self.spiked = (
             <boolean*>start(self.arrays[0]), <boolean*>start(self.arrays[1]), <boolean*>start(self.arrays[2])
@@ -33,7 +35,9 @@ cdef class Grid:
             self.spikes[i] = <boolean*>start(self.arrays[3 + i])
             self.corners[i].x, self.corners[i].y = surface.spikes[i][0]
         self.walls_low, self.walls_high = <Point*>start(self.arrays[7]), <Point*>start(self.arrays[8])
-        self.sums = <int64_t*>start(self.arrays[9])
+        self.sums, self.part = <int64_t*>start(self.arrays[9]), <int64_t*>start(self.arrays[10])
+        self.steps = <boolean*>start(self.arrays[11])
+        self.fields = {}
 
     def __reduce__(self):
         """Return what makes None: a copy of a surface is read anew."""
@@ -45,9 +49,14 @@ cdef void* start(object array):
     return cnp.PyArray_DATA(<cnp.ndarray>array)
 
 
-cdef Grid bound(object ground, int64_t layer):
-    surface = pathfinding.surface(ground, Layer(layer))
+cdef Grid read(object surface):
+    """Return a surface as it is read here."""
     if surface.native is None:
         surface.native = Grid(surface)
-    (<list>ground.native)[layer] = surface.native
-    return surface.native
+    return <Grid>surface.native
+
+
+cdef Grid bound(object ground, int64_t layer):
+    cdef Grid grid = read(pathfinding.surface(ground, Layer(layer)))
+    (<list>ground.native)[layer] = grid
+    return grid

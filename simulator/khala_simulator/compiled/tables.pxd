@@ -18,7 +18,9 @@ cdef struct Hit:
     bint bounces  # it leaves from the last victim
     bint conditional  # the game's own switch may leave it out
     bint ignores_armor
-    bint plain  # it takes from its target alone, and does nothing else
+    bint impacts  # it does more to its target than damage
+    bint plain  # it is dealt to its target alone
+    bint splashes
 
 cdef struct Weapon:
     Py_ssize_t first_hit

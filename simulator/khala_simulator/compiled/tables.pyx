@@ -59,8 +59,9 @@ cdef write_hit(Hit* row, hit):
     row.flies, row.sweeps = hit.missile_speed_n is not None, hit.sweep is not None
     row.bounces, row.conditional = hit.bounce, bool(hit.when)
     row.ignores_armor = hit.ignores_armor
-    searches = hit.search is not None and not hit.bounce
-    row.plain = not (hit.kills_self or searches or hit.area or hit.effect in IMPACTS)
+    row.impacts = hit.effect in IMPACTS
+    cdef bint ordinary = not hit.kills_self and (hit.search is None or hit.bounce)
+    row.plain, row.splashes = ordinary and not hit.area, ordinary and bool(hit.area)
 
 
 @functools.lru_cache(maxsize=4)

@@ -43,7 +43,7 @@ def fly(world: World) -> None:
         missiles.keep(~arriving)
         for shot in arrived:
             damage.hit_with(world, shot)
-            _bounce(world, shot)
+            bounce(world, shot)
 
 
 def launch(world: World, shot: Shot, hit: Hit) -> None:
@@ -61,7 +61,7 @@ def speeds(hit: Hit) -> tuple[float, float, float]:
     return 0.0, top, gain_n / LOOPS_PER_NORMAL_SECOND**2
 
 
-def _bounce(world: World, shot: Shot) -> None:
+def bounce(world: World, shot: Shot) -> None:
     """Send on a missile that bounces; one whose target died on the way is lost."""
     hits = world.catalog.weapons[shot.weapon].hits
     if shot.target == NOBODY or shot.hit + 1 >= len(hits) or not hits[shot.hit + 1].bounce:
