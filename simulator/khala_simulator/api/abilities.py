@@ -124,22 +124,27 @@ def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
     have 500 abilities on their cards, of which 60 differ.
     """
     found: dict[int, Ability] = {}
-    open_: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
+    left: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
     for slot in slots:
         row = int(world.type[slot])
-        asked = open_[row] if row in open_ else world.catalog.abilities_of(row)
-        open_[row] = []
+        asked = left[row] if row in left else world.catalog.abilities_of(row)
+        left[row] = []
         for ability in asked:
             if ability.id in found:
                 continue
             why = casting.refusal(world, slot, ability)
             if why is ActionResult.SUCCESS:
                 found[ability.id] = ability
-            elif why is ActionResult.NOT_SUPPORTED or (why is ActionResult.TECH_REQUIREMENTS_NOT_MET and requirements.missing_to_all(world, slot, ability)):
-                continue
-            else:
-                open_[row].append(ability)
+            elif not _hopeless(world, slot, ability, why):
+                left[row].append(ability)
     return [ability for _, ability in sorted(found.items())]
+
+
+def _hopeless(world: World, slot: int, ability: Ability, why: ActionResult) -> bool:
+    """Return whether an ability that a unit can't use is out of reach for all units of its owner."""
+    if why is ActionResult.TECH_REQUIREMENTS_NOT_MET:
+        return requirements.missing_to_all(world, slot, ability)
+    return why is ActionResult.NOT_SUPPORTED
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
