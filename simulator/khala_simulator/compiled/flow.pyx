@@ -2,9 +2,9 @@
 cimport cython
 cimport numpy as cnp
 from libc.math cimport INFINITY, ceil, floor
-from libc.stdint cimport int64_t, uint8_t
+from libc.stdint cimport int64_t, uint8_t, uint64_t
 from libc.stdlib cimport calloc, free, malloc
-from libc.string cimport memset
+from libc.string cimport memcpy, memset
 
 from khala_simulator.compiled.columns cimport Point, boolean
 from khala_simulator.compiled.numbers cimport count, floats, least, length, most, new_floats, new_points
@@ -16,6 +16,8 @@ from khala_simulator.movement import flow as rules
 
 cnp.import_array()
 
+cdef enum:
+    WORD = 8  # cells in a word
 cdef int64_t FINE = rules.FINE
 cdef double MARGIN = rules.MARGIN
 cdef uint8_t NOWHERE = rules.NOWHERE
@@ -40,6 +42,8 @@ cdef class Flow:
     cdef Point low
     cdef int64_t width
     cdef int64_t height
+    cdef int64_t size  # of the grid, in cells
+    cdef int64_t words
     cdef boolean* free
     cdef boolean* wanted
     cdef boolean* awaited  # the cells around walkers
@@ -58,20 +62,30 @@ cdef class Flow:
         high.x, high.y = ceil(high.x + (grid.shift + MARGIN)), ceil(high.y + (grid.shift + MARGIN))
         self.low.x, self.low.y = low.x - grid.shift, low.y - grid.shift
         self.width, self.height = <int64_t>(high.x - low.x) * FINE, <int64_t>(high.y - low.y) * FINE
-        self.free = <boolean*>calloc(self.width * self.height, 1)
-        self.wanted = <boolean*>calloc(self.width * self.height, 1)
-        self.awaited = <boolean*>malloc(self.width * self.height)
-        self.left = <uint8_t*>malloc(self.width * self.height)
-        self.reached = <int64_t*>malloc(self.width * self.height * sizeof(int64_t))
+        self.size = self.width * self.height
+        self.words = (self.size + WORD - 1) // WORD
+        self.free = <boolean*>calloc(self.words, WORD)
+        self.wanted = <boolean*>calloc(self.words, WORD)
+        self.awaited = <boolean*>malloc(self.size)
+        self.left = <uint8_t*>malloc(self.size)
+        self.reached = <int64_t*>malloc(self.size * sizeof(int64_t))
         if not (self.free and self.wanted and self.awaited and self.left and self.reached):
             raise MemoryError("no room for the ways of a crowd")
-        cdef int64_t x, y, column, row
-        for y in range(1, self.height - 1):  # not at the edge, so that no step leads round it
-            row = <int64_t>low.y + y // FINE
-            for x in range(1, self.width - 1):
-                column = <int64_t>low.x + x // FINE
-                if 0 <= row < grid.height and 0 <= column < grid.width:
-                    self.free[y * self.width + x] = grid.flat[row * grid.width + column]
+        self.stand_on(grid, <int64_t>low.x, <int64_t>low.y)
+
+    cdef void stand_on(self, Grid grid, int64_t low_x, int64_t low_y) noexcept:
+        """Free the cells on free ground, but none at the edge, so that no step leads round it."""
+        cdef int64_t x, y, row, line
+        for y in range(max(-low_y, 0), min(self.height // FINE, grid.height - low_y)):
+            row = y * FINE * self.width
+            for x in range(max(-low_x, 0), min(self.width // FINE, grid.width - low_x)):
+                if grid.flat[(low_y + y) * grid.width + low_x + x]:
+                    memset(self.free + row + x * FINE, True, FINE)
+            self.free[row] = self.free[row + self.width - 1] = False
+            for line in range(1, FINE):
+                memcpy(self.free + row + line * self.width, self.free + row, self.width)
+        memset(self.free, False, self.width)
+        memset(self.free + self.size - self.width, False, self.width)
 
     def __dealloc__(self):
         free(self.free)
@@ -120,8 +134,7 @@ cdef class Flow:
             w = &walkers[i]
             w.at, w.ahead, w.goal = (<Point*>floats(at))[i], (<Point*>floats(at))[i], (<Point*>floats(goal))[i]
             w.found = w.settled = False
-        if self.leads_anywhere():
-            self.spread(walkers, k)
+        if self.spread(walkers, k):
             for i in range(k):
                 w = &walkers[i]
                 self.look_ahead(w)
@@ -145,27 +158,22 @@ cdef class Flow:
             (<boolean*>cnp.PyArray_DATA(found))[i] = walkers[i].found
         return points, found
 
-    cdef bint leads_anywhere(self) noexcept:
-        """Return whether there is a place to go to."""
-        cdef Py_ssize_t i
-        for i in range(self.width * self.height):
-            if self.free[i] and self.wanted[i]:
-                return True
-        return False
-
     cdef int64_t cell(self, Point at) noexcept:
         """Return the cell under a point of the grid."""
         cdef int64_t x = <int64_t>((at.x - self.low.x) * FINE), y = <int64_t>((at.y - self.low.y) * FINE)
         return y * self.width + x
 
-    cdef void spread(self, Walker* walkers, Py_ssize_t k) noexcept:
-        """Count the steps from each cell to a place to go to, outwards until those that go on are reached."""
-        cdef int64_t size = self.width * self.height, cell, x, y, missing = 0
+    cdef bint spread(self, Walker* walkers, Py_ssize_t k) noexcept:
+        """Count the steps from each cell to a place to go to, outwards until those that go on are reached.
+
+        Returns whether there is such a place.
+        """
+        cdef int64_t cell, x, y, missing = 0, word
         cdef int64_t end = 0, old = 0, older = 0, stop  # in ``reached``: its end, and where the last two steps begin
         cdef uint8_t step = 0
         cdef Py_ssize_t i
-        memset(self.left, NOWHERE, size)
-        memset(self.awaited, 0, size)
+        memset(self.left, NOWHERE, self.size)
+        memset(self.awaited, False, self.size)
         for i in range(k):
             if walkers[i].settled:
                 continue
@@ -174,9 +182,11 @@ cdef class Flow:
                     cell = self.cell(walkers[i].at) + y * self.width + x
                     missing += self.free[cell] and not self.awaited[cell]
                     self.awaited[cell] |= self.free[cell]
-        for cell in range(size):
-            if self.wanted[cell]:
-                missing -= self.arrive(cell, 0, &end)
+        for word in range(self.words):
+            if (<uint64_t*>self.free)[word] & (<uint64_t*>self.wanted)[word] != 0:
+                for cell in range(word * WORD, (word + 1) * WORD):
+                    if self.wanted[cell]:
+                        missing -= self.arrive(cell, 0, &end)
         while missing and step < NOWHERE - 1:
             step += 1
             stop = end
@@ -191,8 +201,9 @@ cdef class Flow:
                     cell = self.reached[i] + self.width
                     missing -= self.arrive(cell - 1, step, &end) + self.arrive(cell + 1, step, &end)
             if end == stop:
-                return
+                break
             older, old = old, stop
+        return end > 0
 
     cdef inline int64_t arrive(self, int64_t cell, uint8_t step, int64_t* end) noexcept:
         """Note that a cell is reached now, if it is free and was not; return how many that were awaited are."""
