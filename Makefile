@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden page picture clean
+.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -34,7 +34,7 @@ ENGINE := simulator/pyproject.toml simulator/setup.py $(wildcard simulator/khala
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments --group page
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page
 	@touch $@
 
 install: .venv/.ready ## Install what is needed to play into .venv
@@ -61,7 +61,7 @@ slow: install-tests ## All long tests: whole tables, more examples, those of PyS
 
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
-	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
+	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
 check: install-tests ## Lint, format, types and import contracts
@@ -80,7 +80,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
 	  echo "== Python $$version"; \
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
-	  $(UV) sync --quiet --frozen --python $$python --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
+	  $(UV) sync --quiet --frozen --python $$python --group env --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
 page: install ## Build khala/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
@@ -89,6 +89,9 @@ page: install ## Build khala/view/assets/index.html, the page of `khala view`, f
 
 bench: install ## Measure what docs/measurements.md claims
 	$(RUN)python -m bench
+
+limits: install ## Fail if a ratio that is measured within one run is beyond its limit
+	$(RUN)python -m bench limits
 
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
 	$(RUN)python -m bench.scenarios

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.env import Launched
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.match import Asks
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Result, Wire
@@ -44,6 +45,7 @@ async def hosted(
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
     launched: Launched | None = None,
+    asks: Asks = lambda *_: None,
 ) -> list[Result]:
     """Play a match, and go on in a new game if the game dies or hangs and the task says so.
 
@@ -56,6 +58,7 @@ async def hosted(
         watch: is called with the run card, every new report and every result.
         past: what was played of this match before.
         launched: a process of the game that is there already.
+        asks: is called in each step with the agents that are asked.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
@@ -65,7 +68,7 @@ async def hosted(
         try:
             first = past.episode if past else 0
             async with game_of(config, sc2path, first_episode=first, launched=launched) as game:
-                return await host(config, game, bus, watch=watch, past=past)
+                return await host(config, game, bus, watch=watch, past=past, asks=asks)
         except GameMissing:
             raise
         except GameError as error:

@@ -21,7 +21,7 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ModelCall, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
     from contextlib import AsyncExitStack
 
     from khala_agents.llm.limits import Gates
@@ -126,15 +126,20 @@ class Minds:
         return ["--model", self.model, *given]
 
 
-def groups_of(task: TaskConfig, minds: Mapping[str, Minds]) -> Iterator[tuple[str, Minds, list[str]]]:
-    """Yield the agents of a match in groups that decide alike, each with its side.
+def groups_of(
+    task: TaskConfig, minds: Mapping[str, Minds], *, taken: Collection[Seat] = ()
+) -> Iterator[tuple[str, Minds, list[str]]]:
+    """Yield the agents of a match in groups that decide alike, each with its side; those `taken` are left out.
 
     Raises:
         ConfigError: minds name an agent that is not in the task.
     """
     for side in task.per_side():
-        for mind, names in minds[side.side].groups([agent.name for agent in side.agents]):
-            yield side.side, mind, names
+        names = [agent.name for agent in side.agents]
+        left = {name for name in names if Seat(side.side, name) not in taken}
+        for mind, group in minds[side.side].groups(names) if left else ():
+            if not left.isdisjoint(group):
+                yield side.side, mind, [name for name in group if name in left]
 
 
 async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, Minds, Sequence[str]]]) -> str | None:

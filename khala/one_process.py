@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from khala import games
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from khala_agents.policy import Policy
     from khala_bridge.game.env import Launched
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.match import Asks
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.messages import Result, Wire
 
@@ -40,17 +42,21 @@ async def play(
     past: Unfinished | None = None,
     launched: Launched | None = None,
     gates: Gates = own_turns,
+    callers: Mapping[Seat, Policy] = MappingProxyType({}),
+    asks: Asks = lambda *_: None,
 ) -> list[Result]:
     """Play a match with its agents in this process.
 
     Args:
         config: the match to play.
-        minds: by side, how its agents decide.
+        minds: by side, how its agents decide; without a side whose agents all have policies of the caller.
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
         past: what was played of this match before.
         launched: a process of the game.
         gates: where requests to models wait for their turn.
+        callers: by seat, policies of the caller, in place of its minds.
+        asks: is called in each step with the agents that are asked.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
@@ -59,7 +65,7 @@ async def play(
     config = config.model_copy(update={"game": name})
     broker, stop = MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
-        by_side = await _policies(config, minds, stack, gates)
+        by_side = await _policies(config, minds, stack, gates, callers)
         if past is not None:
             _remind(by_side, past)
         agents = [
@@ -67,7 +73,7 @@ async def play(
             for side, policies in by_side.items()
         ]
         try:
-            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, launched=launched)
+            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, launched=launched, asks=asks)
             return await _unless_one_fails(asyncio.create_task(match), agents)
         finally:
             stop.set()
@@ -75,13 +81,19 @@ async def play(
 
 
 async def _policies(
-    config: MatchConfig, minds: Mapping[str, Minds], stack: contextlib.AsyncExitStack, gates: Gates
+    config: MatchConfig,
+    minds: Mapping[str, Minds],
+    stack: contextlib.AsyncExitStack,
+    gates: Gates,
+    callers: Mapping[Seat, Policy],
 ) -> dict[str, dict[str, Policy]]:
     """Return the policies of all agents, by side; start the scripted endpoint if one asks it."""
-    groups = list(groups_of(config.task, minds))
+    groups = list(groups_of(config.task, minds, taken=callers))
     base_url = await scripted_endpoint(stack, groups)
     budgets = {side: Budget(mind.budget_usd, source="the budget of the match") for side, mind in minds.items()}
-    made: dict[str, dict[str, Policy]] = {side: {} for side in minds}
+    made: dict[str, dict[str, Policy]] = {side.side: {} for side in config.task.per_side()}
+    for seat, policy in callers.items():
+        made[seat.side][seat.agent] = policy
     for side, mind, names in groups:
         made[side] |= mind.policies(names, base_url, budgets[side], gates)
     return made

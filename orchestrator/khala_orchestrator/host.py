@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
+    from khala_orchestrator.match import Asks
     from khala_orchestrator.record import OwnedSink
     from khala_orchestrator.resume import Unfinished
     from khala_orchestrator.roster import Seat
@@ -48,6 +49,7 @@ async def host(
     *,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
+    asks: Asks = lambda *_: None,
 ) -> list[Result]:
     """Wait for the agents, play the match with them, and return its results.
 
@@ -57,6 +59,7 @@ async def host(
         bus: a session on the bus that agents join.
         watch: is called with the run card, every report and every result.
         past: what was played of this match; `game` begins with the first episode that is not over.
+        asks: is called in each step with the agents that are asked, also while `past` is played again.
 
     Raises:
         ResumeError: the game goes another way than in what was played.
@@ -84,7 +87,7 @@ async def host(
         watch(card)
         observer = stack.enter_context(_PublishingObserver(announcer, watch, flush))
         scenery = Scenery(config.task, config.run, game, observer)
-        match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock), scenery)
+        match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock), scenery, asks)
         for briefing in match.briefings(past.episode if past else 0):  # by which agents know that the host is there
             await announcer.brief(briefing)
         await roster.assemble(required, config.assemble_s)

@@ -12,7 +12,7 @@ import time
 from collections import defaultdict
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, TypeAlias
 
 from khala_orchestrator.cards import briefing
 from khala_orchestrator.pacing import AtOnce
@@ -21,7 +21,7 @@ from khala_orchestrator.tally import Tally, valid_together
 from khala_protocol.messages import Timings
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Collection, Iterator, Sequence
+    from collections.abc import AsyncIterator, Callable, Collection, Iterator, Sequence
 
     from khala_bridge.game.game import Sides, StepResult
     from khala_bridge.state import Snapshot
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Advice, Briefing, Message, Report, Result
 
 Phase = Literal["observe", "act", "game"]
+Asks: TypeAlias = "Callable[[StepId, Sequence[Seat]], None]"
+"""Is called with a step and the agents that are asked in it, before they are."""
 
 
 class MatchObserver(Protocol):
@@ -94,6 +96,7 @@ class Match:
     pacing: Pacing = field(default_factory=AtOnce)
     scenery: Scenery | None = None
     """Shows the map to those who watch; None if nobody does."""
+    asks: Asks = lambda *_: None
     schedule: Schedule = field(init=False)
 
     def __post_init__(self) -> None:
@@ -143,6 +146,7 @@ class Match:
             for side, snapshot in zip(self.sides, snapshots, strict=True):
                 side.look(snapshot)
             asked = self._ask(at, loop)
+            self.asks(at, asked.seats)
         async with self.scenery.shown(at, snapshots) if self.scenery else nullcontext():
             answers = await self.agents.ask(self._questions(at, asked.seats, watch), wait=self.config.task.clock.waits)
         self.schedule.decide(answers.by_seat, loop)

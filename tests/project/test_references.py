@@ -43,6 +43,9 @@ FOREIGN = {
     "tests/golden.mcap": "a reader records it",
     "<out>/scenarios.md": "`make scenarios` writes it",
     "stableid.json": "StarCraft II writes it",
+    "bench/results/DATE-COMMIT.json": "`make bench` writes it",
+    "DATE-COMMIT.json": "`make bench` writes it",
+    "docs/images/measurements": "`python -m bench history` writes it, once results are kept",
 }
 
 

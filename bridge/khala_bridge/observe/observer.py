@@ -213,7 +213,7 @@ class _Moment:
     @cached_property
     def scene(self) -> Scene:
         """The scene."""
-        return Scene(self.snapshot, self.task.frames)
+        return Scene(self.snapshot, self.task.frames, (team for teams in self.teams.values() for team in teams))
 
     @cached_property
     def album(self) -> Album | None:

@@ -23,7 +23,25 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("avoidance", "collision", "engagement", "movement", "navigation")
+SYSTEMS: Final = (
+    "acquire",
+    "autocast",
+    "avoidance",
+    "casts",
+    "collision",
+    "construction",
+    "death",
+    "engagement",
+    "harvest",
+    "hits",
+    "missiles",
+    "movement",
+    "navigation",
+    "orders",
+    "regeneration",
+    "triggers",
+    "weapons",
+)
 """The systems that have a module here."""
 
 

@@ -54,23 +54,21 @@ cdef class Columns:
         return None
 
 
-cdef void* start(object column) except NULL:
-    """Return where an array begins; its numbers must lie one after the other."""
-    cdef cnp.ndarray array = column
-    if not cnp.PyArray_ISCARRAY(array):
-        raise ValueError("a column must be contiguous and writable")
-    return cnp.PyArray_DATA(array)
+NAMES = (
+{names}
+)
 
 
 cdef Columns bound(object world):
     cdef Columns c = Columns.__new__(Columns)
+    cdef tuple arrays = (world.visible, *[getattr(world, name) for name in NAMES])
+    for array in arrays:
+        if not cnp.PyArray_ISCARRAY(<cnp.ndarray>array):
+            raise ValueError("a column must be contiguous and writable")
     c.capacity = world.capacity
-    c.visible = <boolean*>start(world.visible)
+    c.visible = <boolean*>cnp.PyArray_DATA(<cnp.ndarray>arrays[0])
 {bindings}
-    c.arrays = (
-        world.visible,
-{arrays}
-    )
+    c.arrays = arrays
     world.native = c
     return c
 '''
@@ -85,11 +83,14 @@ def declared() -> dict[str, str]:
     """Return the text of every file that follows from the columns."""
     types = {name: c_type(column) for name, column in COLUMNS.items()}
     pointers = "\n".join(f"    cdef {kind}* {name}" for name, kind in types.items())
-    bindings = "\n".join(f"    c.{name} = <{kind}*>start(world.{name})" for name, kind in types.items())
-    arrays = "\n".join(f"        world.{name}," for name in types)
+    bindings = "\n".join(
+        f"    c.{name} = <{kind}*>cnp.PyArray_DATA(<cnp.ndarray>arrays[{index}])"
+        for index, (name, kind) in enumerate(types.items(), start=1)
+    )
+    names = "\n".join(f'    "{name}",' for name in types)
     return {
         "columns.pxd": DECLARATION.format(pointers=pointers),
-        "columns.pyx": DEFINITION.format(bindings=bindings, arrays=arrays),
+        "columns.pyx": DEFINITION.format(names=names, bindings=bindings),
     }
 
 

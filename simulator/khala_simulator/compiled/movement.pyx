@@ -5,6 +5,7 @@ from libc.stdint cimport int64_t
 
 from khala_simulator.compiled.columns cimport Columns, Point, boolean, columns_of
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_floats
+from khala_simulator.compiled.turning cimport turned
 
 from khala_simulator.systems import movement as rules
 from khala_simulator.world.census import census
@@ -71,23 +72,6 @@ cdef face_targets(world, Columns c):
 cdef inline bint faces(Columns c, int64_t slot) noexcept:
     """Return whether a fighter turns to its target."""
     return c.aim_cos[slot] > -1.0 and not c.turreted[slot] and not c.wants[slot]
-
-
-cdef Point turned(Point facing, Point wanted, double cos_step, double sin_step) noexcept:
-    """Return a unit vector turned towards another by at most a step, as `geometry.turn_towards` does."""
-    cdef double cos_error = facing.x * wanted.x + facing.y * wanted.y, sine, size
-    cdef Point result
-    if wanted.x == 0.0 and wanted.y == 0.0:
-        return facing
-    if cos_error >= cos_step:
-        return wanted
-    sine = sin_step if facing.x * wanted.y - facing.y * wanted.x >= 0.0 else -sin_step
-    result.x = facing.x * cos_step - facing.y * sine
-    result.y = facing.x * sine + facing.y * cos_step
-    size = length(result.x, result.y)
-    result.x /= size
-    result.y /= size
-    return result
 
 
 # flyers that stop -----------------------------------------------------------------------------------------------------
