@@ -4,10 +4,11 @@ cimport numpy as cnp
 from libc.stdint cimport int64_t
 
 from khala_simulator.compiled.columns cimport Columns, Point, columns_of
+from khala_simulator.compiled.flanking cimport lead
 from khala_simulator.compiled.numbers cimport count, floats, ints, length, most, new_floats, new_ints, new_points
+from khala_simulator.compiled.sums cimport pairwise
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, grid_of
 
-from khala_simulator.compiled.flow import Flow
 from khala_simulator.systems import avoidance as rules
 from khala_simulator.systems import flanking
 from khala_simulator.tables.mechanics import MECHANICS
@@ -72,7 +73,7 @@ def find_headings(world):
             slot = ints(turning)[i]
             if flows(c, slot):
                 c.detour[slot] = 1 if c.detour[slot] > 0 else -1
-        flanking.lead(world, turning[:due], Flow)
+        lead(world, c)
     look(world, c, ints(turning), due)
 
 
@@ -130,30 +131,7 @@ cdef double to_the_left(Point at, Point way, Point* places, Py_ssize_t bodies, d
         terms[i] = 0.0
         if x * x + y * y < LOOK_SQUARED and x * way.x + y * way.y > 0.0:
             terms[i] = y * way.x - x * way.y
-    return total(terms, bodies)
-
-
-cdef double total(double* terms, Py_ssize_t n) noexcept:
-    """Return a sum in the order of `numpy.add.reduce` along an axis of contiguous numbers: pairwise."""
-    cdef double[8] sums
-    cdef double result = 0.0
-    cdef Py_ssize_t i, j, half
-    if n < 8:
-        for i in range(n):
-            result += terms[i]
-        return result
-    if n > 128:
-        half = n // 2 - n // 2 % 8
-        return total(terms, half) + total(terms + half, n - half)
-    for j in range(8):
-        sums[j] = terms[j]
-    for i in range(1, n // 8):
-        for j in range(8):
-            sums[j] += terms[8 * i + j]
-    result = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]))
-    for i in range(n - n % 8, n):
-        result += terms[i]
-    return result
+    return pairwise(terms, bodies)
 
 
 # the heading ----------------------------------------------------------------------------------------------------------
@@ -180,7 +158,7 @@ cdef look(world, Columns c, int64_t* slots, Py_ssize_t n):
             grid, last = grid_of(ground, c.layer[slot]), c.layer[slot]
         crowd.look_around(c, slot, way)
         for turn in range(FAN):
-            heading = turned(way, turn, c.detour[slot])
+            heading = heading_of(way, turn, c.detour[slot])
             if (c.layer[slot] == AIR or on_ground(grid, c.pos[slot], heading)) and crowd.lets_pass(heading):
                 break
         else:
@@ -194,7 +172,7 @@ cdef look(world, Columns c, int64_t* slots, Py_ssize_t n):
             c.aside[slot].x = c.aside[slot].y = 0.0
 
 
-cdef Point turned(Point way, Py_ssize_t turn, double side) noexcept:
+cdef Point heading_of(Point way, Py_ssize_t turn, double side) noexcept:
     """Return one of the headings that turn further and further to a side (1 is left), then to the other side."""
     cdef double sine = FAN_SIN[turn] * side
     cdef Point heading
