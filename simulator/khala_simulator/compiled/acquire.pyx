@@ -172,9 +172,7 @@ cdef Py_ssize_t foes_of(Columns c, int64_t player, int64_t* live, Py_ssize_t uni
     cdef int64_t slot
     for i in range(units):
         slot = live[i]
-        if c.owner[slot] == player or c.owner[slot] == 0:
-            continue
-        if c.targetable[slot] and c.visible[player * c.capacity + slot]:
+        if is_foe(c, player, slot):
             foes[found].slot = slot
             foes[found].x, foes[found].y, foes[found].radius = c.pos[slot].x, c.pos[slot].y, c.radius[slot]
             foes[found].planes = c.plane_bits[slot]
@@ -182,6 +180,20 @@ cdef Py_ssize_t foes_of(Columns c, int64_t player, int64_t* live, Py_ssize_t uni
             foes[found].threatens = threatened_planes(c, slot)
             found += 1
     return found
+
+
+cdef bint is_foe(Columns c, int64_t player, int64_t slot) noexcept:
+    """Return whether a unit is an enemy of a player that it sees and can aim at."""
+    return (
+        c.owner[slot] != player and c.owner[slot] != 0
+        and c.targetable[slot] and c.visible[player * c.capacity + slot]
+    )
+
+
+cdef double rank_of(Columns c, int64_t seeker, int64_t foe) noexcept:
+    """Return the rank that comes before distance: the foe's priority, and whether it threatens its seeker."""
+    cdef double threat = THREAT_WEIGHT if threatened_planes(c, foe) & c.plane_bits[seeker] else 0.0
+    return c.priority[foe] * PRIORITY_WEIGHT + threat
 
 
 cdef int64_t threatened_planes(Columns c, int64_t foe) noexcept:
@@ -198,8 +210,7 @@ cdef bint better(
     cdef double rank_now = OUT_OF_SIGHT, rise
     cdef bint handy
     if now != NOBODY:
-        rank_now = THREAT_WEIGHT if threatened_planes(c, now) & c.plane_bits[slot] else 0.0
-        rank_now = c.priority[now] * PRIORITY_WEIGHT + rank_now
+        rank_now = rank_of(c, slot, now)
     c.rank[slot] = rank_now
     if not best_of(c, tables, ranges, foes, foe_count, widest, filters, zones, choice) or choice.foe == now:
         return False

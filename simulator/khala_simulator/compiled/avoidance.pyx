@@ -1,12 +1,14 @@
 """Avoidance, compiled; `systems.avoidance` has the rules."""
+cimport cython
 cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point, boolean, columns_of
+from khala_simulator.compiled.columns cimport Columns, Point, columns_of
+from khala_simulator.compiled.flanking cimport lead
 from khala_simulator.compiled.numbers cimport count, floats, ints, length, most, new_floats, new_ints, new_points
+from khala_simulator.compiled.sums cimport pairwise
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, grid_of
 
-from khala_simulator.compiled.flow import Flow
 from khala_simulator.systems import avoidance as rules
 from khala_simulator.systems import flanking
 from khala_simulator.tables.mechanics import MECHANICS
@@ -27,6 +29,21 @@ cdef int64_t DETOUR_LOOPS = MECHANICS.detour_loops
 cdef int64_t FLANK_PERIOD = MECHANICS.flank_period
 cdef double[FAN] FAN_COS = rules.FAN_COS
 cdef double[FAN] FAN_SIN = rules.FAN_SIN
+
+cdef enum:
+    STRIPES = 256
+
+cdef struct Body:
+    Point at
+    Point step
+    double separation
+    int64_t bits  # layers it collides in
+    int64_t slot
+
+cdef struct Obstacle:
+    double x  # from the walker
+    double y
+    double apart  # distance to keep
 
 
 def find_headings(world):
@@ -56,7 +73,7 @@ def find_headings(world):
             slot = ints(turning)[i]
             if flows(c, slot):
                 c.detour[slot] = 1 if c.detour[slot] > 0 else -1
-        flanking.lead(world, turning[:due], Flow)
+        lead(world, c)
     look(world, c, ints(turning), due)
 
 
@@ -114,30 +131,7 @@ cdef double to_the_left(Point at, Point way, Point* places, Py_ssize_t bodies, d
         terms[i] = 0.0
         if x * x + y * y < LOOK_SQUARED and x * way.x + y * way.y > 0.0:
             terms[i] = y * way.x - x * way.y
-    return total(terms, bodies)
-
-
-cdef double total(double* terms, Py_ssize_t n) noexcept:
-    """Return a sum in the order of `numpy.add.reduce` along an axis of contiguous numbers: pairwise."""
-    cdef double[8] sums
-    cdef double result = 0.0
-    cdef Py_ssize_t i, j, half
-    if n < 8:
-        for i in range(n):
-            result += terms[i]
-        return result
-    if n > 128:
-        half = n // 2 - n // 2 % 8
-        return total(terms, half) + total(terms + half, n - half)
-    for j in range(8):
-        sums[j] = terms[j]
-    for i in range(1, n // 8):
-        for j in range(8):
-            sums[j] += terms[8 * i + j]
-    result = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]))
-    for i in range(n - n % 8, n):
-        result += terms[i]
-    return result
+    return pairwise(terms, bodies)
 
 
 # the heading ----------------------------------------------------------------------------------------------------------
@@ -145,81 +139,132 @@ cdef double total(double* terms, Py_ssize_t n) noexcept:
 
 cdef look(world, Columns c, int64_t* slots, Py_ssize_t n):
     """Choose the heading of every walker that follows no flow: the free one that turns it least."""
-    cdef cnp.ndarray live = world.live
-    cdef Py_ssize_t i, first
-    cdef int64_t slot
-    cdef Point way, start
-    cdef Point[FAN] headings
-    cdef boolean[FAN] free
+    cdef Crowd crowd = Crowd(world)
+    cdef Grid grid = None
+    cdef Py_ssize_t i, turn
+    cdef int64_t slot, last = -1
+    cdef Point way, heading
     cdef double size
-    cdef Grid grid
     ground = world.ground
     for i in range(n):
         slot = slots[i]
         if flows(c, slot):
             continue
-        start = c.pos[slot]
-        way.x, way.y = c.nav_point[slot].x - start.x, c.nav_point[slot].y - start.y
+        way.x, way.y = c.nav_point[slot].x - c.pos[slot].x, c.nav_point[slot].y - c.pos[slot].y
         size = most(length(way.x, way.y), 1e-12)
         way.x /= size
         way.y /= size
-        fan(way, c.detour[slot], headings)
-        for first in range(FAN):
-            free[first] = True
-        if c.layer[slot] != AIR:
-            grid = grid_of(ground, c.layer[slot])
-            for first in range(FAN):
-                free[first] = grid.flat[cell_at(
-                    grid, start.x + headings[first].x * SEEN_AHEAD, start.y + headings[first].y * SEEN_AHEAD
-                )]
-        keep_off(c, ints(live), count(live), slot, way, headings, free)
-        first = 0
-        while first < FAN and not free[first]:
-            first += 1
+        if c.layer[slot] != AIR and c.layer[slot] != last:
+            grid, last = grid_of(ground, c.layer[slot]), c.layer[slot]
+        crowd.look_around(c, slot, way)
+        for turn in range(FAN):
+            heading = heading_of(way, turn, c.detour[slot])
+            if (c.layer[slot] == AIR or on_ground(grid, c.pos[slot], heading)) and crowd.lets_pass(heading):
+                break
+        else:
+            turn = FAN
         # an army on its way to a fight keeps to its sides: who turned back would meet those that follow
-        if SIDE < first < FAN and c.target[slot] != NOBODY:
+        if SIDE < turn < FAN and c.target[slot] != NOBODY:
             c.detour[slot] = -c.detour[slot]
-        if 0 < first < FAN:
-            c.aside[slot] = headings[first]
+        if 0 < turn < FAN:
+            c.aside[slot] = heading
         else:
             c.aside[slot].x = c.aside[slot].y = 0.0
 
 
-cdef void fan(Point way, double side, Point* headings) noexcept:
-    """Write headings turned further and further to a side (1 is left), then to the other side."""
-    cdef int i
-    cdef double sine
-    for i in range(FAN):
-        sine = FAN_SIN[i] * side
-        headings[i].x = way.x * FAN_COS[i] - way.y * sine
-        headings[i].y = way.y * FAN_COS[i] + way.x * sine
+cdef Point heading_of(Point way, Py_ssize_t turn, double side) noexcept:
+    """Return one of the headings that turn further and further to a side (1 is left), then to the other side."""
+    cdef double sine = FAN_SIN[turn] * side
+    cdef Point heading
+    heading.x = way.x * FAN_COS[turn] - way.y * sine
+    heading.y = way.y * FAN_COS[turn] + way.x * sine
+    return heading
 
 
-cdef void keep_off(
-    Columns c, int64_t* live, Py_ssize_t n, int64_t slot, Point way, Point* headings, boolean* free
-) noexcept:
-    """Rule out the headings that lead into a body that stands or comes within ``SEEN_AHEAD``."""
-    cdef Py_ssize_t i, j
-    cdef int64_t other
-    cdef double x, y, apart, seen, along, across, reach
-    cdef Point start = c.pos[slot]
-    for i in range(n):
-        other = live[i]
-        x, y = c.pos[other].x - start.x, c.pos[other].y - start.y
-        apart = c.separation[slot] + c.separation[other] - TOLERANCE
-        seen = apart + SEEN_AHEAD
-        if (
-            x * x + y * y >= seen * seen
-            or c.walled[other]
-            or c.layer_bits[slot] & c.layer_bits[other] == 0
-            or other == slot
-            or other == c.target[slot]
-            or way.x * c.intended[other].x + way.y * c.intended[other].y > 0.0
-        ):
-            continue
-        for j in range(FAN):
-            along = headings[j].x * x + headings[j].y * y
-            across = headings[j].x * y - headings[j].y * x
+cdef bint on_ground(Grid grid, Point start, Point heading) noexcept:
+    """Return whether a heading leads to a free cell."""
+    return grid.flat[cell_at(grid, start.x + heading.x * SEEN_AHEAD, start.y + heading.y * SEEN_AHEAD)]
+
+
+cdef inline int64_t stripe(double x) noexcept:
+    """Return the number of the stripe of the map, one cell wide, in which a point is counted."""
+    return 0 if x < 0.0 else STRIPES - 1 if x >= STRIPES else <int64_t>x
+
+
+@cython.final
+cdef class Crowd:
+    """The bodies that may be in somebody's way, stripe by stripe of the map."""
+
+    cdef tuple arrays  # keeps the memory alive
+    cdef Body* bodies
+    cdef Obstacle* near
+    cdef Py_ssize_t many  # near a walker
+    cdef Py_ssize_t[STRIPES + 1] begin  # of each stripe
+    cdef double widest
+
+    def __cinit__(self, world):
+        cdef Columns c = columns_of(world)
+        cdef cnp.ndarray live = world.live
+        cdef Py_ssize_t i
+        cdef int64_t slot
+        cdef Body* body
+        self.arrays = (
+            new_floats(count(live) * <Py_ssize_t>(sizeof(Body) // sizeof(double))),
+            new_floats(count(live) * <Py_ssize_t>(sizeof(Obstacle) // sizeof(double))),
+        )
+        self.bodies, self.near = <Body*>floats(self.arrays[0]), <Obstacle*>floats(self.arrays[1])
+        for i in range(count(live)):
+            if in_the_way(c, ints(live)[i]):
+                self.begin[stripe(c.pos[ints(live)[i]].x)] += 1
+        for i in range(1, STRIPES + 1):
+            self.begin[i] += self.begin[i - 1]
+        for i in range(count(live)):
+            slot = ints(live)[i]
+            if in_the_way(c, slot):
+                self.begin[stripe(c.pos[slot].x)] -= 1
+                body = &self.bodies[self.begin[stripe(c.pos[slot].x)]]
+                body.at, body.step, body.separation = c.pos[slot], c.intended[slot], c.separation[slot]
+                body.bits, body.slot = c.layer_bits[slot], slot
+                self.widest = most(self.widest, body.separation)
+
+    cdef void look_around(self, Columns c, int64_t slot, Point way) noexcept:
+        """Find the bodies that stand near a walker or come towards it."""
+        cdef double x, y, apart, seen, separation = c.separation[slot]
+        cdef double farthest = separation + self.widest + SEEN_AHEAD
+        cdef Point start = c.pos[slot]
+        cdef Py_ssize_t i
+        cdef Body* body
+        self.many = 0
+        for i in range(self.begin[stripe(start.x - farthest)], self.begin[stripe(start.x + farthest) + 1]):
+            body = &self.bodies[i]
+            x, y = body.at.x - start.x, body.at.y - start.y
+            apart = separation + body.separation - TOLERANCE
+            seen = apart + SEEN_AHEAD
+            if (
+                x * x + y * y < seen * seen
+                and c.layer_bits[slot] & body.bits != 0
+                and body.slot != slot
+                and body.slot != c.target[slot]
+                and way.x * body.step.x + way.y * body.step.y <= 0.0
+            ):
+                self.near[self.many].x, self.near[self.many].y, self.near[self.many].apart = x, y, apart
+                self.many += 1
+
+    cdef bint lets_pass(self, Point heading) noexcept:
+        """Return whether a heading leads into none of these within ``SEEN_AHEAD``."""
+        cdef double along, across, reach
+        cdef Obstacle* near
+        cdef Py_ssize_t i
+        for i in range(self.many):
+            near = &self.near[i]
+            along = heading.x * near.x + heading.y * near.y
+            across = heading.x * near.y - heading.y * near.x
             reach = most(along - SEEN_AHEAD, 0.0)
-            if along > 0.0 and across * across + reach * reach < apart * apart:
-                free[j] = False
+            if along > 0.0 and across * across + reach * reach < near.apart * near.apart:
+                return False
+        return True
+
+
+cdef inline bint in_the_way(Columns c, int64_t slot) noexcept:
+    """Return whether a unit is a body to go round; what stands on a footprint is a wall."""
+    return c.layer_bits[slot] != 0 and not c.walled[slot]

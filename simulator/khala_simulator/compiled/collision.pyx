@@ -203,37 +203,36 @@ cdef void relax(Crowd crowd, int rounds) noexcept:
     cdef Point* at = crowd.after
     cdef Point* force = crowd.force
     cdef Pair* pair
-    cdef Py_ssize_t i
-    cdef bint overlaps
-    cdef double distance
+    cdef Py_ssize_t i, overlapping
+    cdef double distance, deepest
     while True:
-        overlaps = False
-        for i in range(crowd.many):
+        overlapping, deepest = 0, 0.0
+        for i in range(crowd.many):  # without a branch, as none could be foreseen
             pair = &crowd.pairs[i]
             pair.x, pair.y = at[pair.one].x - at[pair.other].x, at[pair.one].y - at[pair.other].y
             distance = length(pair.x, pair.y)
             pair.depth = pair.apart - distance
-            pair.push = pair.depth / most(distance, SAME_POINT)
-            overlaps |= pair.depth > OVERLAP_ALLOWED
-        if rounds == 0 or not overlaps:
+            pair.push = pair.depth / (distance if distance > SAME_POINT else SAME_POINT)
+            crowd.chosen[overlapping] = i
+            overlapping += pair.depth > 0.0
+            deepest = pair.depth if pair.depth > deepest else deepest
+        if rounds == 0 or not deepest > OVERLAP_ALLOWED:
             return
         rounds -= 1
         for i in range(crowd.count):
             force[i].x = force[i].y = 0.0
-        for i in range(crowd.many):
-            pair = &crowd.pairs[i]
-            if pair.depth > 0.0:
-                force[pair.one].x += pair.x * (pair.push * pair.share)
-                force[pair.one].y += pair.y * (pair.push * pair.share)
-                if crowd.by_slots:
-                    force[pair.other].x -= pair.x * (pair.push * pair.rest)
-                    force[pair.other].y -= pair.y * (pair.push * pair.rest)
+        for i in range(overlapping):
+            pair = &crowd.pairs[crowd.chosen[i]]
+            force[pair.one].x += pair.x * (pair.push * pair.share)
+            force[pair.one].y += pair.y * (pair.push * pair.share)
+            if crowd.by_slots:
+                force[pair.other].x -= pair.x * (pair.push * pair.rest)
+                force[pair.other].y -= pair.y * (pair.push * pair.rest)
         if not crowd.by_slots:  # what follows a body in the order of the pairs comes before what it follows
-            for i in range(crowd.many):
-                pair = &crowd.pairs[i]
-                if pair.depth > 0.0:
-                    force[pair.other].x -= pair.x * (pair.push * pair.rest)
-                    force[pair.other].y -= pair.y * (pair.push * pair.rest)
+            for i in range(overlapping):
+                pair = &crowd.pairs[crowd.chosen[i]]
+                force[pair.other].x -= pair.x * (pair.push * pair.rest)
+                force[pair.other].y -= pair.y * (pair.push * pair.rest)
         for i in range(crowd.count):
             at[i].x += force[i].x
             at[i].y += force[i].y
@@ -259,9 +258,9 @@ cdef keep_on_surfaces(world, Crowd crowd, Columns c, int64_t* slots):
     """Put every body that has moved where its layer allows."""
     cdef double x0, y0, x1, y1
     cdef Py_ssize_t i
-    cdef int64_t layer, cell
+    cdef int64_t layer, cell, last = -1
     cdef Point* after
-    cdef Grid grid
+    cdef Grid grid = None
     ground = world.ground
     x0, y0, x1, y1 = world.map.terrain.playable
     for i in range(crowd.count):
@@ -272,7 +271,8 @@ cdef keep_on_surfaces(world, Crowd crowd, Columns c, int64_t* slots):
         if layer == AIR:
             after.x, after.y = least(most(after.x, x0), x1 - EDGE_MARGIN), least(most(after.y, y0), y1 - EDGE_MARGIN)
             continue
-        grid = grid_of(ground, layer)
+        if layer != last:
+            grid, last = grid_of(ground, layer), layer
         cell = cell_at(grid, after.x, after.y)
         if not grid.open[cell]:
             off_walls(grid, crowd.before[i], after, cell, c.clearance[slots[i]])

@@ -36,6 +36,7 @@ cdef class Crowd:
     cdef double* friend  # and by a friend
     cdef Place* places  # those that can meet others
     cdef Place* ranked  # the same, sorted
+    cdef Py_ssize_t* close  # which of them are near one
     cdef int64_t* sorted  # slots in the order in which they were found last
     cdef Py_ssize_t known  # how many of them
     cdef int64_t* index  # (slots,) where each is among the places, -1 for most
@@ -43,13 +44,14 @@ cdef class Crowd:
     cdef Pair* pairs
     cdef Py_ssize_t many  # pairs found
     cdef Py_ssize_t pair_room
+    cdef Py_ssize_t* chosen  # (pair_room,) numbers of pairs
     cdef bint by_slots  # whether the pairs are in the order of slots, both ways round
     cdef double closest  # the least distance between two of a pair, squared
 
     cdef int reserve(self, Py_ssize_t count, Py_ssize_t slots) except -1
     cdef int all_pairs(self, Py_ssize_t bodies) except -1
     cdef int neighbours(self, int64_t* slots, Py_ssize_t bodies) except -1
-    cdef int measure(self, Place* one, Place* other, double squared) except -1
+    cdef int note(self, Place* one, Place* other) except -1
     cdef void rank(self, int64_t* slots, Py_ssize_t bodies) noexcept
     cdef int near(self, Columns c, int64_t* slots) except -1
 

@@ -29,6 +29,8 @@ cdef class Crowd:
         free(self.sorted)
         free(self.index)
         free(self.pairs)
+        free(self.chosen)
+        free(self.close)
 
     def __reduce__(self):
         """Return what makes None: a copy of a world makes its own room."""
@@ -48,6 +50,7 @@ cdef class Crowd:
             self.friend = <double*>grown(self.friend, self.room * sizeof(double))
             self.places = <Place*>grown(self.places, self.room * sizeof(Place))
             self.ranked = <Place*>grown(self.ranked, self.room * sizeof(Place))
+            self.close = <Py_ssize_t*>grown(self.close, self.room * sizeof(Py_ssize_t))
             self.sorted = <int64_t*>grown(self.sorted, self.room * sizeof(int64_t))
         if slots > self.slots:
             self.index = <int64_t*>grown(self.index, slots * sizeof(int64_t))
@@ -77,52 +80,60 @@ cdef class Crowd:
 
     cdef int all_pairs(self, Py_ssize_t bodies) except -1:
         """Measure every pair, by slots; return whether any two touch."""
-        cdef Py_ssize_t i, j
+        cdef Place* places = self.places
+        cdef Py_ssize_t i, j, close
         cdef int touch = False
-        cdef double x, y
+        cdef double x, y, beside
         for i in range(bodies):
-            for j in range(i + 1, bodies):
-                x = self.places[i].along - self.places[j].along
-                y = self.places[i].across - self.places[j].across
-                touch |= self.measure(&self.places[i], &self.places[j], x * x + y * y)
+            close = 0
+            for j in range(i + 1, bodies):  # without a branch, as none could be foreseen
+                x, y = places[i].along - places[j].along, places[i].across - places[j].across
+                beside = places[i].separation + places[j].separation + SKIN
+                self.close[close] = j
+                close += x * x + y * y < beside * beside
+            for j in range(close):
+                touch |= self.note(&places[i], &places[self.close[j]])
         return touch
 
     cdef int neighbours(self, int64_t* slots, Py_ssize_t bodies) except -1:
         """Measure those that follow each other along the wider axis of the crowd; return whether any two touch."""
         cdef Place* places = self.ranked
-        cdef Py_ssize_t i, j
+        cdef Py_ssize_t i, j, close, end = 0
         cdef int touch = False
-        cdef double widest = 0.0, reach, end, ahead, aside
+        cdef double widest = 0.0, reach, x, y, beside
         for i in range(bodies):
             widest = most(widest, self.places[i].separation)
         reach = 2.0 * widest + SKIN
         self.rank(slots, bodies)
         for i in range(bodies):
-            end = places[i].along + reach
-            for j in range(i + 1, bodies):
-                if not places[j].along < end:
-                    break
-                aside = places[i].across - places[j].across
-                if fabs(aside) < reach:
-                    ahead = places[i].along - places[j].along
-                    touch |= self.measure(&places[i], &places[j], ahead * ahead + aside * aside)
+            while end < bodies and places[end].along < places[i].along + reach:
+                end += 1
+            close = 0
+            for j in range(i + 1, end):
+                x, y = places[i].along - places[j].along, places[i].across - places[j].across
+                beside = places[i].separation + places[j].separation + SKIN
+                self.close[close] = j
+                close += (x * x + y * y < beside * beside) & (fabs(y) < reach)
+            for j in range(close):
+                touch |= self.note(&places[i], &places[self.close[j]])
         return touch
 
-    cdef int measure(self, Place* one, Place* other, double squared) except -1:
-        """Note a pair if it is near; return whether it touches."""
-        cdef double apart = one.separation + other.separation, beside = apart + SKIN, inside
+    cdef int note(self, Place* one, Place* other) except -1:
+        """Note a pair that is near, if they can meet; return whether it touches."""
+        cdef double apart = one.separation + other.separation, inside = most(apart - OVERLAP_ALLOWED, 0.0)
+        cdef double x = one.along - other.along, y = one.across - other.across, squared = x * x + y * y
         cdef Pair* pair
-        if squared >= beside * beside or one.bits & other.bits == 0:
+        if one.bits & other.bits == 0:
             return False
         if self.many == self.pair_room:
             self.pair_room = 2 * self.pair_room + 64
             self.pairs = <Pair*>grown(self.pairs, self.pair_room * sizeof(Pair))
+            self.chosen = <Py_ssize_t*>grown(self.chosen, self.pair_room * sizeof(Py_ssize_t))
         pair = &self.pairs[self.many]
         self.many += 1
         pair.one, pair.other, pair.apart = one.body, other.body, apart
         if squared < self.closest:
             self.closest = squared
-        inside = most(apart - OVERLAP_ALLOWED, 0.0)
         return squared < inside * inside
 
     cdef void rank(self, int64_t* slots, Py_ssize_t bodies) noexcept:

@@ -32,11 +32,8 @@ ANY = -1
 AIR = int(Layer.AIR)
 
 
-def lead(world: World, blocked: Ints, flow: type[Flow] = Flow) -> None:
-    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked.
-
-    The ways are found by a ``flow``, which may be a compiled one.
-    """
+def lead(world: World, blocked: Ints) -> None:
+    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked."""
     slots = _pursuers(world)
     stuck = np.zeros(world.top, dtype=np.bool_)
     stuck[blocked] = True
@@ -45,7 +42,7 @@ def lead(world: World, blocked: Ints, flow: type[Flow] = Flow) -> None:
     standing = _standing(world)
     for kind in _kinds(world, slots):
         if some(stuck.take(kind)):
-            _follow(world, kind, standing, flow)
+            _follow(world, kind, standing)
 
 
 def _pursuers(world: World) -> Ints:
@@ -91,13 +88,13 @@ def _foes(world: World, slots: Ints) -> Ints:
     return chosen
 
 
-def _follow(world: World, slots: Ints, standing: Ints, flow_of: type[Flow]) -> None:
+def _follow(world: World, slots: Ints, standing: Ints) -> None:
     """Lead units of one size to the nearest free places in reach of any of their foes."""
     one = int(slots[0])
     chooses = world.looks_around[one] and world.acquires[one]
     foes = _foes(world, slots) if chooses else world.target.take(slots[:1])
     at, width = world.pos.take(slots, 0), float(world.separation[one])
-    flow = flow_of(pathfinding.surface(world.ground, Layer(int(world.layer[one]))), at)
+    flow = Flow(pathfinding.surface(world.ground, Layer(int(world.layer[one]))), at)
     bodies = _in_the_way(world, one, standing)
     squeeze = MECHANICS.flank_squeeze
     flow.stand(world.pos.take(bodies, 0), world.separation.take(bodies) + (width - squeeze))
