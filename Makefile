@@ -34,7 +34,7 @@ ENGINE := simulator/pyproject.toml simulator/setup.py $(wildcard simulator/khala
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
 	@touch $@
 
 install: .venv/.ready ## Install what is needed to play into .venv
@@ -83,7 +83,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
 	  echo "== Python $$version"; \
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
-	  $(UV) sync --quiet --frozen --python $$python --group env --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
+	  $(UV) sync --quiet --frozen --python $$python --group env --group experiments --group tools && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
 page: install ## Build khala/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
