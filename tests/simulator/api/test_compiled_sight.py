@@ -35,10 +35,10 @@ def differences_in_a_game(name: str, loops: int) -> int:
     while world.loop < loops and not world.ended:
         give_orders(world, chance)
         advance(world, 8)
-        for player in range(len(world.players)):
+        for watcher in range(len(world.players)):
             for show_cloaked, through_fog in ((False, False), (True, False), (True, True)):
-                rule = units_seen(world, types, player, show_cloaked, through_fog)
-                assert bits(kernel.units_seen(world, types, player, show_cloaked, through_fog)) == bits(rule)
+                rule = units_seen(world, types, watcher, show_cloaked, through_fog)
+                assert bits(kernel.units_seen(world, types, watcher, show_cloaked, through_fog)) == bits(rule)
                 seen += len(rule)
     return seen
 
