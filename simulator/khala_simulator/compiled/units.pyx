@@ -5,6 +5,7 @@ from libc.stdlib cimport free, malloc, realloc
 from libc.string cimport memcpy
 
 from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
+from khala_simulator.compiled.heights cimport Heights
 from khala_simulator.compiled.numbers cimport least, most
 
 from khala_simulator.api import sight as perception
@@ -33,33 +34,6 @@ cdef struct Bytes:
     uint8_t* data
     Py_ssize_t used
     Py_ssize_t size
-
-
-cdef class Ground:
-    """Heights at the corners of the map's cells."""
-
-    cdef cnp.ndarray vertices
-    cdef float* z
-    cdef Py_ssize_t width
-    cdef double right, top
-
-    def __init__(self, terrain):
-        self.vertices = terrain.vertices
-        self.z = <float*>cnp.PyArray_DATA(self.vertices)
-        self.width = cnp.PyArray_DIM(self.vertices, 1)
-        self.right, self.top = terrain.size[0] - 1e-6, terrain.size[1] - 1e-6
-
-    cdef double at(self, double x, double y) noexcept:
-        """Return the height under a world point, as `Terrain.ground_z` does."""
-        cdef double fx, fy, low, high
-        cdef Py_ssize_t ix, iy
-        x, y = least(most(x, 0.0), self.right), least(most(y, 0.0), self.top)
-        ix, iy = <Py_ssize_t>x, <Py_ssize_t>y
-        fx, fy = x - ix, y - iy
-        cdef float* corner = self.z + iy * self.width + ix
-        low = corner[0] * (1.0 - fx) + corner[1] * fx
-        high = corner[self.width] * (1.0 - fx) + corner[self.width + 1] * fx
-        return low * (1.0 - fy) + high * fy
 
 
 def encode(units):
@@ -103,7 +77,7 @@ def encode(units):
     cdef double x0 = units.origin[0], y0 = units.origin[1]
     cdef bint buffed = worn is not None, fixed
     cdef bint jobs = bool(world.jobs), rallies = bool(world.rallies)
-    cdef Ground ground = Ground(world.map.terrain)
+    cdef Heights heights = Heights(world.map.terrain)
     cdef int64_t loop = world.loop
     cdef int64_t* levels[PLAYERS]
     levels_of = [types.levels(tuple(player.upgrades)) for player in world.players]  # keeps them alive
@@ -160,7 +134,7 @@ def encode(units):
                 if c.order_kind[slot] == IDLE and jobs and slot in world.jobs or world.queue[slot]:
                     put_bytes(&body, units.orders(slot))
                 else:
-                    put_order(&body, c, slot, ground, x0, y0, loop)
+                    put_order(&body, c, slot, heights, x0, y0, loop)
                 if c.addon[slot] >= 0:
                     put_number(&body, 23, c.tag[c.addon[slot]])
                 if cargo[row]:
@@ -246,7 +220,7 @@ def encode_panel(world, types, list slots, int64_t player):
         free(out.data)
 
 
-cdef put_order(Bytes* body, Columns c, int64_t slot, Ground ground, double x0, double y0, int64_t loop):
+cdef put_order(Bytes* body, Columns c, int64_t slot, Heights heights, double x0, double y0, int64_t loop):
     """Write the only order of a unit, as `World.orders_of` has it, or nothing for an idle one."""
     cdef int64_t kind = c.order_kind[slot], tag = 0, ability = c.order_ability[slot]
     cdef bint targeted, pointed
@@ -274,7 +248,7 @@ cdef put_order(Bytes* body, Columns c, int64_t slot, Ground ground, double x0, d
         put_head(&order, 2, 15)
         put_float(&order, 1, x - x0)
         put_float(&order, 2, y - y0)
-        put_float(&order, 3, ground.at(x, y))
+        put_float(&order, 3, heights.at(x, y))
     if done:
         put_float(&order, 4, done)
     put_message(body, 22, &order)
