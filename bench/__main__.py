@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import statistics
+import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
@@ -62,24 +63,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     keeping = not names or given.times is not None or given.out is not None
     if keeping and (without := [name for name in names if name not in KEPT]):
         parser.error(f"{without[0]} has no figures that can be kept: run it without --times and --out")
-    if keeping:
-        keep(names or KEPT, options, given.times or TIMES, given.out)
+    code = keep(names or KEPT, options, given.times or TIMES, given.out) if keeping else 0
     for name in PRINTED if not names else () if keeping else names:
         print(f"\n== python -m bench.{name}", flush=True)
         show(name, options)
-    return 0
+    return code
 
 
-def keep(names: Sequence[str], options: Sequence[str], times: int, out: Path | None) -> None:
-    """Measure in turns, so that hours of a busy machine fall on all; print the figures, and write them."""
+def keep(names: Sequence[str], options: Sequence[str], times: int, out: Path | None) -> int:
+    """Measure in turns, so that hours of a busy machine fall on all; print the figures, and write them.
+
+    Return 1 if a run failed, else 0.
+    """
     found = results.begun()
     runs: dict[str, list[list[Figure]]] = {name: [] for name in names}
+    failed: list[str] = []
     for number, name in itertools.product(range(times), names):
         print(f"\n== python -m bench.{name} ({number + 1} of {times})", flush=True)
-        runs[name].append(figures_of(name, options))
+        try:
+            runs[name].append(figures_of(name, options))
+        except subprocess.CalledProcessError as error:  # what took an hour is kept nevertheless
+            failed.append(f"{name} ({number + 1} of {times}): exit code {error.returncode}")
     series = tuple(one for name in names for one in results.join(name, runs[name]))
     print_table(COLUMNS, rows(series))
     print(f"written to {results.write(found.model_copy(update={'figures': series}), out)}")
+    for each in failed:
+        print(f"failed, and without figures: {each}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 def rows(figures: Sequence[results.Series]) -> Iterator[tuple[str, ...]]:

@@ -7,8 +7,9 @@
 
 Games are played as `khala experiment run --jobs` plays them: recorded, each with a seed of its own, agents that ask the
 scripted model through its endpoint, which answers at once. Each process first plays a game that is not counted, since
-the first one imports everything. `cpu s` is the processor time of a game, in all processes: on a busy machine it can be
-compared, and the games an hour cannot. Full games end after seven minutes of the game.
+the first one imports everything. A game that crashes is played once more, and its time counts. `cpu s` is the processor
+time of a game, in all processes: on a busy machine it can be compared, and the games an hour cannot. Full games end
+after seven minutes of the game.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
+    from khala.experiment.runner import Event
     from khala_bridge.task.config import TaskConfig
 
 LOOPS_PER_MINUTE: Final = 22.4 * 60
@@ -125,11 +127,19 @@ async def measure(name: str, games: int, at_once: int, out: Path) -> Played:
 async def _play(matches: Sequence[PlannedMatch], engine: Engine, out: Path) -> None:
     store = Store(out)
     store.directory.mkdir(parents=True)
-    experiment = Experiment.model_validate({"name": "games", "factors": {"task": ["2s3z_pair"]}, "retries": 0})
-    await Runner(experiment, store, engine, Budget()).play(matches)
-    wrong = [one for one in store.played().values() if one.state != "done"]
-    if wrong:
-        raise SystemExit(f"a game of {wrong[0].cell['task']} was not played to its end: {wrong[0].cause}")
+    experiment = Experiment.model_validate({"name": "games", "factors": {"task": ["2s3z_pair"]}, "retries": 1})
+    await Runner(experiment, store, engine, Budget(), see=_check).play(matches)
+
+
+def _check(event: Event) -> None:
+    """Say which game is played again, and stop at one that is not played to its end."""
+    if event.what == "begins":
+        return
+    words = f"{event.match.title}, was not played to its end: {event.words}"
+    if event.what == "again":
+        print(f"{words}; it is played once more", file=sys.stderr)
+    elif event.played is None or event.played.state != "done":
+        raise SystemExit(words)
 
 
 def _processor_s() -> float:

@@ -35,8 +35,9 @@ HEAD = """<!-- Written by `python -m bench history` from bench/results: change t
 # Measurements over time
 
 Figures that were measured with `make bench` and kept, a picture each: the median of every run, and a line from the
-least to the most of them. A dashed line is a limit that `make limits` checks. What the figures are, and where goals are
-missed, is on the page of [measurements](measurements.md).
+least to the most of them. A dashed line is a limit that `make limits` checks. Tables have the newest value, and the one
+before on the same machine. What the figures are, and where goals are missed, is on the page of
+[measurements](measurements.md).
 
 `python -m bench compare A B` says by which factors two of them differ, and how sure that is. `make bench` on a quiet
 machine, the file that it writes into `bench/results`, and `python -m bench history` add a point to each picture.
@@ -110,15 +111,16 @@ def _sections(found: Sequence[Line]) -> Iterator[str]:
     for bench, group in itertools.groupby(found, key=lambda line: line.bench):
         each = list(group)
         yield f"## {bench}"
-        rows = [(line.name, _value(line.points[0]), _value(line.points[-1]), line.unit, BETTER[line.better])
-                for line in each]  # fmt: skip
-        yield markdown.table(("figure", "first", "newest", "unit", ""), rows)
+        rows = [(line.name, *_newest(line.points), line.unit, BETTER[line.better]) for line in each]
+        yield markdown.table(("figure", "before", "newest", "unit", ""), rows)
         for line in each:
             yield f"![{line.name}, {line.unit}, {BETTER[line.better]}](images/{PICTURES.name}/{line.file})"
 
 
-def _value(point: Point) -> str:
-    return f"{statistics.median(point.values):.4g}"
+def _newest(points: Sequence[Point]) -> tuple[str, str]:
+    """Return the newest value, after the one before it on the same machine."""
+    same = [f"{statistics.median(point.values):.4g}" for point in points if point.machine == points[-1].machine]
+    return "".join(same[-2:-1]), same[-1]
 
 
 def picture(line: Line, titles: Sequence[str], colours: Mapping[Machine, int]) -> bytes:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bench.figures import Figure
 
 KEPT: Final = (
-    "yardstick", "turn", "bus", "simulator_engine", "engines", "start", "observe", "act", "abilities",
+    "yardstick", "turn", "bus", "simulator_engine", "engines", "floors", "start", "observe", "act", "abilities",
     "games_per_hour",
 )  # fmt: skip
 """The measurements whose figures are kept: they have `--json` and `measures`."""

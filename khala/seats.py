@@ -21,6 +21,7 @@ from khala import one_process
 from khala_agents.policy import Policy
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.schedule import StepId
+from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Report, Result
 
@@ -97,6 +98,10 @@ class SeatedMatch:
 
     Its methods are for the event loop in which it was entered. The game stands still between turns, unless the clock is
     `realtime`; then an agent waits for an answer until its deadline, and the others go on.
+
+    Attributes:
+        seats: those that the caller plays.
+        broker: of the bus, for whoever wants to listen to it.
     """
 
     def __init__(
@@ -121,6 +126,7 @@ class SeatedMatch:
             ConfigError: there is no such seat, or nobody decides for an agent.
         """
         self.seats = tuple(seats)
+        self.broker = MemoryBroker()
         _check(config.task, self.seats, minds)
         self._config, self._minds, self._game, self._launched = config, minds, game, launched
         self._sides = {seat.side for seat in self.seats}
@@ -203,6 +209,7 @@ class SeatedMatch:
             launched=self._launched,
             callers=callers,
             asks=self._asks,
+            broker=self.broker,
         )
 
     def _asks(self, at: StepId, seats: Sequence[Seat]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -22,6 +23,7 @@ SHORT = {
     "bus": ("--agents", "1", "--scale", "0.05"),
     "simulator_engine": ("--seconds", "0.05", "--maps", "llm_smac/2s3z", "--sizes", "10"),
     "engines": ("--rounds", "1", "--seconds", "0.05"),
+    "floors": ("layers:2s3z:8", "--rounds", "1", "--steps", "20"),
     "start": ("--times", "1"),
     "observe": (),
     "act": (),
@@ -82,6 +84,23 @@ def test_figures_of_several_runs_in_turns_go_into_a_file(ran: list[Any], tmp_pat
         "figure of turn": ((1.0,), (3.0,)),
         "figure of bus": ((2.0,), (4.0,)),
     }
+
+
+def test_figures_are_kept_when_a_measurement_fails_and_the_exit_code_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[str] = []
+
+    def fail_once(name: str, _: Any) -> list[Figure]:
+        asked.append(name)
+        if asked == ["turn", "bus"]:
+            raise subprocess.CalledProcessError(2, ["bench.bus"])
+        return [Figure(f"figure of {name}", "ms", (float(len(asked)),))]
+
+    monkeypatch.setattr(command, "figures_of", fail_once)
+    assert command.main(["--times", "2", "--out", str(tmp_path / "a.json"), "turn", "bus"]) == 1
+    assert [one.runs for one in results.read(tmp_path / "a.json").figures] == [((1.0,), (3.0,)), ((4.0,),)]
+    assert "failed, and without figures: bus (1 of 2): exit code 2" in capsys.readouterr().err
 
 
 def test_without_names_all_is_measured_and_the_figures_are_kept(

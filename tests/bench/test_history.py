@@ -34,6 +34,7 @@ def test_each_figure_has_a_picture_and_a_row(made: Made, step: Step, tmp_path: P
         made(step(20.0, 21.0), step(1.2, name="ours / theirs", limit=1.5), day=1),
         made(step(10.0, 12.0), commit="b" * 40, day=2),
         made(step(30.0), commit="c" * 40, day=3, cpu="a slow one"),
+        made(step(9.0), commit="d" * 40, day=4),
     ]
     (tmp_path / "images").mkdir()
     gone = tmp_path / "images" / "turn-gone.svg"
@@ -41,7 +42,7 @@ def test_each_figure_has_a_picture_and_a_row(made: Made, step: Step, tmp_path: P
     text, *pictures = write(kept, tmp_path / "page.md", tmp_path / "images")
     assert [path.name for path in pictures] == ["turn-a-step.svg", "turn-ours-theirs.svg"]
     assert not gone.exists()
-    assert "| a step | 20.5 | 30 | ms | less is better |" in text.read_text()
+    assert "| a step | 11 | 9 | ms | less is better |" in text.read_text()
     assert "| 2026-11-02 | `bbbbbbbb` | a quick one, 2 cores, 8 GB, Linux, Python 3.11.9 | 2 | 0 |" in text.read_text()
     words = "".join(ET.parse(pictures[0]).getroot().itertext())
     for part in ("turn: a step", "less is better", "2026-11-03", "cccccccc", "a slow one"):

@@ -123,17 +123,28 @@ def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
     Each is asked until one unit can, or until what is missing is missing to all: thirty selected units of five types
     have 500 abilities on their cards, of which 60 differ.
     """
-    found: dict[int, Ability | None] = {}  # None: no unit of this player can
+    found: dict[int, Ability] = {}
+    left: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
     for slot in slots:
-        for ability in world.catalog.abilities_of(int(world.type[slot])):
+        row = int(world.type[slot])
+        asked = left[row] if row in left else world.catalog.abilities_of(row)
+        left[row] = []
+        for ability in asked:
             if ability.id in found:
                 continue
             why = casting.refusal(world, slot, ability)
             if why is ActionResult.SUCCESS:
                 found[ability.id] = ability
-            elif why is ActionResult.TECH_REQUIREMENTS_NOT_MET and requirements.missing_to_all(world, slot, ability):
-                found[ability.id] = None
-    return [ability for _, ability in sorted(found.items()) if ability is not None]
+            elif not _hopeless(world, slot, ability, why):
+                left[row].append(ability)
+    return [ability for _, ability in sorted(found.items())]
+
+
+def _hopeless(world: World, slot: int, ability: Ability, why: ActionResult) -> bool:
+    """Return whether an ability that a unit can't use is out of reach for all units of its owner."""
+    if why is ActionResult.TECH_REQUIREMENTS_NOT_MET:
+        return requirements.missing_to_all(world, slot, ability)
+    return why is ActionResult.NOT_SUPPORTED
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:

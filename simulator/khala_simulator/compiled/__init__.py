@@ -39,6 +39,7 @@ SYSTEMS: Final = (
     "navigation",
     "orders",
     "regeneration",
+    "sweeps",
     "triggers",
     "weapons",
 )

@@ -5,7 +5,9 @@ from libc.stdint cimport int64_t
 from khala_simulator.compiled.columns cimport Columns, columns_of
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most
 from khala_simulator.compiled.shots cimport Shot, as_tuple
-from khala_simulator.compiled.tables cimport MELEE, RANGED, SPELL, SPLASH, Hit, Kind, Tables, tables_of
+from khala_simulator.compiled.tables cimport (
+    ANY_PLANE, MELEE, RANGED, SPELL, SPLASH, Affects, Hit, Kind, Tables, tables_of,
+)
 
 from khala_simulator.combat import damage as rules
 from khala_simulator.tables import stats
@@ -14,7 +16,6 @@ from khala_simulator.tables.mechanics import MECHANICS
 cnp.import_array()
 
 cdef int64_t NOBODY = -1
-cdef int64_t GROUND_PLANE = stats.GROUND_PLANE
 cdef int64_t AIR_PLANE = stats.AIR_PLANE
 cdef double DAMAGE_MIN = MECHANICS.damage_min
 cdef double ALL_ROUND_DEG = 360.0
@@ -129,13 +130,12 @@ cdef splash(object world, Hit* hit, Shot* shot):
     cdef double forward_x = shot.goal.x - shot.start.x, forward_y = shot.goal.y - shot.start.y
     cdef double widest = 0.0
     cdef Py_ssize_t i
-    cdef Affects affects = affects_of(damage.hit.area_affects)
     cdef list rings = [(ring.radius, ring.fraction, ring.arc_deg) for ring in damage.hit.area]
     for radius, _, _ in rings:
         widest = most(widest, radius)
     for i in range(count(live)):
         slot = slots[i]
-        if not touches(c, &affects, shot, slot):
+        if not touches(c, &hit.affects, shot, slot):
             continue
         x, y = c.pos[slot].x - shot.goal.x, c.pos[slot].y - shot.goal.y
         edge = length(x, y) - c.radius[slot]
@@ -147,19 +147,8 @@ cdef splash(object world, Hit* hit, Shot* shot):
             ):
                 strike(world, c, hit, shot, slot, damage, fraction)
                 break
-    if affects.not_target:
+    if hit.affects.not_target:
         hit_target(world, shot)
-
-
-cdef Affects affects_of(object record):
-    """Return which units a splash, a search or a sweep may touch."""
-    cdef Affects affects
-    affects.allies, affects.neutral = record.allies, record.neutral
-    affects.only_structures, affects.no_structures = record.only == "structure", record.excluding == "structure"
-    affects.not_self, affects.not_target = record.not_self, record.not_target
-    plane = record.plane
-    affects.planes = ~<int64_t>0 if plane == "any" else GROUND_PLANE if plane == "ground" else AIR_PLANE
-    return affects
 
 
 cdef bint touches(Columns c, Affects* affects, Shot* shot, int64_t slot) noexcept:
@@ -172,4 +161,4 @@ cdef bint touches(Columns c, Affects* affects, Shot* shot, int64_t slot) noexcep
         return False
     if affects.not_self and slot == shot.source or affects.not_target and slot == shot.target:
         return False
-    return affects.planes == ~<int64_t>0 or c.plane_bits[slot] & affects.planes != 0
+    return affects.planes == ANY_PLANE or c.plane_bits[slot] & affects.planes != 0

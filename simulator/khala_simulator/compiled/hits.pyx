@@ -6,10 +6,9 @@ from khala_simulator.compiled.columns cimport Columns, columns_of
 from khala_simulator.compiled.damage cimport hit_target, hit_with
 from khala_simulator.compiled.missiles cimport launch
 from khala_simulator.compiled.numbers cimport count
-from khala_simulator.compiled.shots cimport PendingHit, Shot, as_tuple, emptied
+from khala_simulator.compiled.shots cimport PendingHit, Shot, emptied
+from khala_simulator.compiled.sweeps cimport begin
 from khala_simulator.compiled.tables cimport Hit, Tables, tables_of
-
-from khala_simulator.systems import sweeps
 
 cnp.import_array()
 
@@ -54,6 +53,6 @@ cdef carry_out(world, Tables tables, PendingHit* pending):
     elif hit.flies:
         launch(world, shot, hit)
     elif hit.sweeps:
-        sweeps.begin(world, as_tuple(shot), pending.due)
+        begin(world, shot, pending.due)
     else:
         hit_with(world, shot)

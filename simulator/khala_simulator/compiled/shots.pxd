@@ -26,5 +26,6 @@ cdef packed struct PendingHit:
     boolean single
 
 cdef object as_tuple(Shot* shot)
+cdef Shot from_tuple(object shot)
 cdef object emptied(object table, Py_ssize_t rows)
 cdef append(object table, void* rows, Py_ssize_t more)

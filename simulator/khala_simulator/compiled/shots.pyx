@@ -25,6 +25,15 @@ cdef object as_tuple(Shot* shot):
     ))
 
 
+cdef Shot from_tuple(object shot):
+    """Return a shot of the Python rules as a row."""
+    cdef Shot row
+    row.source, row.owner, row.target, row.prior, row.weapon, row.hit, start, goal = shot
+    row.start.x, row.start.y = start
+    row.goal.x, row.goal.y = goal
+    return row
+
+
 cdef object emptied(object table, Py_ssize_t rows):
     """Give a table new rows to be filled, and return the old ones."""
     old = table.rows

@@ -1,11 +1,36 @@
 """The catalog's weapons, hits and types as compiled systems read them."""
 from libc.stdint cimport int64_t
 
+cdef enum:
+    ANY_PLANE = -1
+
 cdef enum Kind:
     SPELL
     RANGED
     MELEE
     SPLASH
+
+cdef struct Affects:
+    bint allies
+    bint neutral
+    bint only_structures
+    bint no_structures
+    bint not_self
+    bint not_target
+    int64_t planes  # of which the unit has to be on one
+
+cdef struct LinePoint:
+    double delay  # loops from the damage point until it touches
+    double across
+    double along
+
+cdef struct Line:
+    LinePoint* points
+    Py_ssize_t count
+    double radius
+    double lag  # loops from a touch to the hit
+    double past_range
+    bint from_source
 
 cdef struct Hit:
     double delay  # loops from the damage point until it is due; 0 for a sweep, which counts itself
@@ -21,6 +46,8 @@ cdef struct Hit:
     bint impacts  # it does more to its target than damage
     bint plain  # it is dealt to its target alone
     bint splashes
+    Affects affects  # of its splash or its sweep
+    Line line  # of its sweep
 
 cdef struct Weapon:
     Py_ssize_t first_hit

@@ -2,6 +2,7 @@
 import functools
 import math
 
+from libc.stdint cimport int64_t
 from libc.stdlib cimport calloc, free
 
 from khala_simulator.abilities import registry as _every_impact  # noqa: F401  # the skills add to IMPACTS and LAUNCHERS
@@ -9,8 +10,11 @@ from khala_simulator.combat.damage import IMPACTS
 from khala_simulator.combat.launchers import LAUNCHERS
 from khala_simulator.combat.targets import aim_cosine
 from khala_simulator.systems.missiles import speeds
+from khala_simulator.tables import stats
 from khala_simulator.tables.stats import ATTRIBUTES, bit_set
 
+cdef int64_t GROUND_PLANE = stats.GROUND_PLANE
+cdef int64_t AIR_PLANE = stats.AIR_PLANE
 cdef dict KINDS = {"ranged": RANGED, "melee": MELEE, "splash": SPLASH}
 
 
@@ -35,6 +39,10 @@ cdef class Tables:
                 index += 1
 
     def __dealloc__(self):
+        cdef Py_ssize_t row, index
+        for row in range(self.weapon_count):
+            for index in range(self.weapons[row].hits):
+                free(self.hits[self.weapons[row].first_hit + index].line.points)
         free(self.weapons)
         free(self.hits)
         free(self.unturnable)
@@ -62,6 +70,32 @@ cdef write_hit(Hit* row, hit):
     row.impacts = hit.effect in IMPACTS
     cdef bint ordinary = not hit.kills_self and (hit.search is None or hit.bounce)
     row.plain, row.splashes = ordinary and not hit.area, ordinary and bool(hit.area)
+    row.affects = affects_of(hit.area_affects if hit.sweep is None else hit.sweep.affects)
+    if hit.sweep is not None:
+        write_line(&row.line, hit.sweep)
+
+
+cdef write_line(Line* line, sweep):
+    cdef Py_ssize_t i
+    line.points = <LinePoint*>calloc(len(sweep.points), sizeof(LinePoint))
+    if line.points == NULL:
+        raise MemoryError
+    line.count, line.radius, line.lag = len(sweep.points), sweep.radius, sweep.lag_loops
+    line.past_range, line.from_source = sweep.past_range, sweep.origin == "source"
+    for i, (delay, across, along) in enumerate(sweep.points):
+        line.points[i].delay = delay - sweep.lag_loops
+        line.points[i].across, line.points[i].along = across, along
+
+
+cdef Affects affects_of(object record):
+    """Return which units a splash or a sweep may touch."""
+    cdef Affects affects
+    affects.allies, affects.neutral = record.allies, record.neutral
+    affects.only_structures, affects.no_structures = record.only == "structure", record.excluding == "structure"
+    affects.not_self, affects.not_target = record.not_self, record.not_target
+    plane = record.plane
+    affects.planes = ANY_PLANE if plane == "any" else GROUND_PLANE if plane == "ground" else AIR_PLANE
+    return affects
 
 
 @functools.lru_cache(maxsize=4)

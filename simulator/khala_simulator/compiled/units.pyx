@@ -15,6 +15,7 @@ cnp.import_array()
 cdef int64_t VISIBLE = perception.Display.VISIBLE
 cdef int64_t HIDDEN = perception.Display.HIDDEN
 cdef int64_t SELF = perception.Alliance.SELF
+cdef int64_t ENEMY = perception.Alliance.ENEMY
 cdef int64_t NEUTRAL = perception.Alliance.NEUTRAL
 cdef int64_t IDLE = kinds.OrderKind.IDLE
 cdef int64_t ATTACK_UNIT = kinds.OrderKind.ATTACK_UNIT
@@ -101,7 +102,7 @@ def encode(units):
     cdef Py_ssize_t type_count = len(types.structure)
     cdef double x0 = units.origin[0], y0 = units.origin[1]
     cdef bint buffed = worn is not None, fixed
-    cdef bint jobs = bool(world.jobs), rallies = bool(world.rallies), lasting = len(world.buffs) > 0
+    cdef bint jobs = bool(world.jobs), rallies = bool(world.rallies)
     cdef Ground ground = Ground(world.map.terrain)
     cdef int64_t loop = world.loop
     cdef int64_t* levels[PLAYERS]
@@ -111,6 +112,7 @@ def encode(units):
     for i in range(len(levels_of)):
         levels[i] = <int64_t*>start(cnp.NPY_INT64, levels_of[i])
     staff = units.harvesters
+    cdef set lasting = set(world.buffs.rows["slot"].tolist())
     cdef dict worn_by = {}
     if buffed:
         for place, number in zip(worn.row.tolist(), worn.id.tolist(), strict=True):
@@ -197,7 +199,7 @@ def encode(units):
                 if c.expires[slot]:
                     put_number(&body, 43, max(0, c.expires[slot] - loop))
                     put_number(&body, 44, c.expires[slot] - c.born_loop[slot])
-                elif lasting:
+                elif lasting and slot in lasting:
                     put_bytes(&body, units.durations(slot))
                 if rallies and slot in world.rallies:
                     put_bytes(&body, units.rallies(slot))
@@ -206,6 +208,42 @@ def encode(units):
     finally:
         free(out.data)
         free(body.data)
+
+
+def encode_panel(world, types, list slots, int64_t player):
+    """Return what the panel says of units, as the field `units` of a `MultiPanel`; `api.ui` has the rule."""
+    cdef Columns c = columns_of(world)
+    cdef int64_t* type_id = <int64_t*>start(cnp.NPY_INT64, types.id)
+    cdef Py_ssize_t type_count = len(types.id)
+    cdef double* life_max = <double*>start(cnp.NPY_FLOAT64, world.stats.life_max)  # (players, types)
+    cdef double* shields_max = <double*>start(cnp.NPY_FLOAT64, world.stats.shields_max)
+    cdef double* energy_max = <double*>start(cnp.NPY_FLOAT64, world.stats.energy_max)
+    cdef int64_t slot, owner, side
+    cdef Py_ssize_t at
+    cdef uint8_t data[128]
+    cdef Bytes out, unit
+    unit.data, unit.size = data, 128
+    allocate(&out, 64 * len(slots) + ROOM)
+    try:
+        for slot in slots:
+            unit.used = 0
+            owner = c.owner[slot]
+            at = owner * type_count + c.type[slot]
+            side = SELF if owner == player else NEUTRAL if owner == 0 else ENEMY
+            put_number(&unit, 1, type_id[c.type[slot]])
+            put_number(&unit, 2, side)
+            put_number(&unit, 3, <int64_t>c.life[slot])
+            put_number(&unit, 4, <int64_t>c.shields[slot])
+            put_number(&unit, 5, <int64_t>c.energy[slot])
+            put_number(&unit, 6, 0)
+            put_float(&unit, 7, c.build_progress[slot])
+            put_number(&unit, 9, <int64_t>life_max[at])
+            put_number(&unit, 10, <int64_t>shields_max[at])
+            put_number(&unit, 11, <int64_t>energy_max[at])
+            put_message(&out, 1, &unit)
+        return <bytes>(<char*>out.data)[: out.used]
+    finally:
+        free(out.data)
 
 
 cdef put_order(Bytes* body, Columns c, int64_t slot, Ground ground, double x0, double y0, int64_t loop):
