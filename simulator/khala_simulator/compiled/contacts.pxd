@@ -5,8 +5,8 @@ from libc.stdint cimport int64_t
 from khala_simulator.compiled.columns cimport Columns, Point
 
 cdef struct Pair:
-    int64_t one  # indices into the living slots
-    int64_t other
+    int one  # indices into the living slots
+    int other
     double apart  # distance to keep
     double share  # part of an overlap by which the first gives way
     double rest  # and the other
@@ -19,8 +19,8 @@ cdef struct Place:
     double along  # on the axis on which the crowd spreads wider
     double across
     double separation
-    int64_t bits  # layers it collides in
-    int64_t body  # index into the living slots
+    int bits  # layers it collides in
+    int body  # index into the living slots
 
 @cython.final
 cdef class Crowd:

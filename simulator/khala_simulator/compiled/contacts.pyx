@@ -2,7 +2,6 @@
 
 The order of the pairs is that of the rules, as forces are summed up in it.
 """
-from libc.math cimport fabs
 from libc.stdint cimport int64_t
 from libc.stdlib cimport free, realloc
 
@@ -113,7 +112,7 @@ cdef class Crowd:
                 x, y = places[i].along - places[j].along, places[i].across - places[j].across
                 beside = places[i].separation + places[j].separation + SKIN
                 self.close[close] = j
-                close += (x * x + y * y < beside * beside) & (fabs(y) < reach)
+                close += x * x + y * y < beside * beside
             for j in range(close):
                 touch |= self.note(&places[i], &places[self.close[j]])
         return touch

@@ -27,7 +27,7 @@ cdef class Flow:
     cdef boolean* free
     cdef boolean* wanted
     cdef boolean* awaited  # the cells around walkers
-    cdef uint8_t* left  # steps from each cell to a place to go to
+    cdef uint8_t* left  # steps from each cell to a place to go to, more than ``NOWHERE`` if it is not free
     cdef int64_t* reached  # cells in the order of these
 
     cdef void stand_on(self, Grid grid, int64_t low_x, int64_t low_y) noexcept

@@ -15,6 +15,7 @@ cdef enum:
 cdef int64_t FINE = rules.FINE
 cdef double MARGIN = rules.MARGIN
 cdef uint8_t NOWHERE = rules.NOWHERE
+cdef uint64_t TAKEN = int.from_bytes(bytes([NOWHERE + 1] * WORD))  # cells that are not free
 cdef int64_t HOPS = rules.HOPS
 cdef double NEARER = rules.NEARER
 cdef int64_t AROUND = rules.SIDE.max()
@@ -107,8 +108,9 @@ cdef class Flow:
         cdef int64_t end = 0, old = 0, older = 0, stop  # in ``reached``: its end, and where the last two steps begin
         cdef uint8_t step = 0
         cdef Py_ssize_t i
-        memset(self.left, NOWHERE, self.size)
         memset(self.awaited, False, self.size)
+        for word in range(self.words):
+            (<uint64_t*>self.left)[word] = TAKEN - (<uint64_t*>self.free)[word]
         for i in range(k):
             if walkers[i].settled:
                 continue
@@ -141,8 +143,8 @@ cdef class Flow:
         return end > 0
 
     cdef int64_t arrive(self, int64_t cell, uint8_t step, int64_t* end) noexcept:
-        """Note that a cell is reached now, if it is free and was not; return how many that were awaited are."""
-        if not self.free[cell] or self.left[cell] != NOWHERE:
+        """Note that a cell is reached now, if it is free and was not before; return how many awaited ones that are."""
+        if self.left[cell] != NOWHERE:
             return 0
         self.left[cell] = step
         self.reached[end[0]] = cell
@@ -162,7 +164,7 @@ cdef class Flow:
                 for dx in range(-AROUND, AROUND + 1):
                     beside_x = (x - goal_x) + dx
                     cost = beside_y * beside_y + beside_x * beside_x
-                    cost = self.left[(y + dy) * self.width + x + dx] + NEARER * cost
+                    cost = min(self.left[(y + dy) * self.width + x + dx], NOWHERE) + NEARER * cost
                     if cost < best:
                         best, best_x, best_y = cost, x + dx, y + dy
             x, y = best_x, best_y
@@ -206,7 +208,7 @@ cdef Flow flow_around(Grid grid, Walker* walkers, Py_ssize_t k):
     flow.free = <boolean*>calloc(flow.words, WORD)
     flow.wanted = <boolean*>calloc(flow.words, WORD)
     flow.awaited = <boolean*>malloc(flow.size)
-    flow.left = <uint8_t*>malloc(flow.size)
+    flow.left = <uint8_t*>malloc(flow.words * WORD)
     flow.reached = <int64_t*>malloc(flow.size * sizeof(int64_t))
     if not (flow.free and flow.wanted and flow.awaited and flow.left and flow.reached):
         raise MemoryError("no room for the ways of a crowd")
