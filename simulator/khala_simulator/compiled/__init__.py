@@ -41,6 +41,7 @@ SYSTEMS: Final = (
     "regeneration",
     "sweeps",
     "triggers",
+    "vision",
     "weapons",
 )
 """The systems that have a module here."""
