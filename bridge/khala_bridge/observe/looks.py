@@ -14,7 +14,7 @@ import numpy as np
 from khala_bridge.frames import CAMERA_WIDTH, sees
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from typing import TypeAlias
 
     from numpy.typing import NDArray
@@ -50,7 +50,7 @@ class Look(NamedTuple):
     """By type, distance and row."""
 
 
-class Bodies(NamedTuple):
+class BodyArrays(NamedTuple):
     """All bodies, one row each."""
 
     places: Floats
@@ -58,10 +58,12 @@ class Bodies(NamedTuple):
     rank: Rows
     """Of the type, by name: (n,)."""
     friend: Bools
+    """Who is listed as a friend: (n,)."""
     foe: Bools
+    """Who is listed as a foe: (n,)."""
 
 
-def looks(bodies: Bodies, cameras: Sequence[Camera], members: Sequence[Sequence[int]]) -> list[Look]:
+def looks(bodies: BodyArrays, cameras: Sequence[Camera], members: Sequence[Sequence[int]]) -> list[Look]:
     """Return what each team looks at.
 
     Args:
@@ -69,49 +71,36 @@ def looks(bodies: Bodies, cameras: Sequence[Camera], members: Sequence[Sequence[
         cameras: of each team, all of the same size.
         members: by team, the rows of its units; at least one.
     """
-    places, rows = bodies.places, np.array(list(chain.from_iterable(members)), dtype=int)
-    ends = list(accumulate(map(len, members)))
-    teams = np.repeat(np.arange(len(members)), [len(one) for one in members])
+    places, sizes = bodies.places, [len(rows) for rows in members]
+    ends = [0, *accumulate(sizes)]
+    mine = np.array(list(chain.from_iterable(members)))
+    owner = np.repeat(np.arange(len(sizes)), sizes)
     centres = np.array([(camera.x, camera.y) for camera in cameras])
-    others = sees(centres, places)
-    others[teams, rows] = False
-    sums = np.add.reduceat(places[rows], [0, *ends[:-1]], axis=0)
-    middles = sums / np.array([[len(one)] for one in members])
-    apart = places - middles[:, None]
-    distance = np.round(np.hypot(apart[..., 0], apart[..., 1]), 1)
-    at_x, at_y = _on_screens(centres, cameras[0].size, places)
-
-    def shown(team: Rows, row: Rows) -> Iterator[Shown]:
-        bounds = [0, *np.cumsum(np.bincount(team, minlength=len(members))).tolist()]
-        columns = [one.tolist() for one in (row, at_x[team, row], at_y[team, row], distance[team, row])]
-        return (Shown(*[column[begin:end] for column in columns]) for begin, end in pairwise(bounds))
-
-    def ordered(mask: Bools, *, by_distance: bool) -> tuple[Rows, Rows]:
-        team, row = np.nonzero(mask)
-        keys = (distance[team, row],) if by_distance else ()
-        order = np.lexsort((*keys, bodies.rank[row], team))
-        return team[order], row[order]
-
-    found = zip(
-        cameras,
-        shown(teams, rows),
-        shown(*ordered(others & bodies.friend, by_distance=False)),
-        shown(*ordered(others & bodies.foe, by_distance=True)),
-        strict=True,
-    )
-    return [Look(*one) for one in found]
+    others = sees(centres, places) & (bodies.friend | bodies.foe)
+    others[owner, mine] = False
+    team, row = (np.concatenate(parts) for parts in zip((owner, mine), others.nonzero(), strict=True))
+    at = places[row]
+    middles = np.add.reduceat(places[mine], ends[:-1], axis=0) / np.array(sizes)[:, None]
+    apart = at - middles[team]
+    distance = np.round(np.hypot(apart[:, 0], apart[:, 1]), 1)
+    screen = _on_screen(at, centres[team], cameras[0].size)
+    strangers = slice(len(mine), None)
+    foe = bodies.foe[row[strangers]]
+    group = 2 * team[strangers] + foe  # friends of a team, its foes, friends of the next
+    order = np.lexsort((distance[strangers] * foe, bodies.rank[row[strangers]], group)) + len(mine)
+    columns = [one[np.concatenate((np.arange(len(mine)), order))].tolist() for one in (row, *screen.T, distance)]
+    bounds = [len(mine), *(len(mine) + np.cumsum(np.bincount(group, minlength=2 * len(sizes)))).tolist()]
+    shown = [Shown(*[column[begin:end] for column in columns]) for begin, end in pairwise(ends + bounds[1:])]
+    return [Look(camera, shown[place], *shown[len(sizes) + 2 * place :][:2]) for place, camera in enumerate(cameras)]
 
 
-def _on_screens(centres: Floats, size: float, places: Floats) -> tuple[Floats, Floats]:
-    """Return where bodies are on screens of this size, x and y, each (teams, n)."""
-    scale = size / CAMERA_WIDTH
-    right = places[:, 0] - centres[:, :1] + _HALF
-    down = centres[:, 1:] + _HALF - places[:, 1]
-    return _tenths(right * scale, size), _tenths(down * scale, size)
+def _on_screen(at: Floats, centres: Floats, size: float) -> Floats:
+    """Return world positions on the screens of cameras at these centres, in its cells: (k, 2), (k, 2) → (k, 2).
 
-
-def _tenths(values: Floats, size: float) -> Floats:
-    """Return positions rounded to a tenth of a cell; they stay within the frame, whose end is open."""
-    near = np.round(values, 1) + 0.0  # no negative zero
-    near[(values < size) & (near >= size)] = round(size - 0.1, 1)
+    They are rounded to a tenth of a cell, and stay within the frame, whose end is open.
+    """
+    cells = np.column_stack((at[:, 0] - centres[:, 0] + _HALF, centres[:, 1] + _HALF - at[:, 1]))
+    cells *= size / CAMERA_WIDTH
+    near = np.round(cells, 1) + 0.0  # no negative zero
+    near[(cells < size) & (near >= size)] = round(size - 0.1, 1)
     return near

@@ -26,7 +26,7 @@ from khala_bridge.frames import CAMERA_WIDTH, Camera
 from khala_bridge.observe.arguments import Around
 from khala_bridge.observe.body import body, rounded
 from khala_bridge.observe.events import Witnessed
-from khala_bridge.observe.looks import Bodies, looks
+from khala_bridge.observe.looks import BodyArrays, looks
 from khala_bridge.observe.observation import TeamObservation
 from khala_bridge.observe.offers import Possible
 from khala_bridge.state import Alliance
@@ -184,11 +184,11 @@ class Scene:
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
 
-def _arranged(order: Sequence[Body]) -> Bodies:
+def _arranged(order: Sequence[Body]) -> BodyArrays:
     """Return bodies as arrays."""
     ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
     foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
-    return Bodies(
+    return BodyArrays(
         np.array([(b.x, b.y) for b in order]),
         np.array([ranks[b.name] for b in order]),
         np.array([b.alliance is not Alliance.ENEMY for b in order]),
