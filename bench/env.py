@@ -5,7 +5,7 @@
     python -m bench.env --maps 2s3z corridor --seconds 10 --rounds 5 --json
 
 The paths are checkouts of https://github.com/oxwhirl/smac and https://github.com/uoe-agents/smaclite; the Python for
-the second has what its `setup.py` asks for. Each environment has a process (SMAC's has the game's beside it). They are
+the second has what it asks for. Each environment has a process (SMAC's has the game's beside it). They are
 measured in turn, one and eight at a time, in several rounds of one run, since machines are not idle: the steps are
 those of all together, the processor time is that of a step, with all of its processes, and the medians of the rounds
 count.
