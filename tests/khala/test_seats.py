@@ -67,6 +67,8 @@ async def test_a_turn_asks_all_agents_of_the_caller_and_reports_what_became_of_t
         match.act(STALKERS, "Stalker-1: <Attack_Unit(0x1)>")
         rest = await match.turn()
         assert list(rest.asked) == [ZEALOTS]
+        with pytest.raises(NotAsked, match=r"^blue/Stalkers waits for no answer, blue/Zealots does: `turn` says"):
+            match.act(STALKERS, "")
         match.act(ZEALOTS, "Zealot-1: <Hold_Position()>")
         second = await match.turn()
         (report,) = second.reports
@@ -118,15 +120,6 @@ async def test_pictures_of_an_observation_are_handed_out_with_it() -> None:
         seen = (await match.turn()).asked[STALKERS]
     assert [len(picture) for picture in seen.pictures] == [ref.bytes for ref in seen.observation.images]
     assert seen.pictures
-
-
-@game
-async def test_a_seat_that_waits_for_no_answer_cannot_act() -> None:
-    async with SeatedMatch(config(max_steps=1), [STALKERS, ZEALOTS]) as match:
-        await match.turn()
-        match.act(STALKERS, "")
-        with pytest.raises(NotAsked, match=r"^blue/Stalkers waits for no answer, blue/Zealots does: `turn` says"):
-            match.act(STALKERS, "")
 
 
 @pytest.mark.slow

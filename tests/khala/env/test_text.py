@@ -94,6 +94,7 @@ def test_one_side_is_played_against_another_that_a_script_plays() -> None:
     env.close()
 
 
+@pytest.mark.slow
 @game
 def test_text_env_passes_the_parallel_api_test() -> None:
     env = words.parallel_env(max_cycles=3)
