@@ -1,6 +1,7 @@
 """The scores of an episode: whether it was won, the value that was killed and lost, and how much of it was legal.
 
-An episode that says nothing about its agents, because a part of the match failed, is not scored.
+An episode that says nothing about its agents is not scored: a part of the match failed, or a limit of inspect_ai ended
+it.
 """
 
 from __future__ import annotations
@@ -79,6 +80,8 @@ def legality() -> Scorer:
 
 def _scorer(of: Callable[[Result], Score]) -> Scorer:
     async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001  # the result says it all
+        if state.store.get(RESULT) is None:
+            return Score.unscored(reason="a limit ended the episode before its result")
         result = Result.model_validate(state.store.get(RESULT))
         return of(result) if result.valid else Score.unscored(reason=result.invalid_because)
 
