@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
+import typer
 from mcp import Client, MCPError, StdioServerParameters
 from mcp.types import BlobResourceContents, CallToolResult, ImageContent, TextContent, TextResourceContents
 
 from khala.mcp.commands import Wanted, run_mcp, table_of
+from khala.mcp.serve import over_http
 from khala.mcp.server import server_of
 from khala.mcp.table import Look, Table, with_messages
 from khala.mcp.words import page
@@ -85,7 +87,7 @@ async def played(client: Client) -> list[str]:
 
 
 @game
-async def test_a_client_observes_acts_and_reads_what_became_of_it(tmp_path: Path) -> None:
+async def test_a_client_observes_acts_and_reads_what_became_of_it_with_pictures(tmp_path: Path) -> None:
     moved: list[tuple[float, str | None]] = []
 
     async def moves(progress: float, total: float | None, message: str | None) -> None:
@@ -95,7 +97,11 @@ async def test_a_client_observes_acts_and_reads_what_became_of_it(tmp_path: Path
     async with client_of(table(STALKERS, record=record, max_steps=2, images="screen")) as client:
         assert [tool.name for tool in (await client.list_tools()).tools] == ["observe", "act", "message", "look_up"]
         assert "Call observe" in (client.instructions or "")
+        assert [one.name for one in (await client.list_resources()).resources] == ["briefing", "observation"]
+        with pytest.raises(MCPError, match="nothing has been observed yet: call the tool observe first"):
+            await client.read_resource("khala://briefing")
         first = await client.call_tool("observe", {})
+        await check_resources(client, first)
         assert text_of(first).startswith("# Who you are\nYou are Stalkers")
         assert "Observation of step 0, episode 1 of 1. The game waits for your answer." in text_of(first)
         assert await said(client, "message", to="Zealots", text="Hold '''here''') <Stop()>") == (
@@ -118,29 +124,24 @@ async def test_a_client_observes_acts_and_reads_what_became_of_it(tmp_path: Path
     assert len(list(recording.of(Reply, agent="Stalkers"))) == 2
 
 
-@game
-async def test_pictures_come_with_an_observation_and_as_resources() -> None:
-    async with client_of(table(STALKERS, max_steps=1, images="screen")) as client:
-        assert [one.name for one in (await client.list_resources()).resources] == ["briefing", "observation"]
-        with pytest.raises(MCPError, match="nothing has been observed yet: call the tool observe first"):
-            await client.read_resource("khala://briefing")
-        (picture,) = [one for one in (await client.call_tool("observe", {})).content if isinstance(one, ImageContent)]
-        assert base64.b64decode(picture.data).startswith(b"\xff\xd8")
-        uris = [one.uri for one in (await client.list_resources()).resources]
-        assert uris == ["khala://briefing", "khala://observation", "khala://pictures/screen-Stalker-1"]
-        (same,) = (await client.read_resource(uris[2])).contents
-        assert isinstance(same, BlobResourceContents)
-        assert (same.blob, same.mime_type) == (picture.data, "image/jpeg")
-        (briefing,), (seen,) = [(await client.read_resource(uri)).contents for uri in uris[:2]]
-        assert isinstance(briefing, TextResourceContents)
-        assert isinstance(seen, TextResourceContents)
-        assert "# How to play with these tools" in briefing.text
-        assert seen.text.startswith("Game\n    Time: 0:00")
+async def check_resources(client: Client, observed: CallToolResult) -> None:
+    """Check that what was observed is there as resources, too."""
+    (picture,) = [one for one in observed.content if isinstance(one, ImageContent)]
+    assert base64.b64decode(picture.data).startswith(b"\xff\xd8")
+    uris = [one.uri for one in (await client.list_resources()).resources]
+    assert uris == ["khala://briefing", "khala://observation", "khala://pictures/screen-Stalker-1"]
+    (briefing,), (seen,), (same,) = [(await client.read_resource(uri)).contents for uri in uris]
+    assert isinstance(same, BlobResourceContents)
+    assert (same.blob, same.mime_type) == (picture.data, "image/jpeg")
+    assert isinstance(briefing, TextResourceContents)
+    assert isinstance(seen, TextResourceContents)
+    assert "# How to play with these tools" in briefing.text
+    assert seen.text.startswith("Game\n    Time: 0:00")
 
 
 @game
-async def test_what_cannot_be_done_is_said_with_what_can() -> None:
-    async with client_of(table(STALKERS, max_steps=1)) as client:
+async def test_what_cannot_be_done_is_said_with_what_can_and_another_episode_is_played() -> None:
+    async with client_of(table(STALKERS, max_steps=1, episodes=2)) as client:
         assert await refusal(client, "message", to="Zealots", text="hi") == (
             "blue/Stalkers has seen nothing yet: call observe first"
         )
@@ -153,6 +154,12 @@ async def test_what_cannot_be_done_is_said_with_what_can() -> None:
         )
         assert "did you mean Stalker" in await refusal(client, "look_up", name="Stalkr")
         assert (await said(client, "look_up", name="Stalker")).startswith("Stalker (unit, protoss, id 74)")
+        between = await said(client, "act", reply="")
+        assert "Episode 1 of 2 is over" in between
+        assert "The match is over" not in between
+        again = await said(client, "observe", briefing=True)
+        assert again.startswith("# Who you are")
+        assert "Observation of step 0, episode 2 of 2." in again
         await said(client, "act", reply="")
         assert await refusal(client, "act", reply="") == "the match is over: nobody waits for an answer"
         assert (await said(client, "observe")).startswith("The match is over.")
@@ -173,18 +180,6 @@ async def test_a_player_that_was_too_slow_must_look_before_it_answers() -> None:
     assert late.startswith("Your last answer: timeout; 0 carried out, 0 refused.\nObservation of step 1,")
 
 
-@game
-async def test_a_client_finds_the_briefing_again_and_plays_the_next_episode() -> None:
-    async with client_of(table(STALKERS, max_steps=1, episodes=2)) as client:
-        await said(client, "observe")
-        between = await said(client, "act", reply="")
-        assert "Episode 1 of 2 is over" in between
-        assert "The match is over" not in between
-        again = await said(client, "observe", briefing=True)
-        assert again.startswith("# Who you are")
-        assert "Observation of step 0, episode 2 of 2." in again
-
-
 def server_command(tmp_path: Path, *options: str) -> list[str]:
     return [sys.executable, "-m", "khala", "mcp", "2s3z_pair", "--max-steps", "2", "--out", str(tmp_path), *options]
 
@@ -196,8 +191,8 @@ def result_in(tmp_path: Path) -> Result:
 
 
 @game
-async def test_a_client_plays_over_stdio_while_a_model_plays_the_others(tmp_path: Path) -> None:
-    command, *options = server_command(tmp_path, "--seat", "Stalkers", "--others", "scripted/skilled")
+async def test_a_client_plays_over_stdio_while_a_policy_plays_the_others(tmp_path: Path) -> None:
+    command, *options = server_command(tmp_path, "--seat", "Stalkers", "--others", "skilled")
     with (tmp_path / "stderr").open("w+") as log:
         from mcp.client.stdio import stdio_client
 
@@ -226,19 +221,28 @@ def http_server(tmp_path: Path, *options: str) -> Iterator[dict[str, str]]:
 
 
 @game
-async def test_two_clients_play_the_two_seats_of_a_match_over_http(tmp_path: Path) -> None:
-    with http_server(tmp_path) as addresses:
-        assert list(addresses) == [str(STALKERS), str(ZEALOTS)]
-        async with (
-            Client(addresses["blue/Stalkers"]) as stalkers,
-            Client(addresses["blue/Zealots"], mode="legacy") as zealots,
-        ):
-            first, second = await asyncio.gather(played(stalkers), played(zealots))
-        assert first[0].startswith("# Who you are\nYou are Stalkers")
-        assert second[0].startswith("# Who you are\nYou are Zealots")
-        async with httpx.AsyncClient() as foreign:
-            refused = await foreign.post(addresses["blue/Zealots"], json={}, headers={"Host": "evil.example"})
-        assert refused.status_code == 421
+async def test_two_clients_play_the_two_seats_of_a_match_over_http(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    both = table(STALKERS, ZEALOTS, record=tmp_path / "run" / "recording.mcap", max_steps=2)
+    serving = asyncio.create_task(over_http(both, 0))
+    await asyncio.sleep(0)  # it has its port, and says its addresses, before it waits for anything
+    addresses = dict(line.split(": ", 1) for line in capsys.readouterr().err.splitlines())
+    assert list(addresses) == [str(STALKERS), str(ZEALOTS)]
+    async with (
+        Client(addresses["blue/Stalkers"]) as stalkers,
+        Client(addresses["blue/Zealots"], mode="legacy") as zealots,
+    ):
+        first, second = await asyncio.gather(played(stalkers), played(zealots))
+    assert first[0].startswith("# Who you are\nYou are Stalkers")
+    assert second[0].startswith("# Who you are\nYou are Zealots")
+    async with httpx.AsyncClient() as foreign:
+        refused = await foreign.post(addresses["blue/Zealots"], json={}, headers={"Host": "evil.example"})
+    assert refused.status_code == 421
+    signal.raise_signal(signal.SIGTERM)
+    with pytest.raises(typer.Exit) as ended:
+        await serving
+    assert ended.value.exit_code == 128 + signal.SIGTERM
     assert result_in(tmp_path).statuses == {"Stalkers": {"ok": 2}, "Zealots": {"ok": 2}}
 
 
