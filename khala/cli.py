@@ -19,6 +19,7 @@ import khala_simulator.process.install
 from khala import __version__
 from khala.actions import EPILOG as ACTIONS_EPILOG
 from khala.actions import actions
+from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
 from khala.dataset.cli import app as dataset
 from khala.experiment.cli import app as experiment
 from khala.fork.cli import FORK_EPILOG, fork
@@ -287,6 +288,7 @@ for command, epilog in (
     (stop, None),
     (view, VIEW_EPILOG),
     (mcp, MCP_EPILOG),
+    (calibrate, CALIBRATE_EPILOG),
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)

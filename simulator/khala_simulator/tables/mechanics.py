@@ -22,6 +22,8 @@ class Constant:
     unit: str
     source: Literal["catalog", "replay", "estimate"]
     note: str
+    probe: str = ""
+    """Of an estimate: the probe of `khala calibrate` that would settle it."""
 
 
 @dataclass(frozen=True, slots=True)

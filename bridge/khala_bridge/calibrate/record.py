@@ -1,0 +1,109 @@
+"""The file of one calibration: which game was measured, and what each probe found.
+
+One JSON object; `khala.calibrate.compare` compares two. Above: `run`.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+from typing import TYPE_CHECKING, Final, Literal
+
+from pydantic import Field, ValidationError
+
+from khala_protocol.errors import ConfigError
+from khala_protocol.files import read_limited
+from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+_MOST_BYTES: Final = 64 * 2**20
+_DIGITS: Final = 6
+
+
+class Values(Frozen):
+    """All that was measured under one name."""
+
+    samples: tuple[float, ...]
+    mean: float
+    sd: float
+    """Of the samples; 0 for a single one."""
+    n: int
+
+    @classmethod
+    def of(cls, samples: Iterable[float]) -> Values:
+        """Return samples with what sums them up."""
+        rounded = tuple(round(float(sample), _DIGITS) for sample in samples)
+        sd = statistics.stdev(rounded) if len(rounded) > 1 else 0.0
+        return cls(
+            samples=rounded, mean=round(statistics.fmean(rounded), _DIGITS), sd=round(sd, _DIGITS), n=len(rounded)
+        )
+
+
+class Measured(Frozen):
+    """What one probe found."""
+
+    unit: str
+    exact: bool
+    """Whether the game repeats it to the last digit, apart from `resolution`."""
+    resolution: float
+    run_s: float
+    """Seconds that it took."""
+    loops: int
+    """Game loops that it played; of a probe with games of its own, those of the last one."""
+    failed: str = ""
+    """Why it found nothing: an error of the game, or a unit that did not do what the probe expects."""
+    values: dict[str, Values] = Field(default_factory=dict)
+
+
+class Calibration(Frozen):
+    """One file."""
+
+    kind: Literal["khala-calibration"] = "khala-calibration"
+    format: Literal[1] = 1
+    khala: str
+    """Version of Khala."""
+    game: str
+    """Such as `StarCraft II`, or the simulator by its name."""
+    version: str
+    """That the game tells, such as 4.10.0."""
+    build: int
+    data_version: str
+    platform: str
+    seed: int
+    probes: dict[str, Measured] = Field(default_factory=dict)
+    """By id."""
+
+    def with_probe(self, name: str, measured: Measured) -> Calibration:
+        """Return it with one more probe, or with another result of one."""
+        return self.model_copy(update={"probes": {**self.probes, name: measured}})
+
+    def is_same_game(self, other: Calibration) -> bool:
+        """Return True if one can be continued with the other's game and seed."""
+        return all(
+            getattr(self, name) == getattr(other, name) for name in ("game", "version", "build", "data_version", "seed")
+        )
+
+    def save(self, path: Path) -> None:
+        """Write it in one step: whoever interrupts finds the file of before or of now."""
+        fresh = path.with_name(f"{path.name}.new")
+        fresh.write_text(json.dumps(self.model_dump(mode="json"), indent=1) + "\n", encoding="utf-8")
+        fresh.replace(path)
+
+
+def load(path: Path) -> Calibration:
+    """Return the calibration in a file.
+
+    Raises:
+        ConfigError: it cannot be read, or is none.
+    """
+    try:
+        return Calibration.model_validate_json(read_limited(path, _MOST_BYTES))
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ConfigError(f"{path} is no file of `khala calibrate`: {where or 'it'}: {first['msg']}") from None

@@ -1,0 +1,139 @@
+"""The work of `khala calibrate`: list probes, play them, compare two files.
+
+`khala.calibrate.cli` has the options and imports this module when it runs.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from khala import __version__
+from khala.calibrate import compare, report
+from khala.calibrate.estimates import estimates
+from khala.environment import plain
+from khala.exit_codes import FAILED, SIGNALLED
+from khala.experiment.numbers import plain as plain_value
+from khala.games import find
+from khala_bridge.calibrate.catalogue import choose
+from khala_bridge.calibrate.connection import started, version
+from khala_bridge.calibrate.record import Calibration, load
+from khala_bridge.calibrate.run import play
+from khala_orchestrator.console import stderr_console
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from khala_bridge.calibrate.probe import Probe
+    from khala_bridge.calibrate.record import Measured
+
+_SIGINT = 2
+
+
+def show_probes(patterns: Sequence[str], *, as_json: bool) -> None:
+    """Print every probe, what it measures and settles, and how many estimates of the simulator wait for it."""
+    waiting: dict[str, list[str]] = {}
+    for guess in estimates():
+        waiting.setdefault(guess.probe, []).append(f"{guess.where}: {guess.what}")
+    probes = choose(patterns)
+    if as_json:
+        names = ("id", "measures", "settles", "unit", "exact", "resolution")
+        rows = [{name: getattr(one, name) for name in names} | {"estimates": waiting.get(one.id, [])} for one in probes]
+        typer.echo(json.dumps(rows))
+        return
+    table = Table("probe", "measures", "settles", "estimates", box=None, pad_edge=False)
+    for one in probes:
+        table.add_row(one.id, escape(one.measures), escape(one.settles), str(len(waiting.get(one.id, [])) or ""))
+    Console().print(table)
+
+
+def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:
+    """Print where two files differ."""
+    one, other = load(a), load(b)
+    found = compare.compare(one, other)
+    typer.echo(json.dumps(plain_value(found)) if as_json else report.write(one, other, found), nl=as_json)
+
+
+def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume: bool, as_json: bool) -> None:
+    """Play probes, and write the file after each.
+
+    Raises:
+        ConfigError: the file is there, or is of another game.
+        GameError: the game cannot be started.
+    """
+    probes = choose(patterns)
+    earlier = _earlier(out, resume=resume)
+    path, name = find(game)
+    screen = stderr_console()
+    screen.print(f"starting {name} in {path}", soft_wrap=True)
+    with started(path, plain()) as connection:
+        said, build, data = version(connection)
+        begun = Calibration(
+            khala=__version__, game=name, version=said, build=build, data_version=data,
+            platform=f"{platform.system()} {platform.machine()}", seed=seed,
+        )  # fmt: skip
+        if earlier and not earlier.is_same_game(begun):
+            raise ConfigError(f"{out} is of {earlier.game} {earlier.version}, seed {earlier.seed}: give another --out")
+        with _progress(screen) as progress:
+            watch = _Watch(progress, probes, earlier)
+            try:
+                done = play(connection, probes, earlier or begun, save=lambda one: one.save(out), watch=watch)
+            except KeyboardInterrupt:
+                screen.print(f"interrupted; what was measured is in {out}, and --resume goes on", soft_wrap=True)
+                raise typer.Exit(SIGNALLED + _SIGINT) from None
+    done.save(out)
+    _end(screen, out, done, as_json=as_json)
+
+
+def _earlier(out: Path, *, resume: bool) -> Calibration | None:
+    if resume:
+        return load(out)
+    if out.exists():
+        raise ConfigError(f"{out} is there already: --resume goes on with it, --out names another file")
+    return None
+
+
+def _progress(screen: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=screen)
+
+
+class _Watch:
+    """Moves the bar, and prints each probe when it is done."""
+
+    def __init__(self, progress: Progress, probes: Sequence[Probe], earlier: Calibration | None) -> None:
+        done = earlier.probes if earlier else {}
+        left = [one for one in probes if one.id not in done or done[one.id].failed]
+        self._progress = progress
+        self._bar = progress.add_task("", total=len(left))
+
+    def __call__(self, probe: Probe, found: Measured | None) -> None:
+        if found is None:
+            self._progress.update(self._bar, description=probe.id)
+            return
+        count = len(found.values)
+        said = (
+            f"[red]failed[/]: {escape(found.failed)}" if found.failed else f"{count} values, {found.loops} game loops"
+        )
+        self._progress.print(f"{probe.id}: {said}, {found.run_s:.1f} s", soft_wrap=True)
+        self._progress.advance(self._bar)
+
+
+def _end(screen: Console, out: Path, done: Calibration, *, as_json: bool) -> None:
+    failed = [name for name, one in done.probes.items() if one.failed]
+    seconds = sum(one.run_s for one in done.probes.values())
+    screen.print(f"{len(done.probes)} probes in {seconds:.0f} s: {out}", soft_wrap=True)
+    if as_json:
+        typer.echo(json.dumps({"file": str(out), "probes": len(done.probes), "failed": failed, "run_s": seconds}))
+    if failed:
+        screen.print(f"failed: {', '.join(failed)}; --resume tries them again", soft_wrap=True)
+        raise typer.Exit(FAILED)

@@ -1,0 +1,117 @@
+"""Where two calibrations differ: to the last digit where the game repeats itself, beyond chance where it does not.
+
+Of a random measurement, the means are compared by a permutation test, and p is corrected for all of them (Holm). Above:
+`report`, which words it. Below: `khala.experiment.statistics`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from khala.experiment.statistics import RESAMPLES, Comparison, compare_values, holm
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from khala_bridge.calibrate.record import Calibration, Measured, Values
+
+LEVEL: Final = 0.05
+"""How often two runs of the same game differ in anything random, by chance."""
+FEWEST: Final = 6
+"""Samples of each side for a comparison of means."""
+MOST_COMPARISONS: Final = int(LEVEL * (RESAMPLES + 1) / 2)
+"""With more of them, the least p that a permutation test can find would not be below the level."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One measurement in which two games differ."""
+
+    probe: str
+    name: str
+    unit: str
+    a: Values
+    b: Values
+    test: Comparison | None = None
+    """Of a random one: the effect is the mean of `b` minus that of `a`."""
+    p: float = 0.0
+    """Corrected for many comparisons; 0 for an exact one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """A measurement that only one of the games gave."""
+
+    probe: str
+    name: str
+    only_in_a: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """What a comparison found."""
+
+    exact: int
+    """Measurements compared digit by digit."""
+    random: int
+    """Measurements of which the means were compared."""
+    unused: int
+    """Random ones with too few samples on a side."""
+    differences: tuple[Difference, ...]
+    missing: tuple[Missing, ...]
+    not_compared: dict[str, str]
+    """Probes that failed, or that a file does not have, with the reason."""
+
+
+def compare(a: Calibration, b: Calibration) -> Compared:
+    """Compare two calibrations; differences are in the order of the probes of `a`."""
+    found: list[Difference] = []
+    random: list[Difference] = []
+    missing: list[Missing] = []
+    exact = unused = 0
+    both = {name: (one, b.probes[name]) for name, one in a.probes.items() if name in b.probes}
+    fit = {name: pair for name, pair in both.items() if not (pair[0].failed or pair[1].failed)}
+    for probe, (one, other) in fit.items():
+        missing += _missing(probe, one, other)
+        for name in one.values.keys() & other.values.keys():
+            difference = Difference(probe, name, one.unit, one.values[name], other.values[name])
+            if one.exact:
+                exact += 1
+                if abs(difference.a.mean - difference.b.mean) > max(one.resolution, 1e-6):
+                    found.append(difference)
+            elif min(difference.a.n, difference.b.n) < FEWEST:
+                unused += 1
+            else:
+                random.append(difference)
+    found += _beyond_chance(random)
+    order = {name: rank for rank, name in enumerate(a.probes)}
+    return Compared(
+        exact=exact,
+        random=len(random),
+        unused=unused,
+        differences=tuple(sorted(found, key=lambda one: (order[one.probe], one.name))),
+        missing=tuple(missing),
+        not_compared=dict(_not_compared(a, b)),
+    )
+
+
+def _beyond_chance(random: list[Difference]) -> Iterator[Difference]:
+    tests = [compare_values(one.b.samples, one.a.samples) for one in random]
+    for one, test, p in zip(random, tests, holm([test.p for test in tests]), strict=True):
+        if p is not None and p <= LEVEL:
+            yield Difference(one.probe, one.name, one.unit, one.a, one.b, test, p)
+
+
+def _missing(probe: str, one: Measured, other: Measured) -> Iterator[Missing]:
+    for name in sorted(one.values.keys() ^ other.values.keys()):
+        yield Missing(probe, name, name in one.values)
+
+
+def _not_compared(a: Calibration, b: Calibration) -> Iterator[tuple[str, str]]:
+    for name in dict.fromkeys((*a.probes, *b.probes)):
+        for which, probes in (("A", a.probes), ("B", b.probes)):
+            if name not in probes:
+                yield name, f"not in {which}"
+            elif probes[name].failed:
+                yield name, f"failed in {which}: {probes[name].failed}"

@@ -1,0 +1,97 @@
+"""A comparison of two calibrations in Markdown, ready for an issue. It decides nothing; `compare` does."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from khala.calibrate.estimates import estimates
+from khala.experiment.numbers import difference_with, number, p_value
+from khala_bridge.calibrate.catalogue import PROBES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from khala.calibrate.compare import Compared, Difference
+    from khala_bridge.calibrate.record import Calibration
+
+MOST_ROWS = 40
+"""Of one probe in the report; the files have all."""
+
+
+def write(a: Calibration, b: Calibration, found: Compared) -> str:
+    """Return the report."""
+    return "\n".join([*_head(a, b, found), *_differences(found), *_missing(found), *_estimates(found)]) + "\n"
+
+
+def _head(a: Calibration, b: Calibration, found: Compared) -> Iterator[str]:
+    yield "# Calibration: two games compared\n"
+    yield "| | game | version | build | data | seed | platform | Khala |\n|---|---|---|---|---|---|---|---|"
+    for name, one in (("A", a), ("B", b)):
+        data = one.data_version[:8]
+        cells = (name, one.game, one.version, one.build, data, one.seed, one.platform, one.khala)
+        yield f"| {' | '.join(map(str, cells))} |"
+    yield ""
+    yield (
+        f"{found.exact} measurements that the game repeats were compared digit by digit, and {found.random} that have "
+        f"chance in them by their means (permutation test, Holm's correction, level 5 %). "
+        f"**{len(found.differences)} differ.**\n"
+    )
+    if found.unused:
+        yield f"{found.unused} with chance in them have too few samples to be compared.\n"
+    yield from (f"* `{name}` was not compared: {why}" for name, why in found.not_compared.items())
+
+
+def _differences(found: Compared) -> Iterator[str]:
+    about = {probe.id: probe for probe in PROBES}
+    for name, group in groupby(found.differences, key=lambda one: one.probe):
+        rows = list(group)
+        yield f"\n## `{name}`: {len(rows)}\n"
+        if name in about:
+            yield f"{about[name].measures} Settles: {about[name].settles}\n"
+        yield from (_exact if rows[0].test is None else _random)(rows)
+        if len(rows) > MOST_ROWS:
+            yield f"\n… and {len(rows) - MOST_ROWS} more."
+
+
+def _exact(rows: list[Difference]) -> Iterator[str]:
+    yield f"| | A | B | B - A ({rows[0].unit}) |\n|---|---:|---:|---:|"
+    for row in rows[:MOST_ROWS]:
+        yield f"| {row.name} | {number(row.a.mean)} | {number(row.b.mean)} | {_signed(row.b.mean - row.a.mean)} |"
+
+
+def _random(rows: list[Difference]) -> Iterator[str]:
+    yield f"| | A | B | B - A ({rows[0].unit}), 95 % | p, corrected |\n|---|---:|---:|---:|---:|"
+    for row in rows[:MOST_ROWS]:
+        assert row.test is not None
+        sides = (f"{number(side.mean)} (n = {side.n}, sd {number(side.sd)})" for side in (row.a, row.b))
+        yield f"| {row.name} | {' | '.join(sides)} | {difference_with(row.test.effect)} | {p_value(row.p)} |"
+
+
+def _signed(value: float) -> str:
+    return number(value, signed=True)
+
+
+def _missing(found: Compared) -> Iterator[str]:
+    if found.missing:
+        yield "\n## Measured in one game only\n"
+    for probe, group in groupby(found.missing, key=lambda one: one.probe):
+        rows = list(group)
+        for which, of_a in (("A", True), ("B", False)):
+            if names := [row.name for row in rows if row.only_in_a is of_a]:
+                more = f" and {len(names) - MOST_ROWS} more" if len(names) > MOST_ROWS else ""
+                yield f"* `{probe}`, only {which}: {', '.join(names[:MOST_ROWS])}{more}"
+
+
+def _estimates(found: Compared) -> Iterable[str]:
+    """Name what of the simulator is a guess that these differences could settle."""
+    probes = {one.probe for one in found.differences}
+    concerned = [one for one in estimates() if one.probe in probes]
+    if not concerned:
+        return []
+    rows = [f"| `{one.probe}` | {one.where} | {one.what} |" for one in concerned]
+    return [
+        "\n## Estimates of the simulator that these probes settle\n",
+        "| probe | where | what |\n|---|---|---|",
+        *rows,
+    ]
