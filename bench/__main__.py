@@ -51,13 +51,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.words and given.words[0] in TOOLS:
         return TOOLS[given.words[0]](given.words[1:]) or 0
-    names = list(itertools.takewhile(lambda word: not word.startswith("-"), given.words))
+    names = list(itertools.takewhile(lambda word: word in {*KEPT, *PRINTED}, given.words))
     options = given.words[len(names) :]
-    if unknown := [name for name in names if name not in (*KEPT, *PRINTED)]:
-        known = ", ".join((*KEPT, *PRINTED, *TOOLS))
-        parser.error(f"there is no measurement {unknown[0]!r}; there are {known}")
     if options and len(names) != 1:
-        parser.error(f"{options[0]} is an option of one measurement: name it before, such as `turn {options[0]}`")
+        if options[0].startswith("-"):
+            parser.error(f"{options[0]} is an option of one measurement: name it before, such as `turn {options[0]}`")
+        known = ", ".join((*KEPT, *PRINTED, *TOOLS))
+        parser.error(f"there is no measurement {options[0]!r}; there are {known}")
     if given.times is not None and given.times < 1:
         parser.error(f"{given.times} times is no measurement: give 1 or more")
     keeping = not names or given.times is not None or given.out is not None

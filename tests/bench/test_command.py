@@ -73,7 +73,8 @@ def test_a_measurement_gives_figures_of_names_of_their_own(name: str) -> None:
 def test_a_named_measurement_runs_as_it_always_did_with_its_own_options(ran: list[Any]) -> None:
     assert command.main(["turn", "--tls", "--times", "9"]) == 0
     assert command.main(["bus", "soak"]) == 0
-    assert ran == [("turn", ("--tls", "--times", "9")), ("bus", ()), ("soak", ())]
+    assert command.main(["floors", "layers:2s3z:8"]) == 0
+    assert ran == [("turn", ("--tls", "--times", "9")), ("bus", ()), ("soak", ()), ("floors", ("layers:2s3z:8",))]
 
 
 def test_figures_of_several_runs_in_turns_go_into_a_file(ran: list[Any], tmp_path: Path) -> None:
@@ -117,6 +118,7 @@ def test_without_names_all_is_measured_and_the_figures_are_kept(
     ("words", "said"),
     [
         (["nothing"], "there is no measurement 'nothing'; there are yardstick, turn"),
+        (["turn", "bus", "nothing"], "there is no measurement 'nothing'; there are yardstick, turn"),
         (["turn", "bus", "--tls"], "--tls is an option of one measurement: name it before, such as `turn --tls`"),
         (["--times", "2", "soak"], "soak has no figures that can be kept: run it without --times and --out"),
         (["--times", "0", "turn"], "0 times is no measurement"),
