@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from functools import partial
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +17,11 @@ from khala_simulator.compiled import declare
 from khala_simulator.maps.game_map import load_map
 from tests.simulator.engine import random_orders
 from tests.simulator.engine.side_by_side import differences, first_difference
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_simulator.world.world import World
 
 TASKS = tuple(f"llm_pysc2/pvz_task{number}_level1" for number in range(1, 9))
 BATTLES = (
@@ -45,6 +53,23 @@ def test_every_system_that_is_said_to_be_compiled_is() -> None:
 @pytest.mark.parametrize("name", ["llm_smac/2s3z", "llm_pysc2/pvz_task6_level1"])
 def test_a_battle_is_the_same(name: str) -> None:
     assert first_difference(partial(battle, name, 1), 300, every=8) is None
+
+
+def by_pickle(world: World) -> World:
+    """Return a copy that went through bytes."""
+    copied: World = pickle.loads(pickle.dumps(world))
+    return copied
+
+
+@built
+@pytest.mark.parametrize("copied", [copy.deepcopy, by_pickle])
+def test_a_copy_of_a_world_in_battle_plays_on_as_it_does(copied: Callable[[World], World]) -> None:
+    world = battle("llm_smac/2s3z", 1)
+    tick.advance(world, 60)
+    other = copied(world)
+    tick.advance(world, 60)
+    tick.advance(other, 60)
+    assert other.digest() == world.digest()
 
 
 @built
