@@ -44,6 +44,9 @@ DEFINITION: Final = '''\
 # Written by khala_simulator.compiled.declare from world.columns.
 """The world's columns as pointers, for compiled systems."""
 cimport numpy as cnp
+from libc.string cimport memcpy
+
+from khala_simulator.world.columns import COLUMNS
 
 cnp.import_array()
 
@@ -53,10 +56,20 @@ cdef class Columns:
         """Return what makes None: a copy of a world binds its own arrays."""
         return type(None), ()
 
+    def clear(self, Py_ssize_t slot):
+        """Make a slot unused."""
+        cdef Py_ssize_t i, size
+        cdef cnp.ndarray column, empty
+        for i in range(len(NAMES)):
+            column, empty = self.arrays[i + 1], EMPTY[i]
+            size = cnp.PyArray_STRIDE(column, 0)
+            memcpy(<char*>cnp.PyArray_DATA(column) + slot * size, cnp.PyArray_DATA(empty), size)
 
-NAMES = (
+
+cdef tuple NAMES = (
 {names}
 )
+cdef tuple EMPTY = tuple(COLUMNS[name].make(1) for name in NAMES)
 
 
 cdef Columns bound(object world):
