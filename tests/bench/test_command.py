@@ -23,6 +23,7 @@ SHORT = {
     "bus": ("--agents", "1", "--scale", "0.05"),
     "simulator_engine": ("--seconds", "0.05", "--maps", "llm_smac/2s3z", "--sizes", "10"),
     "engines": ("--rounds", "1", "--seconds", "0.05"),
+    "simulator_env": ("layers:2s3z:8", "--steps", "20"),
     "floors": ("layers:2s3z:8", "--rounds", "1", "--steps", "20"),
     "start": ("--times", "1"),
     "observe": (),
