@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow cover test-all demo bench scenarios docs golden page picture clean
+.PHONY: help install install-tests check format types test pysc2 slow numpy cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -34,7 +34,7 @@ ENGINE := simulator/pyproject.toml simulator/setup.py $(wildcard simulator/khala
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group experiments --group page
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
 	@touch $@
 
 install: .venv/.ready ## Install what is needed to play into .venv
@@ -59,6 +59,9 @@ pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the 
 slow: install-tests ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
+numpy: install-tests ## The tests of the simulator's rules without the compiled systems
+	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) tests/simulator/engine tests/simulator/api
+
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
 	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
@@ -80,7 +83,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  version=$$($$python -c 'import platform; print(platform.python_version())'); \
 	  echo "== Python $$version"; \
 	  export UV_PROJECT_ENVIRONMENT=.venv-$$version; \
-	  $(UV) sync --quiet --frozen --python $$python --group experiments && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
+	  $(UV) sync --quiet --frozen --python $$python --group env --group experiments --group tools && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
 page: install ## Build khala/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
@@ -89,6 +92,9 @@ page: install ## Build khala/view/assets/index.html, the page of `khala view`, f
 
 bench: install ## Measure what docs/measurements.md claims
 	$(RUN)python -m bench
+
+limits: install ## Fail if a ratio that is measured within one run is beyond its limit
+	$(RUN)python -m bench limits
 
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
 	$(RUN)python -m bench.scenarios

@@ -1,7 +1,7 @@
 """Ask a game what its units can do, as every observation does, and measure how long that takes.
 
-    python bench/abilities.py            a table
-    python bench/abilities.py --json     one JSON object on stdout
+    python -m bench.abilities            a table
+    python -m bench.abilities --json     one JSON object on stdout
 
 The simulator runs in its own process, and PySC2 asks it over its websocket, as in a match: the base and the
 workers that a game of Simple64 begins with, plus 30 and 100 units of sixteen types. The time is that of
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import debug_pb2
 
+from bench.figures import Figure
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.game.game import GameConfig
 from khala_bridge.game.pysc2_game import PySC2Game
@@ -28,6 +29,8 @@ from khala_bridge.task.maps import known_maps
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from khala_bridge.state import Snapshot
 
 ARMY = (
@@ -74,6 +77,12 @@ def _with_army(game: PySC2Game, size: int) -> Snapshot:
     game._env._controllers[0].debug(commands)  # noqa: SLF001  # the only way to units that the map does not have
     (turn,) = game.act([RawExecutor().plan([], now, 2)])
     return turn.snapshot
+
+
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield what asking for the abilities of all own units costs."""
+    for row in found:
+        yield Figure(f"abilities of {row['units']} units", "ms", (row["median_ms"],))
 
 
 def main() -> None:

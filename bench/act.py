@@ -16,11 +16,12 @@ import argparse
 import json
 import statistics
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.figures import Figure
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import general
@@ -30,6 +31,9 @@ from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig
 from khala_bridge.task.maps import MapSpec
 from khala_protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 AGENT = "Commander"
 TEAMS = ("Stalker", "Zealot", "Immortal", "HighTemplar", "Sentry")
@@ -134,12 +138,19 @@ def measure(calls: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield what each kind of reply costs."""
+    for name, row in found.items():
+        yield Figure(f"a reply to commands, {name}", "ms of processor time", (row["all_ms"],))
+
+
 def main() -> None:
     """Print the figures."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    given = options.parse_args()
     results = {"right": measure(CALLS), "wrong": measure(WRONG)}
-    if options.parse_args().json:
+    if given.json:
         print(json.dumps(results))
         return
     columns = list(results["right"])

@@ -1,8 +1,8 @@
 """One joint round over the bus: the host sends every agent an observation, and every agent replies.
 
-    python bench/bus.py                      a table
-    python bench/bus.py --tls                the same over TLS, next to it
-    python bench/bus.py --json               one JSON object on stdout
+    python -m bench.bus                      a table
+    python -m bench.bus --tls                the same over TLS, next to it
+    python -m bench.bus --json               one JSON object on stdout
 
 It compares, in turns of a few rounds so that a noisy machine treats them the same:
     bus    `khala_protocol.bus`: observations as STATE, replies as SPEECH
@@ -27,20 +27,26 @@ import time
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import zenoh
 from zenoh.handlers import Callback
 
+from bench.figures import Figure
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig, settings
 from khala_protocol.bus.zenoh import ZenohBus, open_bus
 from khala_protocol.certificates import files_of, make_authority
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 ROUNDS = {1: 400, 8: 200, 32: 120, 128: 60}
 TURN_ROUNDS = 10
 WARM_UP_ROUNDS = 10
 TIMEOUT_S = 60.0
+MOST_OVER_RAW = 1.5
+"""How many times as long as over plain Zenoh a round may take."""
 KEYS = "KHALA_TLS"
 HEAD_BYTES = 8
 BLOCK = zenoh.CongestionControl.BLOCK  # raw publishers have no cache to repair losses of DROP
@@ -289,9 +295,15 @@ async def warm_up(host: Host) -> None:
 
 
 async def start(stack: AsyncExitStack, *arguments: str) -> str:
-    """Start this file as another process; return its first line."""
+    """Start this module as another process; return its first line."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, __file__, "--process", *arguments, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+        sys.executable,
+        "-m",
+        "bench.bus",
+        "--process",
+        *arguments,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
     )
 
     async def stop() -> None:
@@ -339,7 +351,25 @@ def summary(agents: int, separate: bool, took_ms: dict[str, list[float]]) -> dic
         "p99_ms": {kind: statistics.quantiles(times, n=100)[98] for kind, times in took_ms.items()},
         "ratio_to_raw": median["bus"] / median["raw"],
         "ratio_to_bare": median["bus"] / median["bare"],
+        "ratios_to_raw": ratios(took_ms["bus"], took_ms["raw"]),
     }
+
+
+def ratios(over_ms: list[float], under_ms: list[float]) -> list[float]:
+    """Return the ratio of each turn of rounds, whose two sides were measured one after the other."""
+    turns = range(0, len(over_ms), TURN_ROUNDS)
+    return [
+        statistics.median(over_ms[turn : turn + TURN_ROUNDS]) / statistics.median(under_ms[turn : turn + TURN_ROUNDS])
+        for turn in turns
+    ]
+
+
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield what a round takes, and how many times as long as over plain Zenoh."""
+    for row in found["results"]:
+        place = f"{row['agents']} agents, {'tls' if row['tls'] else 'tcp'}, router {row['router']}"
+        yield Figure(f"a round, {place}", "ms", (row["median_ms"]["bus"],))
+        yield Figure(f"ours / plain Zenoh, {place}", "times", tuple(row["ratios_to_raw"]), limit=MOST_OVER_RAW)
 
 
 HEADER = "link router   agents rounds |  bus ms    p99 |  raw ms    p99 | bare ms    p99 | bus/raw bus/bare"

@@ -1,7 +1,7 @@
 """Make observations and joint actions of armies, and measure the cost of a turn between PySC2 and the bus.
 
-    python bench/observe.py            a table
-    python bench/observe.py --json     one JSON object on stdout
+    python -m bench.observe            a table
+    python -m bench.observe --json     one JSON object on stdout
 
 `observe` is everything from a snapshot to views and text of one agent with its teams, all units in sight of all
 teams, half of them hurt since the turn before. `unseen` is what a snapshot costs at which no agent looks. `act` is
@@ -20,11 +20,12 @@ import gc
 import json
 import statistics
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.figures import Figure
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.functions import general
 from khala_bridge.knowledge import knowledge
@@ -33,6 +34,9 @@ from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 from khala_orchestrator.config import load_task
 from khala_protocol.speech import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 BATTLES = {  # task: own units, enemy units
     "2s3z": ({"Stalker": 2, "Zealot": 3}, {"Stalker": 2, "Zealot": 3}),
@@ -201,12 +205,21 @@ def measure(name: str) -> dict[str, Any]:
     }
 
 
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield what the observation of a side costs, and what is done with the replies to it."""
+    for name, row in found.items():
+        yield Figure(f"views and texts, {name}", "ms", (row["observe_ms"],))
+        if row["act_ms"] != "":
+            yield Figure(f"replies to commands, {name}", "ms", (row["act_ms"],))
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    given = options.parse_args()
     results = {name: measure(name) for name in BATTLES}
     results |= {"12 in one place": measure_full_game(1), "12 at four": measure_full_game(4)}
-    if options.parse_args().json:
+    if given.json:
         print(json.dumps(results))
         return
     columns = list(results["2s3z"])

@@ -14,11 +14,12 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
+from bench.figures import Figure
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
@@ -28,7 +29,7 @@ from khala_simulator.tick import advance, new_game
 from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 LOOPS_PER_STEP = 8
 ARMY_SIZES = (10, 25, 50, 100, 200, 400)
@@ -96,6 +97,13 @@ def resident_mb() -> float:
     """Return the resident memory of this process."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.partition("VmRSS:")[2].split()[0]) / 1024
+
+
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield the speed of each battle, and the memory after all."""
+    for name, row in found["rows"].items():
+        yield Figure(f"loops a second, {name}", "loops", (row["loops_per_s"],), "more")
+    yield Figure("memory after all battles", "MB", (max(row["mb"] for row in found["rows"].values()),))
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from typing import Any
 
 from absl import flags
 
-from bench.simulator_env import make_env
+from bench.env_games import make_env
 from khala_bridge.compat import actions
 from khala_simulator.process.install import install
 

@@ -23,11 +23,12 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 
+from bench.figures import Figure
 from khala_protocol.keys import Topic, parse
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
 GOAL_HELP_S, GOAL_MATCH_S, GOAL_MB = 0.25, 2.5, 350
 IMPORTS = {
@@ -114,6 +115,19 @@ def _name(process: psutil.Process) -> str:
     line = " ".join(process.cmdline())
     known = {"khala_simulator": "game", "khala.spare": "agents", "khala agent": "agents", "khala llm": "endpoint"}
     return next((name for mark, name in known.items() if mark in line), "host")
+
+
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield times, numbers of modules and memory."""
+    yield Figure("khala --help", "s", (found["help"]["wall_s"],))
+    yield Figure("khala --help, processor time", "s", (found["help"]["cpu_s"],))
+    for row in found["imports"]:
+        yield Figure(f"import {row['module']}, processor time", "s", (row["cpu_s"],))
+        yield Figure(f"modules of {row['module']}", "modules", (row["modules"],))
+    yield Figure("a match of one step", "s", (found["match"]["wall_s"],))
+    yield Figure("a match of one step, processor time", "s", (found["match"]["cpu_s"],))
+    yield Figure("until the first observation", "s", (found["match"]["first_s"],))
+    yield Figure("memory of a match of twelve agents", "MB", (sum(row["pss_mb"] for row in found["memory"]),))
 
 
 def main() -> None:

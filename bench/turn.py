@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from bench.figures import Figure
 from bench.original import step_s
 from khala import games
 from khala.children import Children
@@ -293,6 +294,15 @@ def table(rows: list[dict[str, Any]]) -> Table:
         shown.add_row(*(f"{row[column]:.1f}" if isinstance(row[column], float) else str(row[column])
                         for column in columns))  # fmt: skip
     return shown
+
+
+def measures(found: Any) -> Iterator[Figure]:
+    """Yield what a step costs beyond the endpoint's latency."""
+    for row in found["rows"]:
+        place = f"{row['agents']} agents, {row['link'].partition('-')[0]}"
+        yield Figure(f"a step beyond the model, {place}", "ms", (row["over"],))
+        if row["original"]:
+            yield Figure(f"beyond the model / the original's way, {place}", "times", (row["over"] / row["original"],))
 
 
 def main() -> None:

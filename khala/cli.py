@@ -26,6 +26,7 @@ from khala.fork.cli import FORK_EPILOG, fork
 from khala.help import Group
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
+from khala.mcp.cli import MCP_EPILOG, mcp
 from khala.options import (
     Assemble,
     BaseUrl,
@@ -298,6 +299,7 @@ for command, epilog in (
     (watch, None),
     (stop, None),
     (view, VIEW_EPILOG),
+    (mcp, MCP_EPILOG),
     (calibrate, CALIBRATE_EPILOG),
     (doctor, None),
 ):

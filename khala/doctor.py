@@ -132,6 +132,21 @@ def _some(names: Sequence[str]) -> str:
     return f"{len(names)}: {', '.join(names[:8])}{more}" if names else "none"
 
 
+def _engine() -> Iterator[Finding]:
+    from khala_simulator import compiled  # noqa: PLC0415
+
+    try:
+        engine = compiled.engine()
+    except (ImportError, ValueError) as error:
+        yield Finding("engine", "wrong", str(error), f"unset {compiled.VARIABLE}, or install with a C compiler")
+        return
+    if engine == "compiled" or compiled.wanted() == "python":
+        yield Finding("engine", "ok", engine)
+        return
+    advice = "with a C compiler (gcc and libc6-dev) `make install` builds one that is several times faster"
+    yield Finding("engine", "note", engine, advice)
+
+
 def _bus() -> Iterator[Finding]:
     yield Finding("Zenoh", "ok", importlib.metadata.version("eclipse-zenoh"))
     for port, user in PORTS.items():
@@ -181,4 +196,4 @@ def _keys() -> Iterator[Finding]:
         )
 
 
-CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _bus, _keys)
+CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _engine, _bus, _keys)

@@ -44,6 +44,7 @@ async def play(
     gates: Gates = own_turns,
     callers: Mapping[Seat, Policy] = MappingProxyType({}),
     asks: Asks = lambda *_: None,
+    broker: MemoryBroker | None = None,
 ) -> list[Result]:
     """Play a match with its agents in this process.
 
@@ -57,13 +58,14 @@ async def play(
         gates: where requests to models wait for their turn.
         callers: by seat, policies of the caller, in place of its minds.
         asks: is called in each step with the agents that are asked.
+        broker: of the bus, for a caller that listens to it, too.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
     sc2path, name = games.find(game)
     config = config.model_copy(update={"game": name})
-    broker, stop = MemoryBroker(), asyncio.Event()
+    broker, stop = broker or MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
         by_side = await _policies(config, minds, stack, gates, callers)
         if past is not None:

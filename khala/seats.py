@@ -21,6 +21,7 @@ from khala import one_process
 from khala_agents.policy import Policy
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.schedule import StepId
+from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Report, Result
 
@@ -97,6 +98,10 @@ class SeatedMatch:
 
     Its methods are for the event loop in which it was entered. The game stands still between turns, unless the clock is
     `realtime`; then an agent waits for an answer until its deadline, and the others go on.
+
+    Attributes:
+        seats: those that the caller plays.
+        broker: of the bus, for whoever wants to listen to it.
     """
 
     def __init__(
@@ -121,6 +126,7 @@ class SeatedMatch:
             ConfigError: there is no such seat, or nobody decides for an agent.
         """
         self.seats = tuple(seats)
+        self.broker = MemoryBroker()
         _check(config.task, self.seats, minds)
         self._config, self._minds, self._game, self._launched = config, minds, game, launched
         self._sides = {seat.side for seat in self.seats}
@@ -165,6 +171,26 @@ class SeatedMatch:
             return self._ended.popleft()
         return Turn(asked=self._questions.seen(), reports=self._take_reports())
 
+    async def news(self) -> Turn:
+        """Wait until something is new, and return all that there is: for agents of the caller with paces of their own.
+
+        An agent is asked, its time for an answer is over, a step is reported, or an episode has ended. `asked` has
+        every agent that waits for an answer now, one that was returned before as well.
+
+        Raises:
+            KhalaError: as in `turn`.
+        """
+        assert self._playing is not None
+        if not (self._ended or self._playing.done()):
+            await self._questions.changed.wait()
+        self._questions.changed.clear()
+        if self._ended:
+            return self._ended.popleft()
+        if self._playing.done():
+            self._playing.result()
+            return Turn(over=True)
+        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+
     def act(self, seat: Seat, said: Said) -> None:
         """Answer for an agent: with a reply, or a reply with its usage.
 
@@ -183,6 +209,7 @@ class SeatedMatch:
             launched=self._launched,
             callers=callers,
             asks=self._asks,
+            broker=self.broker,
         )
 
     def _asks(self, at: StepId, seats: Sequence[Seat]) -> None:
@@ -191,6 +218,7 @@ class SeatedMatch:
     def _watch(self, message: Wire) -> None:
         if isinstance(message, Report) and message.side in self._sides:
             self._reports.append(message)
+            self._questions.changed.set()
         elif isinstance(message, Result):
             self._results.append(message)
             if len(self._results) == len(self._config.task.per_side()):
@@ -273,6 +301,7 @@ class _OpenQuestions:
         finally:
             if self._open.get(seat) is question:  # it was cancelled: too late, or a newer one is there
                 del self._open[seat]
+                self.changed.set()
 
     def close(self, seat: Seat, said: Said) -> None:
         """Answer a question.

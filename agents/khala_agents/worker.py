@@ -17,6 +17,7 @@ import logging
 from collections import Counter
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 from khala_agents.briefings import Briefings
@@ -28,13 +29,15 @@ from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, BusError, PeerError
-from khala_protocol.messages import Briefing, Observation, Reply, Result, Usage, Wire
+from khala_protocol.messages import Briefing, Reply, Result, Usage, Wire
+from khala_protocol.unread import decode_observation
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Mapping
+    from collections.abc import AsyncIterator, Callable, Mapping
 
     from khala_agents.policy import Decision, Policy, Said
     from khala_protocol.bus import Bus, Sample, Subscription
+    from khala_protocol.messages import Observation
 
 log = logging.getLogger(__name__)
 
@@ -159,7 +162,7 @@ class Worker:
     # --- hearing ------------------------------------------------------------------------------------
 
     async def _hear_briefings(self, links: Links, group: asyncio.TaskGroup) -> None:
-        async for briefing in self._read(Briefing, links.briefings):
+        async for briefing in self._read(partial(decode_as, Briefing), links.briefings):
             newest = self._briefings.newest
             if newest is not None and briefing.episode <= newest.episode:  # another host, with steps from 0 perhaps
                 self._began_again, self._last_result = True, None
@@ -174,12 +177,12 @@ class Worker:
             await self._pictures.put(sample.payload)
 
     async def _hear_results(self, links: Links) -> None:
-        async for result in self._read(Result, links.results):
+        async for result in self._read(partial(decode_as, Result), links.results):
             self._last_result = result.episode
             self._end_if_over()
 
     async def _hear_observations(self, links: Links, group: asyncio.TaskGroup) -> None:
-        async for observation in self._read(Observation, links.observations):
+        async for observation in self._read(decode_observation, links.observations):
             at = (observation.episode, observation.step)
             if not self._is_new(observation):
                 await self._repeat(at, links)
@@ -197,11 +200,11 @@ class Worker:
             return observation != newest
         return (observation.episode, observation.step) > (newest.episode, newest.step)
 
-    async def _read(self, kind: type[M], samples: Subscription[Sample]) -> AsyncIterator[M]:
-        """Yield the messages of this kind, without anything else that arrives."""
+    async def _read(self, decode: Callable[[bytes], M], samples: Subscription[Sample]) -> AsyncIterator[M]:
+        """Yield the messages that can be decoded, without anything else that arrives."""
         async for sample in samples:
             try:
-                yield decode_as(kind, sample.payload)
+                yield decode(sample.payload)
             except PeerError as error:
                 log.warning("agent %s: %s is dropped: %s", self._name, sample.key, error)
 

@@ -101,16 +101,17 @@ class Camera:
         scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
         return WorldPoint(point.x / scale - half + self.x, self.y + half - point.y / scale)
 
-    def sees(self, places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which of these world positions are on the screen: (n, 2) → (n,)."""
-        half = CAMERA_WIDTH / 2
-        right, down = places[:, 0] - self.x, self.y - places[:, 1]
-        seen: NDArray[np.bool_] = (right >= -half) & (right < half) & (down >= -half) & (down < half)
-        return seen
-
     def bounds(self, world: MapFrame) -> tuple[float, float, float, float]:
         """Return the part of the screen that is on the playable map: x0, y0, x1, y1 in screen cells."""
         left, bottom, right, top = world.playable
         x0, y0 = self.screen(left, top)
         x1, y1 = self.screen(right, bottom)
         return max(0.0, x0), max(0.0, y0), min(self.size, x1), min(self.size, y1)
+
+
+def sees(centres: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which world positions cameras at these centres have on their screens: (t, 2), (n, 2) → (t, n)."""
+    half = CAMERA_WIDTH / 2
+    right, down = places[:, 0] - centres[:, :1], centres[:, 1:] - places[:, 1]
+    seen: NDArray[np.bool_] = (right >= -half) & (right < half) & (down >= -half) & (down < half)
+    return seen

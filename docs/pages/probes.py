@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 def page() -> str:
     """Return the table of probes, the estimates by probe, and the estimates that none settles."""
-    settled = [(code(one.probe), one.where, one.what) for one in estimates() if one.probe]
-    order = {code(probe.id): rank for rank, probe in enumerate(PROBES)}
+    order = {probe.id: rank for rank, probe in enumerate(PROBES)}
+    settled = sorted((one for one in estimates() if one.probe), key=lambda one: (order[one.probe], one.where))
     return join(
         head("Probes", "`bridge/khala_bridge/calibrate/probes` and the simulator's own lists of estimates"),
         "What `khala calibrate` measures, on the simulator and on [the real game](../how-to/real-game.md) alike. How "
@@ -26,7 +26,7 @@ def page() -> str:
         table(("probe", "measures", "settles", "unit", "kind", "map"), [_row(probe) for probe in PROBES]),
         "## Estimates that they settle",
         "What the simulator only guesses, and the probe whose numbers of the real game would replace the guess.",
-        table(("probe", "where", "estimate"), sorted(settled, key=lambda row: (order[row[0]], row[1]))),
+        table(("probe", "where", "estimate"), [(code(one.probe), one.where, one.what) for one in settled]),
         "## Estimates that no probe settles",
         f"Those of single maps: {of_maps()}. Of the rest:",
         table(

@@ -45,8 +45,7 @@ class _Episode:
     decided: set[int] = field(default_factory=set)
 
     def add(self, report: Report) -> None:
-        known = report.killed_value is not None and report.lost_value is not None
-        self.values[report.step] = (report.killed_value or 0.0) - (report.lost_value or 0.0) if known else None
+        self.values[report.step] = value_of(report)
         for agent in report.agents:
             if agent.status in COUNTED:
                 self.decided.add(report.step if agent.asked_step is None else agent.asked_step)
@@ -72,6 +71,13 @@ class _Episode:
         if result is None:
             return None
         return [*[0.0] * (len(steps) - 1), result.killed.value - result.lost.value]
+
+
+def value_of(report: Report) -> float | None:
+    """Return value destroyed - value lost in a step, in minerals + vespene; None if the report does not say."""
+    if report.killed_value is None or report.lost_value is None:
+        return None
+    return report.killed_value - report.lost_value
 
 
 def rewards(recording: Recording, gamma: float) -> Mapping[tuple[str, int], Mapping[int, Reward]]:

@@ -46,6 +46,7 @@ export class Match {
   async open(): Promise<void> {
     try {
       await this.take(this.run, `runs/${this.id}`);
+      if (!this.line.value && this.grows()) return; // `grow` asks when the episode has begun
       await Promise.all([this.take(this.timeline, `${this.path}/timeline`), this.takeTerrain()]);
     } catch (error) {
       if (!this.grows()) this.trouble.value = (error as Error).message;
@@ -57,7 +58,8 @@ export class Match {
     this.lag.value = progress.live ? progress.lag_s : null;
     const known = this.timeline.value;
     const ended = !progress.live && progress.indexed >= 1; // the last line that comes
-    if (ended || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
+    if (ended || !this.line.value || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
+    if (!this.line.value) return;
     if (known && !ended && progress.episode === this.episode && known.steps.length >= progress.steps) return;
     await this.take(this.timeline, `${this.path}/timeline`).catch(() => undefined); // its first step is not read yet
     if (!this.terrain.value) await this.takeTerrain();

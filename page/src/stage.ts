@@ -48,17 +48,21 @@ export function toggleLayer(layer: Layer): void {
 
 /** Begin a page that follows its address, and whose address follows it. */
 export function begin(): void {
-  const read = () => void visit(readHash(location.hash));
-  addEventListener("hashchange", read);
-  read();
+  // by the event's own address: that of the page may have been written over before the event came
+  addEventListener("hashchange", (event) => void visit(readHash(new URL(event.newURL).hash)));
+  void visit(readHash(location.hash));
   clock.run();
   effect(keepSpan);
   effect(goToPending);
   effect(keepAddress);
 }
 
-/** Show what a link says. */
+let visits = 0;
+
+/** Show what a link says; a later link overtakes one whose matches are still being opened. */
 export async function visit(to: Link): Promise<void> {
+  const visit = ++visits;
+  clearTimeout(writing);
   const wanted = [to.a && `${to.a} ${to.e}`, to.b && `${to.b} ${to.eb}`].filter(Boolean).join("|");
   const open = matches.value.map((m) => `${m.id} ${m.episode}`).join("|");
   batch(() => {
@@ -69,6 +73,7 @@ export async function visit(to: Link): Promise<void> {
     clock.axis.value = to.by;
   });
   if (wanted !== open) await openMatches(to);
+  if (visit !== visits) return;
   pending = to.s;
   goToPending();
 }

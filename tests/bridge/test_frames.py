@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from khala_bridge.compat import features, point
-from khala_bridge.frames import Camera, MapFrame, MinimapPoint, ScreenPoint, WorldPoint
+from khala_bridge.frames import Camera, MapFrame, MinimapPoint, ScreenPoint, WorldPoint, sees
 
 WORLD = st.floats(0, 200, allow_nan=False)
 MAPS = (MapFrame(32, 32, (0, 0, 32, 32)), MapFrame(96, 60, (0, 23, 96, 52)), MapFrame(88, 96, (10, 8, 80, 90)))
@@ -32,7 +32,8 @@ def test_a_camera_sees_what_is_inside_of_its_frame(cx: float, cy: float, x: floa
     camera = Camera(cx, cy)
     screen = camera.screen(x, y)
     if all(abs(value - edge) > 1e-9 for value in screen for edge in (0, 24)):
-        assert camera.sees(np.array([[x, y]])).tolist() == [0 <= screen.x < 24 and 0 <= screen.y < 24]
+        shown = sees(np.array([[cx, cy]]), np.array([[x, y]]))
+        assert shown.tolist() == [[0 <= screen.x < 24 and 0 <= screen.y < 24]]
 
 
 def test_the_screen_has_y_down_and_its_centre_in_the_middle() -> None:

@@ -67,6 +67,8 @@ async def test_a_turn_asks_all_agents_of_the_caller_and_reports_what_became_of_t
         match.act(STALKERS, "Stalker-1: <Attack_Unit(0x1)>")
         rest = await match.turn()
         assert list(rest.asked) == [ZEALOTS]
+        with pytest.raises(NotAsked, match=r"^blue/Stalkers waits for no answer, blue/Zealots does: `turn` says"):
+            match.act(STALKERS, "")
         match.act(ZEALOTS, "Zealot-1: <Hold_Position()>")
         second = await match.turn()
         (report,) = second.reports
@@ -95,20 +97,29 @@ async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
 
 
 @game
+async def test_news_are_each_agent_that_is_asked_or_no_longer_waited_for_and_each_step() -> None:
+    hasty = change(load_task("2s3z_pair"), max_steps=1, max_wait_s=0.5)
+    told: list[Turn] = []
+    async with SeatedMatch(MatchConfig(task=hasty, run="seats"), [STALKERS, ZEALOTS]) as match:
+        while not told or not told[-1].over:
+            told.append(await match.news())
+            if STALKERS in told[-1].asked:
+                match.act(STALKERS, "")
+    waiting = [tuple(turn.asked) for turn in told]
+    assert any(STALKERS in seats for seats in waiting)
+    assert any(ZEALOTS in seats for seats in waiting)
+    assert waiting[-1] == ()
+    (report,) = [report for turn in told for report in turn.reports]
+    assert {one.agent: one.status == "ok" for one in report.agents} == {"Stalkers": True, "Zealots": False}
+    assert len(told[-1].results) == 1
+
+
+@game
 async def test_pictures_of_an_observation_are_handed_out_with_it() -> None:
     async with SeatedMatch(config(max_steps=1, images="screen"), [STALKERS, ZEALOTS]) as match:
         seen = (await match.turn()).asked[STALKERS]
     assert [len(picture) for picture in seen.pictures] == [ref.bytes for ref in seen.observation.images]
     assert seen.pictures
-
-
-@game
-async def test_a_seat_that_waits_for_no_answer_cannot_act() -> None:
-    async with SeatedMatch(config(max_steps=1), [STALKERS, ZEALOTS]) as match:
-        await match.turn()
-        match.act(STALKERS, "")
-        with pytest.raises(NotAsked, match=r"^blue/Stalkers waits for no answer, blue/Zealots does: `turn` says"):
-            match.act(STALKERS, "")
 
 
 @pytest.mark.slow

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import inspect
 import itertools
+import json
 import os
 import re
 import shlex
 import shutil
+import tomllib
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -54,10 +56,22 @@ GOLDEN = ROOT / "tests" / "khala" / "golden.mcap"
 FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 MODELS: dict[str, type[BaseModel]] = {"yaml task": TaskConfig, "yaml model": ModelConfig, "yaml agents": AgentsFile}
-LANGUAGES = {"python", "python compile", "bash", "console", "text", "json", "yaml scenario", "yaml actions", *MODELS}
+LANGUAGES = {
+    "python",
+    "python compile",
+    "bash",
+    "console",
+    "text",
+    "json",
+    "json client",
+    "toml client",
+    "yaml scenario",
+    "yaml actions",
+    *MODELS,
+}
 OTHER_PROGRAMS = {
-    "cd", "cp", "curl", "docker", "export", "git", "kubectl", "make", "mkdir", "pip", "ray", "sbatch", "scp", "source",
-    "ssh",
+    "cd", "claude", "cp", "curl", "docker", "export", "git", "inspect", "kubectl", "make", "mkdir", "pip", "ray",
+    "sbatch", "scp", "source", "ssh",
 }  # fmt: skip
 ALONE = {"khala-agent": "agent", "khala-llm": "llm", "khala-sc2": "sc2"}
 """The commands of a package that is installed without the others, and what `khala` calls them."""
@@ -273,6 +287,16 @@ def test_the_mistake_in_the_tutorial_is_reported_as_it_says() -> None:
 @pytest.mark.parametrize("block", blocks("json"))
 def test_a_message_on_a_page_is_one_of_the_protocol(block: Block) -> None:
     assert decode(block.text.encode()).run
+
+
+@pytest.mark.parametrize("block", blocks("json client", "toml client"))
+def test_a_file_of_an_mcp_client_starts_a_command_that_can_be_given(block: Block) -> None:
+    read = tomllib.loads if block.info.startswith("toml") else json.loads
+    (servers,) = read(block.text).values()
+    for server in servers.values():
+        if "url" not in server:
+            assert Path(server["command"]).name == "khala"
+            parse(server["args"])
 
 
 def test_every_block_says_what_it_is() -> None:

@@ -53,12 +53,12 @@ class Action(Frozen):
     produces: str | None = None
     """Unit type or upgrade that it produces."""
 
-    @property
+    @functools.cached_property
     def named(self) -> int:
         """How many of its arguments name the units that carry it out."""
         return {"unit": 1, "two_units": 2}.get(self.subject, 0)
 
-    @property
+    @functools.cached_property
     def target_kind(self) -> ArgKind | None:
         """The kind of the target argument; None for an action without a target."""
         return self.args[self.named] if len(self.args) > self.named else None
@@ -68,7 +68,7 @@ class Action(Frozen):
         """How it is written: `<Attack_Unit(tag)>`."""
         return f"<{self.name}({', '.join(self.args)})>"
 
-    @property
+    @functools.cached_property
     def pysc2(self) -> Function | None:
         """The function that it ends in."""
         return None if self.function is None else functions()[self.function]

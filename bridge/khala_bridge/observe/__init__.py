@@ -1,7 +1,8 @@
 """What agents see: units → teams → views → text and pictures.
 
     observer   runs all of it, snapshot after snapshot        stages      a team's stage in its task
-    scene      the units on each team's screen                body        the part of a unit's view that all share
+    scene      the units on each team's screen                looks       who is on which screen, for all teams
+    body       the part of a unit's view that all share
     events     changes since the snapshot before              chronicle   a side's memory of an episode
     offers     possible actions, and why not the others       side, landmarks   for agents of the whole side
     observation   all of this as a value                      text, image  in words; in pictures

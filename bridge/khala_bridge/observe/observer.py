@@ -213,7 +213,8 @@ class _Moment:
     @cached_property
     def scene(self) -> Scene:
         """The scene."""
-        return Scene(self.snapshot, self.task.frames)
+        teams = (team for teams in self.teams.values() for team in teams)
+        return Scene(self.snapshot, self.task.frames, teams)
 
     @cached_property
     def album(self) -> Album | None:

@@ -26,6 +26,7 @@ from khala_bridge.frames import CAMERA_WIDTH, Camera
 from khala_bridge.observe.arguments import Around
 from khala_bridge.observe.body import body, rounded
 from khala_bridge.observe.events import Witnessed
+from khala_bridge.observe.looks import BodyArrays, looks
 from khala_bridge.observe.observation import TeamObservation
 from khala_bridge.observe.offers import Possible
 from khala_bridge.state import Alliance
@@ -33,23 +34,19 @@ from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from typing import TypeAlias
-
-    from numpy.typing import NDArray
+    from collections.abc import Iterable, Sequence
 
     from khala_bridge.auto.aims import Aim
     from khala_bridge.auto.warp import PowerField
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.events import Events
+    from khala_bridge.observe.looks import Look, Shown
     from khala_bridge.observe.offers import Choice
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Alliance as Whose
     from khala_protocol.messages import Frames, Point, UnitView
-
-    Floats: TypeAlias = NDArray[np.float64]
 
 UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
 _HALF = CAMERA_WIDTH / 2
@@ -61,8 +58,8 @@ _NO_DETAILS = UnitDetails()
 class Scene:
     """A snapshot, and the common part of all teams' views."""
 
-    def __init__(self, snapshot: Snapshot, frames: Frames) -> None:
-        """Take a snapshot, and the frames of its views."""
+    def __init__(self, snapshot: Snapshot, frames: Frames, teams: Iterable[Team]) -> None:
+        """Take a snapshot, the frames of its views, and the teams of all agents; their units are in the snapshot."""
         self.snapshot = snapshot
         self.world = snapshot.info.frame(frames)
         self._screen_size = frames.screen
@@ -74,19 +71,18 @@ class Scene:
         self.totals = {tag: view.health + view.shield for tag, view in self.views.items()}
         """Health and shield by tag."""
         self.possible = Possible(snapshot, self.world)
-        self._arrange()
+        self._order = tuple(self.bodies.values())
+        self._tags = tuple(self.views)
+        self._teams = {(team.agent, team.name): team.tags for team in teams if team.tags}
 
-    def _arrange(self) -> None:
-        """Put the bodies in order as arrays: one row a body, in ascending order of tags."""
-        order = self._order = tuple(self.bodies.values())
-        self._index = {b.tag: index for index, b in enumerate(order)}
-        self._tags = [b.view.tag for b in order]
-        self._places = np.array([(b.x, b.y) for b in order], dtype=float).reshape(-1, 2)  # world
-        ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
-        self._rank = np.array([ranks[b.name] for b in order], dtype=int)  # of the type, by name
-        foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
-        self._foe = np.array(foe, dtype=bool)
-        self._friend = np.array([b.alliance is not Alliance.ENEMY for b in order], dtype=bool)
+    @functools.cached_property
+    def _looks(self) -> dict[tuple[str, str], Look]:
+        """What each team with units looks at, by agent and team."""
+        index = {tag: row for row, tag in enumerate(self.bodies)}
+        members = [[index[tag] for tag in tags] for tags in self._teams.values()]
+        heads = [self._order[rows[0]] for rows in members]
+        cameras = [Camera(head.x, head.y, self._screen_size) for head in heads]
+        return dict(zip(self._teams, looks(_arranged(self._order), cameras, members), strict=True))
 
     @functools.cached_property
     def resources(self) -> tuple[Body, ...]:
@@ -138,50 +134,39 @@ class Scene:
         if not team.tags:
             names = team.config.actions
             return TeamObservation(team, None, _team_view(team.name, None, self.possible.for_side(names)))
-        members = np.array([self._index[tag] for tag in team.tags])
-        head = self._order[members[0]]
-        camera = Camera(head.x, head.y, self._screen_size)
-        looked = _Look(camera, self._places, members)
-        friends = np.flatnonzero(looked.others & self._friend)
-        foes = np.flatnonzero(looked.others & self._foe)
-        friends = friends[np.argsort(self._rank[friends], kind="stable")]
-        foes = foes[np.lexsort((looked.distance[foes], self._rank[foes]))]
-        bodies = [self._order[index] for index in members.tolist()]
-        around = Around(self.world, camera, self._aims(foes), self._aims(np.append(friends, members)))
-        view = _team_view(team.name, head.view.minimap, self.possible.for_team(agent, bodies, around)).but(
-            units=self._skilled(agent, bodies, self._units(looked, members, "own")),
-            allies=self._units(looked, friends, "ally"),
-            enemies=self._units(looked, foes, "enemy"),
+        camera, members, friends, foes = self._looks[team.agent, team.name]
+        bodies = [self._order[row] for row in members.rows]
+        around = Around(self.world, camera, self._aims(foes.rows), self._aims([*friends.rows, *members.rows]))
+        view = _team_view(team.name, bodies[0].view.minimap, self.possible.for_team(agent, bodies, around)).but(
+            units=self._skilled(agent, bodies, self._units(members, "own")),
+            allies=self._units(friends, "ally"),
+            enemies=self._units(foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
             bounds=_edges(camera.bounds(self.world)),
         )
-        tags = Witnessed(*(self._tags_of(rows) for rows in (members, friends, foes)))
+        tags = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
         happened = events.of_team(before.view, before.tags, tags) if before else ()
         return TeamObservation(team, camera, view.but(events=happened), tags)
 
     @functools.cached_property
     def _aim(self) -> list[Aim]:
         """What matters of each body as a target."""
-        return [aim_of(self.snapshot.units[tag]) for tag in self._index]
+        return [aim_of(self.snapshot.units[tag]) for tag in self.bodies]
 
-    def _aims(self, rows: NDArray[np.intp]) -> dict[Aim, list[int]]:
+    def _aims(self, rows: Iterable[int]) -> dict[Aim, list[int]]:
         """Return the tags of bodies, those that are equally good targets together."""
         found: dict[Aim, list[int]] = {}
-        for row in rows.tolist():
+        for row in rows:
             found.setdefault(self._aim[row], []).append(self._order[row].tag)
         return found
 
-    def _tags_of(self, rows: NDArray[np.intp]) -> tuple[str, ...]:
-        return tuple([self._tags[row] for row in rows.tolist()])
-
-    def _units(self, looked: _Look, rows: NDArray[np.intp], alliance: Whose) -> tuple[UnitView, ...]:
-        points = zip(looked.screen_x[rows].tolist(), looked.screen_y[rows].tolist(), strict=True)
-        distances = looked.distance[rows].tolist() if alliance == "enemy" else [None] * len(rows)
+    def _units(self, shown: Shown, alliance: Whose) -> tuple[UnitView, ...]:
         units = []
-        for row, at, distance in zip(rows.tolist(), points, distances, strict=True):
+        for row, x, y, distance in zip(*shown, strict=True):
             view = self._order[row].view
             values = view.__dict__.copy()
-            values["alliance"], values["screen"], values["distance"] = alliance, at, distance
+            values["alliance"], values["screen"] = alliance, (x, y)
+            values["distance"] = distance if alliance == "enemy" else None
             units.append(view.having(values))
         return tuple(units)
 
@@ -199,28 +184,16 @@ class Scene:
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
 
-class _Look:
-    """Where all bodies are for one team's camera; one row a body in each array."""
-
-    def __init__(self, camera: Camera, places: Floats, members: NDArray[np.intp]) -> None:
-        """Take a camera, (n, 2) world positions, and the rows of the team's units."""
-        self.others: NDArray[np.bool_] = camera.sees(places)
-        """Who is on the screen and not of the team."""
-        self.others[members] = False
-        right, down = places[:, 0] - camera.x + _HALF, camera.y + _HALF - places[:, 1]
-        scale = camera.size / CAMERA_WIDTH
-        self.screen_x = _tenths(right * scale, camera.size)
-        self.screen_y = _tenths(down * scale, camera.size)
-        apart = places - places[members].sum(axis=0) / len(members)
-        self.distance = np.round(np.hypot(apart[:, 0], apart[:, 1]), 1)
-        """From the middle of the team, in world units."""
-
-
-def _tenths(values: Floats, size: float) -> Floats:
-    """Return positions rounded to a tenth of a cell; they stay within the frame, whose end is open."""
-    near = np.round(values, 1) + 0.0  # no negative zero
-    near[(values < size) & (near >= size)] = round(size - 0.1, 1)
-    return near
+def _arranged(order: Sequence[Body]) -> BodyArrays:
+    """Return bodies as arrays."""
+    ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
+    foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
+    return BodyArrays(
+        np.array([(b.x, b.y) for b in order]),
+        np.array([ranks[b.name] for b in order]),
+        np.array([b.alliance is not Alliance.ENEMY for b in order]),
+        np.array(foe),
+    )
 
 
 def _with_skills(view: UnitView, ready: tuple[str, ...], ready_somewhere: Iterable[str]) -> UnitView:

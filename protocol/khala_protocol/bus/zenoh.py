@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import zenoh
 from zenoh import CongestionControl, Priority, SampleKind
 from zenoh.ext import (
+    AdvancedPublisher,
     CacheConfig,
     HistoryConfig,
     MissDetectionConfig,
@@ -45,7 +46,7 @@ from khala_protocol.errors import BusClosed, BusError, NoRouter
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from zenoh.ext import AdvancedPublisher, Miss
+    from zenoh.ext import Miss
 
     from khala_protocol.bus import Publisher, Subscription, Token
 
@@ -305,10 +306,16 @@ class _Held:
         self._declared.update(declared)
 
     def take_back(self, *declared: Any) -> None:
+        """Withdraw declarations; an advanced publisher goes when the caller drops the last reference to it.
+
+        Its `undeclare` keeps the GIL while it waits for its heartbeat, which runs on a thread of Zenoh that may wait
+        for the GIL itself, in a callback: both wait for 10 s. When it is dropped, it lets go of the GIL first.
+        """
         self._declared.difference_update(declared)
         if not self.closed:
             for one in reversed(declared):  # a listener goes before what it listens to
-                one.undeclare()
+                if not isinstance(one, AdvancedPublisher):
+                    one.undeclare()
 
 
 class _Publisher:
@@ -349,7 +356,9 @@ class _Publisher:
         if not self._closed:
             self._closed = True
             await self._lane.settle()  # Zenoh refuses to undeclare what a put on a thread still uses
-            self._held.take_back(*self._declared)
+            declared, self._declared = self._declared, ()
+            del self._put
+            self._held.take_back(*declared)
 
 
 class _Token:

@@ -276,7 +276,7 @@ def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[i
         if world.carrier[slot] != NOBODY:
             continue  # a passenger takes no orders
         order = _of_its_own(world, slot, wanted)
-        if queue and world.order_kind[slot] != OrderKind.IDLE:
+        if queue and int(world.order_kind[slot]) != OrderKind.IDLE:
             if len(world.queue[slot]) >= QUEUE_LIMIT:
                 continue
             world.queue[slot].append(order)
@@ -318,7 +318,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     """
     order = order or Order(OrderKind.IDLE, 0)
     target, opponent = world.slot_of(order.target), int(world.target[slot])
-    fights_on = order.kind in SEEKS_FIGHTS and world.order_kind[slot] in LOOKS_AROUND
+    fights_on = order.kind in SEEKS_FIGHTS and int(world.order_kind[slot]) in LOOKS_AROUND
     if world.harvest[slot]:
         _end_harvest(world, slot)
     world.order_kind[slot] = order.kind
@@ -367,7 +367,7 @@ def _end_harvest(world: World, slot: int) -> None:
 def begin_next(world: World, slot: int) -> None:
     """Begin the next order of a unit; a patrol turns round, orders whose target is gone are skipped."""
     waiting = world.queue[slot]
-    if world.order_kind[slot] == OrderKind.PATROL and not waiting:
+    if int(world.order_kind[slot]) == OrderKind.PATROL and not waiting:
         here, there = world.order_point[slot].copy(), world.order_origin[slot].copy()
         world.order_point[slot], world.order_origin[slot] = there, here
         world.nav_end[slot] = False

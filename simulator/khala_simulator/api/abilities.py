@@ -11,20 +11,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from s2clientprotocol import error_pb2
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.economy import requirements
 from khala_simulator.tables.abilities import Aim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
-    from khala_simulator.tables.catalog import Ability
+    from khala_simulator.tables.catalog import Ability, Catalog
     from khala_simulator.world.world import World
 
     Point = tuple[float, float]
@@ -96,24 +98,60 @@ def meant(world: World, slot: int, requested: int) -> Ability | None:
 
 def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
     """Return the result of ``meant``, and whether the unit can use it now; None where that was not checked."""
-    card = world.catalog.abilities_of(int(world.type[slot])) if requested > 0 else ()
-    exact = next((a for a in card if a.id == requested), None)
+    exact, forms = _forms(world.catalog, int(world.type[slot]), requested)
     if exact is not None:
         return exact, None
     first: tuple[Ability | None, ActionResult | None] = None, None
-    for ability in card:
-        if ability.general == requested and casting.is_modelled(ability):
-            why = casting.refusal(world, slot, ability)
-            if why is ActionResult.SUCCESS:
-                return ability, why
-            first = first if first[0] is not None else (ability, why)
+    for ability in forms:
+        why = casting.refusal(world, slot, ability)
+        if why is ActionResult.SUCCESS:
+            return ability, why
+        first = first if first[0] is not None else (ability, why)
     return first
+
+
+@lru_cache(maxsize=4096)
+def _forms(catalog: Catalog, row: int, requested: int) -> tuple[Ability | None, tuple[Ability, ...]]:
+    """Return the ability on a type's card with this id, or else those that a general id may mean."""
+    card = catalog.abilities_of(row) if requested > 0 else ()
+    exact = next((a for a in card if a.id == requested), None)
+    return exact, tuple(a for a in card if a.general == requested and casting.is_modelled(a))
 
 
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
     """Return the abilities that a unit can use now, by ascending id; ``free`` ignores cost and cooldown."""
     card = world.catalog.abilities_of(int(world.type[slot]))
     return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
+
+
+def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
+    """Return the abilities that at least one of a player's units can use now, by ascending id.
+
+    Each is asked until one unit can, or until what is missing is missing to all: thirty selected units of five types
+    have 500 abilities on their cards, of which 60 differ.
+    """
+    found: dict[int, Ability] = {}
+    left: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
+    for slot in slots:
+        row = int(world.type[slot])
+        asked = left[row] if row in left else world.catalog.abilities_of(row)
+        left[row] = []
+        for ability in asked:
+            if ability.id in found:
+                continue
+            why = casting.refusal(world, slot, ability)
+            if why is ActionResult.SUCCESS:
+                found[ability.id] = ability
+            elif not _hopeless(world, slot, ability, why):
+                left[row].append(ability)
+    return [ability for _, ability in sorted(found.items())]
+
+
+def _hopeless(world: World, slot: int, ability: Ability, why: ActionResult) -> bool:
+    """Return whether an ability that a unit can't use is out of reach for all units of its owner."""
+    if why is ActionResult.TECH_REQUIREMENTS_NOT_MET:
+        return requirements.missing_to_all(world, slot, ability)
+    return why is ActionResult.NOT_SUPPORTED
 
 
 def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
@@ -131,13 +169,18 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
         return _refused(command, ActionResult.NOT_SUPPORTED)
     parts: list[tuple[Ability, tuple[Cast, ...]]] = []
     why = ActionResult.ERROR
+    target = world.slot_of(aimed.target) if aimed.aim is Aim.UNIT else NOBODY
     for ability, some in groups:
-        results = [_judged(world, player, slot, ability, aimed, known) for slot, known in some]
-        casts = tuple(result for result in results if isinstance(result, Cast))
+        result = _aim_result(world, player, ability, aimed, target)
+        casts: list[Cast] = []
+        if result is ActionResult.SUCCESS:
+            results = [_judged(world, slot, ability, aimed, target, known) for slot, known in some]
+            casts = [judged for judged in results if isinstance(judged, Cast)]
+            result = results[0] if isinstance(results[0], ActionResult) else result
         if casts:
-            parts.append((ability, casts))
-        elif not parts and isinstance(results[0], ActionResult):
-            why = results[0]
+            parts.append((ability, tuple(casts)))
+        elif not parts:
+            why = result
     if not parts:
         return _refused(command, why)
     return OrderPlan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
@@ -194,26 +237,31 @@ def _groups(
     return [groups[number] for number in sorted(groups)]
 
 
-def _judged(
-    world: World, player: int, slot: int, ability: Ability, command: UnitCommand, known: ActionResult | None
-) -> Cast | ActionResult:
-    """Return what a unit is to do with its ability, or why it can't; ``known`` is the reason if already known."""
+def _aim_result(world: World, player: int, ability: Ability, command: UnitCommand, target: int) -> ActionResult:
+    """Return why an ability can't be aimed like this by any unit, or success; ``target`` is the slot of the target."""
     if not command.aim & ability.aim:
         aimless = Aim.POINT not in ability.aim
         return ActionResult.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
             ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
         )  # fmt: skip
-    target = NOBODY
     if command.aim is Aim.UNIT:
-        target = world.slot_of(command.target)
         remembered = target != NOBODY and command.target in world.memories[player].of_unit
         if target == NOBODY or not (remembered or world.visible[player, target]):
             return ActionResult.MUST_TARGET_VISIBLE_UNIT
+    return ActionResult.SUCCESS
+
+
+def _judged(
+    world: World, slot: int, ability: Ability, command: UnitCommand, target: int, known: ActionResult | None
+) -> Cast | ActionResult:
+    """Return what a unit is to do with its ability, or why it can't; ``known`` is the reason if already known."""
     why = casting.refusal(world, slot, ability) if known is None else known
+    if why is not ActionResult.SUCCESS:
+        return why
     cast = Cast(slot, casting.as_is(world, slot, ability), target, command.point)
-    if why is ActionResult.SUCCESS and ability.effect == "attack" and target != NOBODY:
+    if ability.effect == "attack" and target != NOBODY:
         why = _cant_attack(world, slot, target)
-    elif why is ActionResult.SUCCESS and ability.effect not in casting.ORDINARY:
+    elif ability.effect not in casting.ORDINARY:
         why = casting.aim_refusal(world, cast)
     return cast if why is ActionResult.SUCCESS else why
 

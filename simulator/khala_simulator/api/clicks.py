@@ -156,7 +156,7 @@ def _select_point(seat: PlayerSeat, click: Point, screen: Screen) -> bool:
     if row is None:
         return False
     tag = int(sight.tag[row])
-    if sight.alliance[row] != Alliance.SELF:
+    if int(sight.alliance[row]) != Alliance.SELF:
         seat.selection.choose([tag])
         return True
     if click.type == Point.Toggle and tag in seat.selection.tags:

@@ -6,19 +6,19 @@ and only the pathing grid is replaced. Above: `play.py`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api import wire
-from khala_simulator.api.raw import write_image
 from khala_simulator.api.sight import Alliance
 from khala_simulator.api.viewer import Viewer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from s2clientprotocol import common_pb2
 
     from khala_simulator.api.game import HostedGame
     from khala_simulator.api.seat import PlayerSeat
@@ -48,7 +48,7 @@ class GameInfo:
         known = _known_structures(self._seat)
         if known != self._known:
             start = raw_pb2.StartRaw()
-            write_image(start.pathing_grid, _crop(self._seat, _paths(self._world, known)), 1)
+            _write_image(start.pathing_grid, _crop(self._seat, _paths(self._world, known)), 1)
             self._known, self._paths = known, start.SerializeToString()
         return [self._fixed, *wire.embed(_START_RAW, [self._map, self._paths])]
 
@@ -82,8 +82,8 @@ def _start_raw(seat: PlayerSeat) -> raw_pb2.StartRaw:
     x0, y0, x1, y1 = terrain.playable
     (start.playable_area.p0.x, start.playable_area.p0.y) = (x0 - int(seat.origin[0]), y0 - int(seat.origin[1]))
     (start.playable_area.p1.x, start.playable_area.p1.y) = (x1 - int(seat.origin[0]), y1 - int(seat.origin[1]))
-    write_image(start.placement_grid, _crop(seat, terrain.build), 1)
-    write_image(start.terrain_height, _crop(seat, terrain.height), 8)
+    _write_image(start.placement_grid, _crop(seat, terrain.build), 1)
+    _write_image(start.terrain_height, _crop(seat, terrain.height), 8)
     for x, y in _start_locations(seat):
         start.start_locations.add(x=x - seat.origin[0], y=y - seat.origin[1])
     return start
@@ -121,3 +121,11 @@ def _paths(world: World, structures: tuple[Structure, ...]) -> NDArray[np.bool_]
             cells = np.clip(cells, 0, np.array(grid.shape[::-1]) - 1)
             grid[cells[:, 1], cells[:, 0]] = False
     return grid
+
+
+def _write_image(image: common_pb2.ImageData, grid: NDArray[Any], bits_per_pixel: int) -> None:
+    """Fill an image with a grid [y, x] of the map; raw images start at the bottom-left, as the grids do."""
+    image.bits_per_pixel = bits_per_pixel
+    image.size.y, image.size.x = grid.shape
+    packed = np.packbits(grid.astype(np.bool_), axis=None) if bits_per_pixel == 1 else grid.astype(np.uint8)
+    image.data = packed.tobytes()

@@ -17,7 +17,7 @@ from s2clientprotocol import spatial_pb2
 
 from khala_simulator.api import wire
 from khala_simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
-from khala_simulator.api.raster import RasterLayer, draw_discs, sample
+from khala_simulator.api.raster import RasterLayer, Sampler, disc_layers
 from khala_simulator.api.sight import Cloak, Display
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import sc2api_pb2
 
     from khala_simulator.api.projection import ImagePair
-    from khala_simulator.api.raster import Discs
+    from khala_simulator.api.raster import DiscLayers
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.types import Types
     from khala_simulator.api.wire import Part
@@ -83,6 +83,8 @@ class FeatureLayers:
         shown = {name: bits for name, bits in MINIMAP_BITS.items() if name not in hidden}
         self._screen = _Image(spatial_pb2.FeatureLayers, SCREEN_BITS, screen.columns, screen.rows)
         self._minimap = _Image(spatial_pb2.FeatureLayersMinimap, shown, minimap.columns, minimap.rows)
+        self._outlined: tuple[float, float] | None = None  # the camera whose view the minimap shows
+        self._outline: list[Part] = []
 
     def encode(self, frame: Frame) -> list[Part]:
         """Return the parts of an `ObservationFeatureLayer`."""
@@ -90,7 +92,7 @@ class FeatureLayers:
         return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
 
     def _encode_screen(self, frame: Frame, values: Ints) -> list[Part]:
-        screen, image = self.screen, self._screen
+        screen = self.screen
 
         def axes() -> tuple[Floats, Floats]:
             corner, pixels = np.zeros(1), np.arange(max(screen.columns, screen.rows), dtype=np.float64)
@@ -98,14 +100,12 @@ class FeatureLayers:
             _, lines = screen.to_world(corner, pixels[: screen.rows], frame.camera)
             return columns, lines
 
-        x, y = screen.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1], frame.camera)
-        radius = frame.sight.radius / screen.scale
-        near = _near(x, y, radius + 1, screen.columns, screen.rows)
-        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
-        layers = image.layers
-        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, near])
-        parts += layers["unit_density"].encode(discs.density) + layers["unit_density_aa"].encode(discs.smooth)
-        return parts + self._effects(frame) + self._power(frame) + self._blips(frame)
+        sight, image = frame.sight, self._screen
+        x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
+        units = image.units.encode(x, y, sight.radius / screen.scale, values)
+        return (
+            image.encode_terrain(frame, axes) + units + self._effects(frame) + self._power(frame) + self._blips(frame)
+        )
 
     def _effects(self, frame: Frame) -> list[Part]:
         """Return the pixels of effect ids; the younger of two at one pixel wins."""
@@ -115,33 +115,30 @@ class FeatureLayers:
         areas = seen_area_effects(frame.world, frame.player, through_fog=not frame.fogged)
         spots = [(x, y, area.radius, area.effect) for area in areas for x, y in area.points]
         table = np.array(spots, np.float64).reshape(-1, 4)
-        return self._spots(layer, Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
+        return self._spots("effects", Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
 
     def _power(self, frame: Frame) -> list[Part]:
         layer, sources = self._screen.layers["power"], power(frame.sight, frame.types)
         if sources is None:
             return layer.blank
         spots = Spots(frame.sight.pos[sources.row], sources.radius)
-        return self._spots(layer, spots, np.ones(len(sources.row), np.int32), frame)
+        return self._spots("power", spots, np.ones(len(sources.row), np.int32), frame)
 
     def _blips(self, frame: Frame) -> list[Part]:
         layer, places = self._screen.layers["blip"], blips(frame.world, frame.types, frame.player)
         if not len(places):
             return layer.blank
         spots = Spots(places, np.full(len(places), BLIP_RADIUS))
-        return self._spots(layer, spots, np.ones(len(places), np.int32), frame)
+        return self._spots("blip", spots, np.ones(len(places), np.int32), frame)
 
-    def _spots(self, layer: RasterLayer, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
+    def _spots(self, layer: str, spots: Spots, values: Ints, frame: Frame) -> list[Part]:
         """Return discs of the world with a value each."""
         screen = self.screen
         x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
-        radius = spots.radius / screen.scale
-        near = _near(x, y, radius + 1, screen.columns, screen.rows)
-        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], screen.columns, screen.rows)
-        return layer.encode_pixels(discs.pixels, values[near].take(discs.rows))
+        return self._screen.spots(layer).encode(x, y, spots.radius / screen.scale, values[None])
 
     def _encode_minimap(self, frame: Frame, values: Ints) -> list[Part]:
-        minimap, image = self.minimap, self._minimap
+        minimap = self.minimap
 
         def axes() -> tuple[Floats, Floats]:
             corner, pixels = np.zeros(1), np.arange(max(minimap.columns, minimap.rows), dtype=np.float64)
@@ -149,28 +146,30 @@ class FeatureLayers:
             _, lines = minimap.to_world(corner, pixels[: minimap.rows])
             return columns, lines
 
-        x, y = minimap.to_pixels(frame.sight.pos[:, 0], frame.sight.pos[:, 1])
-        known = np.flatnonzero(frame.sight.display != Display.HIDDEN.value)
-        radius = frame.sight.radius[known] / minimap.scale
-        discs = draw_discs(np.stack([x[known], y[known]], axis=1), radius, minimap.columns, minimap.rows)
-        parts = image.encode_terrain(frame, axes) + image.encode_units(discs, values[:, known])
-        return parts + self._camera(frame) + self._alerts(frame)
+        sight, image = frame.sight, self._minimap
+        pos, radius, known = sight.pos, sight.radius, sight.display != Display.HIDDEN.value
+        if not known.all():
+            pos, radius, values = pos[known], radius[known], values.compress(known, axis=1)
+        x, y = minimap.to_pixels(pos[:, 0], pos[:, 1])
+        units = image.units.encode(x, y, radius / minimap.scale, values)
+        return image.encode_terrain(frame, axes) + units + self._camera(frame) + self._alerts(frame)
 
     def _camera(self, frame: Frame) -> list[Part]:
-        view = self.screen.view(frame.camera)
-        x0, y0 = self.minimap.to_pixels(view.x0, view.y1)
-        x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
-        image = np.zeros((self.minimap.rows, self.minimap.columns), np.bool_)
-        image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
-        return self._minimap.layers["camera"].encode(image)
+        if self._outlined != frame.camera:
+            view = self.screen.view(frame.camera)
+            x0, y0 = self.minimap.to_pixels(view.x0, view.y1)
+            x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
+            image = np.zeros((self.minimap.rows, self.minimap.columns), np.bool_)
+            image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
+            self._outlined, self._outline = frame.camera, self._minimap.layers["camera"].encode(image)
+        return self._outline
 
     def _alerts(self, frame: Frame) -> list[Part]:
         layer = self._minimap.layers["alerts"]
         if not len(frame.attacked):
             return layer.blank
         x, y = self.minimap.to_pixels(frame.attacked[:, 0], frame.attacked[:, 1])
-        spots = draw_discs(np.stack([x, y], axis=1), np.zeros(len(x)), self.minimap.columns, self.minimap.rows)
-        return layer.encode_pixels(spots.pixels, np.ones(len(spots.pixels), np.int32))
+        return self._minimap.spots("alerts").encode(x, y, np.zeros(len(x)), np.ones((1, len(x)), np.int32))
 
 
 class _Image:
@@ -178,37 +177,40 @@ class _Image:
 
     def __init__(self, message: type[Message], bits: dict[str, int], columns: int, rows: int) -> None:
         fields = message.DESCRIPTOR.fields_by_name
+        self._shape = columns, rows
         self.layers = {name: RasterLayer(fields[name].number, depth, columns, rows) for name, depth in bits.items()}
-        self._of_units = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
+        shown = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
+        dense = "unit_density" in self.layers
+        density = (self.layers["unit_density"], self.layers["unit_density_aa"]) if dense else None
+        self.units = disc_layers(shown, density, columns, rows)
+        self._spots: dict[str, DiscLayers] = {}
         self._camera: tuple[float, float] | None = None
         self._walk: Bools | None = None
         self._creep: Bools | None = None
+        self._sampler: Sampler | None = None
         self._terrain: list[Part] = []
         self._visibility: list[Part] = []
 
-    def encode_units(self, discs: Discs, values: Ints) -> list[Part]:
-        """Return the layers that show units, from the values [k, n] of the discs' rows."""
-        shown: list[bool] = np.any(values, axis=1).tolist()
-        parts: list[Part] = []
-        for k, layer in self._of_units:
-            parts += layer.encode_pixels(discs.pixels, values[k].take(discs.rows)) if shown[k] else layer.blank
-        return parts
+    def spots(self, name: str) -> DiscLayers:
+        """Return a layer that shows discs other than units."""
+        if name not in self._spots:
+            self._spots[name] = disc_layers([(0, self.layers[name])], None, *self._shape)
+        return self._spots[name]
 
     def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
         """Return terrain and visibility; drawn again only if the camera moved, the ground changed, or fog may have."""
         world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
+        if self._sampler is None or self._camera != frame.camera:
+            self._sampler, self._camera, self._walk = Sampler(terrain.size, *axes()), frame.camera, None
+        take = self._sampler.take
         changed = self._walk is not world.ground.walk or self._creep is not world.creep
-        moved = changed or self._camera != frame.camera
-        if moved or world.fog:
-            x, y = axes()
-            self._visibility = layers["visibility_map"].encode(sample(world.visibility[frame.player], x, y))
-            if moved:
-                self._camera, self._walk, self._creep = frame.camera, world.ground.walk, world.creep
-                grids = {"height_map": terrain.height, "pathable": world.ground.walk, "buildable": terrain.build,
-                         "creep": world.creep}  # fmt: skip
-                self._terrain = [
-                    part for name, grid in grids.items() for part in layers[name].encode(sample(grid, x, y))
-                ]
+        if changed:
+            self._walk, self._creep = world.ground.walk, world.creep
+            grids = {"height_map": terrain.height, "pathable": self._walk, "buildable": terrain.build,
+                     "creep": self._creep}  # fmt: skip
+            self._terrain = [part for name, grid in grids.items() for part in layers[name].encode(take(grid))]
+        if changed or world.fog:
+            self._visibility = layers["visibility_map"].encode(take(world.visibility[frame.player]))
         return self._terrain + self._visibility
 
 
@@ -242,8 +244,3 @@ def unit_values(frame: Frame) -> Ints:
 
 def _ratio(part: Floats, whole: Floats) -> Floats:
     return np.minimum(part / np.maximum(whole, 1e-9), 1.0) * 255
-
-
-def _near(x: Floats, y: Floats, margin: Floats, columns: int, rows: int) -> NDArray[np.intp]:
-    inside = (x > -margin) & (x < columns + margin) & (y > -margin) & (y < rows + margin)
-    return np.flatnonzero(inside)

@@ -11,14 +11,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from s2clientprotocol import raw_pb2
+from s2clientprotocol import common_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api import ui, wire
-from khala_simulator.api.abilities import result_of, usable
+from khala_simulator.api.abilities import result_of, usable_by_any
 from khala_simulator.api.effects import seen_buffs
 from khala_simulator.api.layers import Frame
-from khala_simulator.api.raw import Units, write_image
+from khala_simulator.api.raw import Units
 from khala_simulator.api.raw_effects import write_effects, write_power, write_radar
 from khala_simulator.api.score import Holdings
 from khala_simulator.api.sight import Alliance, Display
@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from khala_simulator.api.wire import Part
 
 _OBSERVATION = sc.ResponseObservation.DESCRIPTOR.fields_by_name["observation"].number
+_RAW = sc.Observation.DESCRIPTOR.fields_by_name["raw_data"].number
 _LAYERS = sc.Observation.DESCRIPTOR.fields_by_name["feature_layer_data"].number
 _RENDERS = sc.Observation.DESCRIPTOR.fields_by_name["render_data"].number
+_MAP_STATE = raw_pb2.ObservationRaw.DESCRIPTOR.fields_by_name["map_state"].number
 _ALARM_PAUSE_LOOPS = 160
 """Loops between two reports of attacks on a player (an estimate: the game's own pause was never published)."""
 
@@ -51,27 +53,25 @@ def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) ->
         chat=seat.hands.chat,
     )
     holdings = Holdings(world, game.types, seat.player)
-    observation = sc.Observation(game_loop=world.loop, player_common=holdings.common())
-    observation.ui_data.CopyFrom(ui.panel(world, game.types, seat.selection, seat.player))
-    _write_abilities(observation, seat)
-    observation.alerts.extend(_alerts(seat, sight, attacked))
+    first = sc.Observation(player_common=holdings.common(), abilities=_abilities(seat))
     if seat.options.score:
-        observation.score.CopyFrom(holdings.score())
+        first.score.CopyFrom(holdings.score())
+    parts: list[Part] = [first.SerializeToString()]
+    through_fog = disable_fog or seat.sees_all
     if seat.options.raw:
-        _write_raw(observation.raw_data, seat, sight, selected)
-        write_effects(observation.raw_data, seat, through_fog=disable_fog or seat.sees_all)
-        write_power(observation.raw_data, seat, sight)
-        write_radar(observation.raw_data, seat)
-    images: list[Part] = []
+        parts += wire.embed(_RAW, _encode_raw(seat, sight, selected, through_fog=through_fog))
+    last = sc.Observation(game_loop=world.loop, alerts=_alerts(seat, sight, attacked))
+    last.ui_data.CopyFrom(ui.panel(world, game.types, seat.selection, seat.player))
+    parts.append(last.SerializeToString())
     if seat.views:
-        fogged = world.fog and not (disable_fog or seat.sees_all)
+        fogged = world.fog and not through_fog
         frame = Frame(world, game.types, seat.player, sight, selected, seat.camera, sight.pos[attacked], fogged)
         if seat.layers is not None:
-            images += wire.embed(_LAYERS, seat.layers.encode(frame))
+            parts += wire.embed(_LAYERS, seat.layers.encode(frame))
         if seat.renders is not None:
-            images += wire.embed(_RENDERS, seat.renders.encode(frame))
+            parts += wire.embed(_RENDERS, seat.renders.encode(frame))
     _told(seat, sight, through_fog=disable_fog)
-    return [told.SerializeToString(), *wire.embed(_OBSERVATION, [observation.SerializeToString(), *images])]
+    return [told.SerializeToString(), *wire.embed(_OBSERVATION, parts)]
 
 
 def _told(seat: PlayerSeat, sight: Sight, *, through_fog: bool) -> None:
@@ -95,13 +95,14 @@ def _mishaps(seat: PlayerSeat) -> list[sc.ActionError]:
     ]
 
 
-def _write_abilities(observation: sc.Observation, seat: PlayerSeat) -> None:
-    """Write the abilities that the selection can use now; none for a foreign unit."""
+def _abilities(seat: PlayerSeat) -> list[common_pb2.AvailableAbility]:
+    """Return the abilities that the selection can use now; none for a foreign unit."""
     world = seat.world
     own = [s for s in seat.selection.slots(world) if world.owner[s] == seat.player]
-    found = {ability.id: ability for slot in own for ability in usable(world, slot)}
-    for number in sorted(found):
-        observation.abilities.add(ability_id=number, requires_point=found[number].requires_point)
+    return [
+        common_pb2.AvailableAbility(ability_id=ability.id, requires_point=ability.requires_point)
+        for ability in usable_by_any(world, own)
+    ]
 
 
 def _attacked(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
@@ -124,21 +125,21 @@ def _alerts(seat: PlayerSeat, sight: Sight, attacked: NDArray[np.intp]) -> list[
     return [*alerts, sc.UnitUnderAttack] if (~structures).any() else alerts
 
 
-def _write_raw(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, sight: Sight, selected: NDArray[np.bool_]) -> None:
-    world, terrain = seat.world, seat.world.map.terrain
+def _encode_raw(seat: PlayerSeat, sight: Sight, selected: NDArray[np.bool_], *, through_fog: bool) -> list[Part]:
+    """Return the parts of an `ObservationRaw`, its fields in the order of their numbers."""
+    world = seat.world
+    first, last = raw_pb2.ObservationRaw(), raw_pb2.ObservationRaw()
     x, y = seat.camera
-    camera = raw.player.camera
+    camera = first.player.camera
     camera.x, camera.y = x - seat.origin[0], y - seat.origin[1]
     camera.z = seat.camera_z
-    raw.player.upgrade_ids.extend(world.players[seat.player].upgrades)
-    Units(
-        world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, seen_buffs(world, sight), seat.player
-    ).write(raw)
-    visibility, creep = world.visibility[seat.player], world.creep
-    if seat.options.raw_crop_to_playable_area:
-        x0, y0, x1, y1 = terrain.playable
-        visibility, creep = visibility[y0:y1, x0:x1], creep[y0:y1, x0:x1]
-    write_image(raw.map_state.visibility, visibility, 8)
-    write_image(raw.map_state.creep, creep, 1)
+    first.player.upgrade_ids.extend(world.players[seat.player].upgrades)
+    write_power(first, seat, sight)
+    worn = seen_buffs(world, sight)
+    units = Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, worn, seat.player)
     dead = (d.tag for d in world.deaths[seat.deaths_told :] if d.owner == seat.player or d.tag in seat.known)
-    raw.event.dead_units.extend(dead)
+    last.event.dead_units.extend(dead)
+    write_effects(last, seat, through_fog=through_fog)
+    write_radar(last, seat)
+    ground = wire.embed(_MAP_STATE, seat.ground.encode(world, seat.player))
+    return [first.SerializeToString(), units.encode(), *ground, last.SerializeToString()]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from khala_simulator import compiled
 from khala_simulator.api import wire
 
 if TYPE_CHECKING:
@@ -92,14 +93,23 @@ def _draw_size(
     return pixels.take(drawn), disc.take(drawn // len(dx)), inside.take(drawn), cover.take(drawn)
 
 
-def sample(grid: NDArray[Any], x: Floats, y: Floats) -> NDArray[Any]:
-    """Return the values of a grid [y, x] of the map in the columns x and rows y of an image; 0 outside of the map."""
-    height, width = grid.shape
-    column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
-    image = grid[np.clip(row, 0, height - 1)[:, None], np.clip(column, 0, width - 1)[None, :]]
-    outside = ((row < 0) | (row >= height))[:, None] | ((column < 0) | (column >= width))[None, :]
-    image[outside] = 0
-    return image
+class Sampler:
+    """Takes the values of grids [y, x] of the map in the columns x and rows y of an image; 0 outside of the map."""
+
+    def __init__(self, size: tuple[int, int], x: Floats, y: Floats) -> None:
+        """Prepare an image with a column for each of the world's x, a row for each of its y, of a map of this size."""
+        width, height = size
+        column, row = np.floor(x).astype(np.intp), np.floor(y).astype(np.intp)
+        outside = ((row < 0) | (row >= height))[:, None] | ((column < 0) | (column >= width))[None, :]
+        self._cell = np.clip(row, 0, height - 1)[:, None] * width + np.clip(column, 0, width - 1)[None, :]
+        self._outside = outside if outside.any() else None
+
+    def take(self, grid: NDArray[Any]) -> NDArray[Any]:
+        """Return the image [rows, columns] of a grid."""
+        image = grid.take(self._cell)
+        if self._outside is not None:
+            image[self._outside] = 0
+        return image
 
 
 class RasterLayer:
@@ -128,3 +138,46 @@ class RasterLayer:
         image = np.zeros(self.area, self._dtype)
         image[pixels] = values
         return self.encode(image)
+
+
+class DiscLayers:
+    """Layers that show values of discs: at each pixel that of the topmost one.
+
+    `compiled.raster` does the same without an image for each layer; `disc_layers` chooses.
+    """
+
+    def __init__(
+        self,
+        layers: list[tuple[int, RasterLayer]],
+        density: tuple[RasterLayer, RasterLayer] | None,
+        columns: int,
+        rows: int,
+    ) -> None:
+        """Show in each layer the values of a row, in the pair how many discs there are and 16 x what they cover."""
+        self._layers, self._density, self._shape = layers, density, (columns, rows)
+
+    def encode(self, x: Floats, y: Floats, radius: Floats, values: NDArray[np.int32]) -> list[Part]:
+        """Return the fields of all layers, for centres and radii [n] in pixels and values [rows, n]."""
+        near = _near(x, y, radius + 1, *self._shape)
+        discs = draw_discs(np.stack([x[near], y[near]], axis=1), radius[near], *self._shape)
+        parts: list[Part] = []
+        for row, layer in self._layers:
+            found = values[row, near]
+            parts += layer.encode_pixels(discs.pixels, found.take(discs.rows)) if found.any() else layer.blank
+        if self._density is not None:
+            many, smooth = self._density
+            parts += many.encode(discs.density) + smooth.encode(discs.smooth)
+        return parts
+
+
+def _near(x: Floats, y: Floats, margin: Floats, columns: int, rows: int) -> NDArray[np.intp]:
+    return np.flatnonzero((x > -margin) & (x < columns + margin) & (y > -margin) & (y < rows + margin))
+
+
+def disc_layers(
+    layers: list[tuple[int, RasterLayer]], density: tuple[RasterLayer, RasterLayer] | None, columns: int, rows: int
+) -> DiscLayers:
+    """Return such layers, compiled where that is possible."""
+    kernel = compiled.part("raster")
+    made: DiscLayers = (DiscLayers if kernel is None else kernel.DiscLayers)(layers, density, columns, rows)
+    return made

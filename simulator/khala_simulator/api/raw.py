@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from s2clientprotocol import raw_pb2
 
+from khala_simulator import compiled
 from khala_simulator.api.sight import Alliance
 from khala_simulator.economy import harvesting
 from khala_simulator.world.active_buffs import FOREVER
@@ -22,13 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
-    from s2clientprotocol import common_pb2
 
     from khala_simulator.api.effects import Worn
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.types import Types
     from khala_simulator.world.orders import Order
-    from khala_simulator.world.world import Rally, World
+    from khala_simulator.world.world import World
 
     Bools = NDArray[np.bool_]
 
@@ -51,9 +51,20 @@ class Units:
         """The number of workers of own town halls and gas structures (slots), and the ideal number."""
         return harvesting.staffing(self.world, self.player)
 
+    def encode(self) -> bytes:
+        """Return all units, as the field `units` of an `ObservationRaw`."""
+        kernel = compiled.part("units")
+        if kernel is not None:
+            encoded: bytes = kernel.encode(self)
+            return encoded
+        raw = raw_pb2.ObservationRaw()
+        self.write(raw)
+        return raw.SerializeToString()
+
     def write(self, raw: raw_pb2.ObservationRaw) -> None:
-        """Add all units to an observation."""
-        orders = self._orders()
+        """Add all units to an observation; `compiled.units` does the same without an object for each."""
+        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
+        orders = self._orders(own)
         first = len(raw.units)
         for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
             unit = raw.units.add()
@@ -69,6 +80,35 @@ class Units:
         if self.worn is not None:
             for row, number in zip(self.worn.row.tolist(), self.worn.id.tolist(), strict=True):
                 raw.units[first + row].buff_ids.append(number)
+
+    # what few units have, as bytes of fields of a `Unit`, for `compiled.units`
+
+    def orders(self, slot: int) -> bytes:
+        """Return the orders of an own unit."""
+        unit = raw_pb2.Unit()
+        for order, height in self._orders([slot])[slot]:
+            self._write_order(unit.orders.add(), order, height)
+        return unit.SerializeToString()
+
+    def cargo(self, slot: int) -> bytes:
+        """Return the passengers of an own unit, and the room that they take."""
+        unit = raw_pb2.Unit()
+        self._write_cargo(unit, slot)
+        return unit.SerializeToString()
+
+    def durations(self, slot: int) -> bytes:
+        """Return how long the life or a buff of an own unit still lasts."""
+        unit = raw_pb2.Unit()
+        self._write_durations(unit, slot)
+        return unit.SerializeToString()
+
+    def rallies(self, slot: int) -> bytes:
+        """Return where an own structure sends new units."""
+        unit = raw_pb2.Unit()
+        self._write_rallies(unit, slot)
+        return unit.SerializeToString()
+
+    # columns
 
     def _slots(self) -> list[int]:
         slots: list[int] = self.sight.slot.tolist()
@@ -98,8 +138,7 @@ class Units:
     def _write_own(self, unit: raw_pb2.Unit, slot: int) -> None:
         world, types, row = self.world, self.types, int(self.world.type[slot])
         unit.assigned_harvesters, unit.ideal_harvesters = self.harvesters.get(slot, (0, 0))
-        for rally in dict.fromkeys(world.rallies.get(slot, {}).values()):
-            self._write_rally(unit.rally_targets.add(), rally)
+        self._write_rallies(unit, slot)
         if types.armed[row]:
             unit.weapon_cooldown = max(0.0, float(world.cooldown[slot]))
             if target := world.tag_of(int(world.target[slot])):
@@ -112,12 +151,14 @@ class Units:
             self._write_cargo(unit, slot)
         self._write_durations(unit, slot)
 
-    def _write_rally(self, message: raw_pb2.RallyTarget, rally: Rally) -> None:
-        x, y = rally.point
-        z = float(self.world.map.terrain.ground_z(np.array([rally.point]))[0])
-        message.point.x, message.point.y, message.point.z = x - self.origin[0], y - self.origin[1], z
-        if rally.target:
-            message.tag = rally.target
+    def _write_rallies(self, unit: raw_pb2.Unit, slot: int) -> None:
+        for rally in dict.fromkeys(self.world.rallies.get(slot, {}).values()):
+            message = unit.rally_targets.add()
+            x, y = rally.point
+            z = float(self.world.map.terrain.ground_z(np.array([rally.point]))[0])
+            message.point.x, message.point.y, message.point.z = x - self.origin[0], y - self.origin[1], z
+            if rally.target:
+                message.tag = rally.target
 
     def _write_cargo(self, unit: raw_pb2.Unit, slot: int) -> None:
         """Write the passengers and the room that they take."""
@@ -161,9 +202,8 @@ class Units:
             point.x, point.y = order.point[0] - self.origin[0], order.point[1] - self.origin[1]
             point.z = height
 
-    def _orders(self) -> dict[int, list[tuple[Order, float]]]:
+    def _orders(self, own: list[int]) -> dict[int, list[tuple[Order, float]]]:
         """Return the orders of own units by slot, each with the ground height at its point, if it has one."""
-        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
         orders = {slot: self.world.orders_of(slot) for slot in own}
         points = [order.point for some in orders.values() for order in some if order.point is not None]
         heights = iter(self.world.map.terrain.ground_z(np.array(points)).tolist() if points else ())
@@ -227,11 +267,3 @@ def _write_side(  # a row of the table, in the order of its columns
         unit.mineral_contents = minerals
     if vespene:
         unit.vespene_contents = vespene
-
-
-def write_image(image: common_pb2.ImageData, grid: NDArray[Any], bits_per_pixel: int) -> None:
-    """Fill an image with a grid [y, x] of the map; raw images start at the bottom-left, as the grids do."""
-    image.bits_per_pixel = bits_per_pixel
-    image.size.y, image.size.x = grid.shape
-    packed = np.packbits(grid.astype(np.bool_), axis=None) if bits_per_pixel == 1 else grid.astype(np.uint8)
-    image.data = packed.tobytes()

@@ -12,6 +12,7 @@ import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.layers import FeatureLayers
+from khala_simulator.api.map_state import GroundImages
 from khala_simulator.api.projection import DEFAULT_WIDTH, ImagePair, Minimap, Rect, Screen, view_of
 from khala_simulator.api.selection import Selection
 from khala_simulator.api.sight import Sight, look
@@ -51,6 +52,7 @@ class PlayerSeat:
         self.playable = Rect(*world.map.terrain.playable)
         crop = options.raw_crop_to_playable_area
         self.origin: tuple[float, float] = (self.playable.x0, self.playable.y0) if crop else (0.0, 0.0)
+        self.ground = GroundImages(world.map.terrain.playable if crop else (0, 0, width, height))
         whole = Rect(0, 0, width, height)
         self.views: dict[str, ImagePair] = {}  # by the field of an Action with clicks on them
         self.layers: FeatureLayers | None = None

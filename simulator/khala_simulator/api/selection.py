@@ -117,7 +117,7 @@ def larvae(sight: Sight, types: Types) -> Rows:
 def idle_workers(world: World, sight: Sight, types: Types) -> Rows:
     """Return the rows of the player's idle workers."""
     rows = _own(sight, types, types.worker)
-    idle: Rows = rows[world.order_kind[sight.slot[rows]] == OrderKind.IDLE]
+    idle: Rows = rows[world.order_kind[sight.slot[rows]] == OrderKind.IDLE.value]
     return idle
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from s2clientprotocol import ui_pb2
 
+from khala_simulator import compiled
 from khala_simulator.api.sight import Alliance
 
 if TYPE_CHECKING:
@@ -25,12 +26,21 @@ def panel(world: World, types: Types, selection: Selection, player: int) -> ui_p
     if len(slots) == 1:
         _write_one(ui, world, types, slots[0], player)
     elif slots:
-        ui.multi.units.extend(_unit(world, types, slot, player) for slot in slots)
+        ui.multi.MergeFromString(_encode_multi(world, types, slots, player))
     for index, tags in enumerate(selection.groups):
         if tags:
             leader = int(world.type[world.slot_of(tags[0])])
             ui.groups.add(control_group_index=index, leader_unit_type=int(types.id[leader]), count=len(tags))
     return ui
+
+
+def _encode_multi(world: World, types: Types, slots: list[int], player: int) -> bytes:
+    """Return a `MultiPanel`; `compiled.units` writes it without an object for each unit."""
+    kernel = compiled.part("units")
+    if kernel is not None:
+        encoded: bytes = kernel.encode_panel(world, types, slots, player)
+        return encoded
+    return ui_pb2.MultiPanel(units=(_unit(world, types, slot, player) for slot in slots)).SerializeToString()
 
 
 def _write_one(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, player: int) -> None:

@@ -153,12 +153,12 @@ def _splash(world: World, shot: Shot, damage: Damage) -> None:
     bodies = zip(near.tolist(), edge.tolist(), world.radius[near].tolist(), offset.tolist(), strict=True)
     for slot, distance, radius, (x, y) in bodies:
         for ring in hit.area:
-            if distance <= ring.radius and _in_arc(x, y, radius, *forward, ring.arc_deg):
+            if distance <= ring.radius and in_arc(x, y, radius, *forward, ring.arc_deg):
                 strike(world, shot.source, shot.owner, slot, damage, ring.fraction)
                 break
 
 
-def _in_arc(x: float, y: float, radius: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
+def in_arc(x: float, y: float, radius: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
     """Return whether a body touches the sector of an arc, at most 180 degrees or all round, in the shot's direction."""
     if arc_deg >= 360.0:
         return True
@@ -188,7 +188,7 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
         for i in order
         if edge[i] <= radius
         and near[i] != shot.prior
-        and _in_arc(offset[i, 0], offset[i, 1], float(world.radius[near[i]]), *forward, search.arc_deg)
+        and in_arc(offset[i, 0], offset[i, 1], float(world.radius[near[i]]), *forward, search.arc_deg)
     ]
     return found[: search.max_count] if search.max_count else found
 

@@ -35,7 +35,7 @@ def unknown_to(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[n
 def remember(world: World, player: int) -> None:
     """Update a player's memory with the player's sight in this loop."""
     memory, owner = world.memories[player], world.owner.take(world.live)
-    slots = world.live[_stays(world.catalog).take(world.type.take(world.live)) & (owner != player)]
+    slots = world.live[leave_snapshots(world.catalog).take(world.type.take(world.live)) & (owner != player)]
     visible = world.visible[player].take(slots)
     seen = visible
     if not memory.made:  # the game shows where the neutral things are from the start
@@ -75,6 +75,6 @@ def _note(memory: FogMemory, columns: list[NDArray[Any]]) -> None:
 
 
 @lru_cache(maxsize=4)
-def _stays(catalog: Catalog) -> NDArray[np.bool_]:
+def leave_snapshots(catalog: Catalog) -> NDArray[np.bool_]:
     """Return [rows] which types leave snapshots: structures, resources and all others that never move."""
     return np.array([(u.structure or bool(u.resource)) and u.speed_n == 0.0 for u in catalog.units])

@@ -13,6 +13,7 @@ from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.tables.records import Weapon
     from khala_simulator.world.world import World
 
 WIDEST_AIM_DEG = 180.0
@@ -49,11 +50,15 @@ def engage(world: World, slot: int, target: int) -> bool:
     world.slop[slot] = weapon.slop
     world.rolling[slot] = weapon.moves == "moving"
     world.turreted[slot] = weapon.turret_deg_n is not None
-    angle = min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)
     fixed = weapon.turret_deg_n is None and world.unit_type(slot).unturnable
-    world.aim_cos[slot] = -1.0 if fixed else math.cos(math.radians(angle))
+    world.aim_cos[slot] = -1.0 if fixed else aim_cosine(weapon)
     world.nav_loop[slot] = 0
     return True
+
+
+def aim_cosine(weapon: Weapon) -> float:
+    """Return the cosine of how far off its target a weapon may point when it fires."""
+    return math.cos(math.radians(min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)))
 
 
 def take_other_weapon(world: World, slot: int) -> None:

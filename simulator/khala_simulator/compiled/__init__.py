@@ -23,7 +23,27 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("auto", "compiled", "python")
 VARIABLE: Final = "KHALA_ENGINE"
-SYSTEMS: Final = ("engagement",)
+SYSTEMS: Final = (
+    "acquire",
+    "autocast",
+    "avoidance",
+    "casts",
+    "collision",
+    "construction",
+    "death",
+    "engagement",
+    "harvest",
+    "hits",
+    "missiles",
+    "movement",
+    "navigation",
+    "orders",
+    "regeneration",
+    "sweeps",
+    "triggers",
+    "vision",
+    "weapons",
+)
 """The systems that have a module here."""
 
 

@@ -44,33 +44,44 @@ DEFINITION: Final = '''\
 # Written by khala_simulator.compiled.declare from world.columns.
 """The world's columns as pointers, for compiled systems."""
 cimport numpy as cnp
+from libc.string cimport memcpy
+
+from khala_simulator.world.columns import COLUMNS
 
 cnp.import_array()
 
 
 cdef class Columns:
-    def __deepcopy__(self, memo):
-        """Return None: a copy of a world binds its own arrays."""
-        return None
+    def __reduce__(self):
+        """Return what makes None: a copy of a world binds its own arrays."""
+        return type(None), ()
+
+    def clear(self, Py_ssize_t slot):
+        """Make a slot unused."""
+        cdef Py_ssize_t i, size
+        cdef cnp.ndarray column, empty
+        for i in range(len(NAMES)):
+            column, empty = self.arrays[i + 1], EMPTY[i]
+            size = cnp.PyArray_STRIDE(column, 0)
+            memcpy(<char*>cnp.PyArray_DATA(column) + slot * size, cnp.PyArray_DATA(empty), size)
 
 
-cdef void* start(object column) except NULL:
-    """Return where an array begins; its numbers must lie one after the other."""
-    cdef cnp.ndarray array = column
-    if not cnp.PyArray_ISCARRAY(array):
-        raise ValueError("a column must be contiguous and writable")
-    return cnp.PyArray_DATA(array)
+cdef tuple NAMES = (
+{names}
+)
+cdef tuple EMPTY = tuple(COLUMNS[name].make(1) for name in NAMES)
 
 
 cdef Columns bound(object world):
     cdef Columns c = Columns.__new__(Columns)
+    cdef tuple arrays = (world.visible, *[getattr(world, name) for name in NAMES])
+    for array in arrays:
+        if not cnp.PyArray_ISCARRAY(<cnp.ndarray>array):
+            raise ValueError("a column must be contiguous and writable")
     c.capacity = world.capacity
-    c.visible = <boolean*>start(world.visible)
+    c.visible = <boolean*>cnp.PyArray_DATA(<cnp.ndarray>arrays[0])
 {bindings}
-    c.arrays = (
-        world.visible,
-{arrays}
-    )
+    c.arrays = arrays
     world.native = c
     return c
 '''
@@ -85,11 +96,14 @@ def declared() -> dict[str, str]:
     """Return the text of every file that follows from the columns."""
     types = {name: c_type(column) for name, column in COLUMNS.items()}
     pointers = "\n".join(f"    cdef {kind}* {name}" for name, kind in types.items())
-    bindings = "\n".join(f"    c.{name} = <{kind}*>start(world.{name})" for name, kind in types.items())
-    arrays = "\n".join(f"        world.{name}," for name in types)
+    bindings = "\n".join(
+        f"    c.{name} = <{kind}*>cnp.PyArray_DATA(<cnp.ndarray>arrays[{index}])"
+        for index, (name, kind) in enumerate(types.items(), start=1)
+    )
+    names = "\n".join(f'    "{name}",' for name in types)
     return {
         "columns.pxd": DECLARATION.format(pointers=pointers),
-        "columns.pyx": DEFINITION.format(bindings=bindings, arrays=arrays),
+        "columns.pyx": DEFINITION.format(names=names, bindings=bindings),
     }
 
 

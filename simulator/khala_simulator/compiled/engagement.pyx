@@ -5,6 +5,7 @@ from libc.stdint cimport int64_t
 
 from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
 from khala_simulator.compiled.numbers cimport floats, ints, least, length, most, new_ints
+from khala_simulator.compiled.targets cimport inside_zone
 
 from khala_simulator.economy import harvesting
 from khala_simulator.systems import engagement as rules
@@ -168,9 +169,3 @@ cdef double to_walls(Columns c, int64_t slot, int64_t target) noexcept:
     cdef double x = most(fabs(c.pos[slot].x - c.pos[target].x) - c.walls[target].x, 0.0)
     cdef double y = most(fabs(c.pos[slot].y - c.pos[target].y) - c.walls[target].y, 0.0)
     return length(x, y) - most(c.radius[slot], BESIDE_WALLS)
-
-
-cdef bint inside_zone(Columns c, int64_t slot, int64_t target) noexcept:
-    """Return whether a target touches the only circle in which a unit fires; most units fire anywhere."""
-    cdef double x = c.pos[target].x - c.zone[slot].x, y = c.pos[target].y - c.zone[slot].y
-    return length(x, y) <= c.zone_radius[slot] + c.radius[target] or c.zone_radius[slot] <= 0.0

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from khala_simulator.tables.abilities import Need
+    from khala_simulator.tables.abilities import Ability, Need
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.world import World
 
@@ -40,6 +40,21 @@ def met(world: World, slot: int, need: Need | None) -> bool:
     if need is None or "tech_tree" in world.players[int(world.owner[slot])].cheats:
         return True
     return _count(world, slot, need) > 0
+
+
+def missing_to_all(world: World, slot: int, ability: Ability) -> bool:
+    """Return whether an ability's condition fails for a unit for a reason that all units of its owner share."""
+    return any(
+        need is not None and _of_the_player(need) and not met(world, slot, need)
+        for need in (ability.requires, ability.shown_if)
+    )
+
+
+@lru_cache(maxsize=1024)
+def _of_the_player(need: Need) -> bool:
+    """Return whether a condition has the same value for all units of a player: no part looks at the unit itself."""
+    itself = need.kind == "behavior" or (need.kind == "unit" and need.state.endswith("_here"))
+    return not itself and all(map(_of_the_player, need.parts))
 
 
 def _count(world: World, slot: int, need: Need) -> float:

@@ -62,12 +62,14 @@ class Surface:
             if dx and dy
         ]
         self.spiked: Bools = np.logical_or.reduce([cells for _, cells in self.spikes])
-        self._sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+        # (height + 1, width + 1) how many cells are free below and to the left
+        self.sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
         self._fields: dict[int, _Field] = {}
         self._places: dict[tuple[float, ...], tuple[Ints, Floats]] = {}
         # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
-        self._steps: list[int] = self._free_steps(blocked).tolist()
+        self.steps: list[int] = self._free_steps(blocked).tolist()
         self._edges = _edges(self.width)
+        self.native: object | None = None  # its cells as compiled code sees them
 
     def _neighbour_blocked(self, dx: int, dy: int) -> Bools:
         """Return (cells,) whether the neighbour at an offset is blocked; beyond the grid everything is."""
@@ -76,7 +78,7 @@ class Surface:
         return ~shifted.ravel()
 
     def _free_steps(self, blocked: dict[tuple[int, int], Bools]) -> NDArray[np.uint8]:
-        """Return (cells,) the bits of ``_steps``."""
+        """Return (cells,) the bits of ``steps``."""
         steps = np.zeros(self.flat.size, dtype=np.uint8)
         for bit, (dx, dy) in enumerate(NEIGHBOURS):
             free = self.flat & ~blocked[dx, dy]
@@ -106,12 +108,12 @@ class Surface:
 
     def nearest(self, point: Floats, part: int, starts: Floats) -> Ints:
         """Return (k,) the cells of a connected part nearest to a point; the side of each start decides near ties."""
-        cells, distance = self._around(point, part)
+        cells, distance = self.around(point, part)
         sides = geometry.length(self.centre(cells) - starts[:, None])
         nearest: Ints = cells.take(np.argmin(distance + NEAR_SIDE * sides, axis=1))
         return nearest
 
-    def _around(self, point: Floats, part: int) -> tuple[Ints, Floats]:
+    def around(self, point: Floats, part: int) -> tuple[Ints, Floats]:
         """Return the cells of a connected part among which a start may choose, and how far from the point they are.
 
         A start that prefers a cell to the nearest one, d away, is at most their distance nearer to it, so the cell is
@@ -129,7 +131,7 @@ class Surface:
 
     def nearest_free(self, point: Floats) -> int | None:
         """Return the free cell nearest to ``point`` over all parts, or None when nothing is free."""
-        candidates = [cells[np.argmin(d)] for cells, d in (self._around(point, i) for i in range(len(self._members)))]
+        candidates = [cells[np.argmin(d)] for cells, d in (self.around(point, i) for i in range(len(self._members)))]
         if not candidates:
             return None
         return int(candidates[int(np.argmin(geometry.length(self.centre(np.array(candidates)) - point)))])
@@ -151,7 +153,7 @@ class Surface:
         np.minimum(high, self._last + 1, out=high)
         left, right = low[:, 0], high[:, 0]
         below, above = low[:, 1] * (self.width + 1), high[:, 1] * (self.width + 1)
-        s = self._sums
+        s = self.sums
         free = s.take(above + right) - s.take(below + right) - s.take(above + left) + s.take(below + left)
         size = high - low
         result: Bools = np.equal(free, size[:, 0] * size[:, 1])
@@ -237,7 +239,7 @@ class Surface:
             if len(self._fields) >= FIELDS_KEPT:
                 self._fields.clear()
             found = self._fields[goal] = _Field(goal, self.flat.size)
-        found.reach(cells, self._steps, self._edges)
+        found.reach(cells, self.steps, self._edges)
         return found
 
     @cached_property

@@ -162,7 +162,7 @@ def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point
     if not ahead or enemy.near(side.place(ahead[0]), FIGHT).size:
         return set()
     centre = world.pos[there][away >= middle].mean(axis=0).tolist()
-    running = [s for s in ahead if world.order_kind[s] != OrderKind.MOVE]
+    running = [s for s in ahead if int(world.order_kind[s]) != OrderKind.MOVE]
     if running:
         hands.move(side, running, (centre[0], centre[1]))
     return set(ahead)

@@ -131,7 +131,7 @@ def _fight(side: Side) -> None:
     if not squad or world.loop - drop.since > FIGHT_S * FASTER_LOOPS:
         _end(side)
         return
-    idle = [s for s in squad if world.order_kind[s] == OrderKind.IDLE and world.target[s] == NOBODY]
+    idle = [s for s in squad if int(world.order_kind[s]) == OrderKind.IDLE and world.target[s] == NOBODY]
     if idle:
         hands.attack(side, idle, drop.target)
 

@@ -55,7 +55,7 @@ def mine(side: Side, staff: Staff) -> None:
     """Send idle workers to work, fill the gas structures, and even the bases out."""
     world = side.world
     pulled = set(map(world.slot_of, side.mind.pulled))
-    idle = [w for w in side.workers if world.order_kind[w] == OrderKind.IDLE and w not in pulled]
+    idle = [w for w in side.workers if int(world.order_kind[w]) == OrderKind.IDLE and w not in pulled]
     for site in _abandoned(side):
         if idle:
             hands.smart(side, [idle.pop()], world.tag_of(site))
@@ -70,7 +70,7 @@ def _abandoned(side: Side) -> list[int]:
     """Return unfinished structures that only go on with a builder, and that have none."""
     world = side.world
     halted = [s for slots in side.begun.values() for s in slots if not world.self_made[s]]
-    building = {int(world.order_target[w]) for w in side.workers if world.order_kind[w] == OrderKind.FOLLOW}
+    building = {int(world.order_target[w]) for w in side.workers if int(world.order_kind[w]) == OrderKind.FOLLOW}
     return [s for s in halted if s not in building and construction.builder_of(world, s) == NOBODY]
 
 

@@ -183,7 +183,7 @@ def free_worker(side: Side, point: Point) -> int:
 def _interruptible(world: World, slot: int) -> bool:
     fields = harvesting.kinds(world.catalog)[1]
     patch = int(world.patch[slot])
-    mines = world.harvest[slot] == Phase.TO_RESOURCE and patch != NOBODY and bool(fields[world.type[patch]])
+    mines = int(world.harvest[slot]) == Phase.TO_RESOURCE and patch != NOBODY and bool(fields[world.type[patch]])
     return mines or (world.order_kind[slot] == 0 and world.carrier[slot] == NOBODY)
 
 

@@ -43,7 +43,7 @@ def look(side: Side) -> None:
             _end(side)
             return
         place = _place(side)
-    if world.order_kind[scout] != OrderKind.MOVE or math.dist(world.order_point[scout].tolist(), place) > 1.0:
+    if int(world.order_kind[scout]) != OrderKind.MOVE or math.dist(world.order_point[scout].tolist(), place) > 1.0:
         hands.move(side, [scout], place)
 
 
@@ -60,7 +60,7 @@ def _chosen(side: Side) -> int:
         overlords = side.named("Overlord")
         return overlords[0] if overlords else products.free_worker(side, side.mind.enemy_start)
     world = side.world
-    idle = [s for s in side.army if world.order_kind[s] == OrderKind.IDLE and world.target[s] == NOBODY]
+    idle = [s for s in side.army if int(world.order_kind[s]) == OrderKind.IDLE and world.target[s] == NOBODY]
     return min(idle, key=lambda s: (sum(world.unit_type(s).cost), s), default=NOBODY)
 
 

@@ -58,12 +58,12 @@ def nearer(at: Point, here: Point, there: Point) -> bool:
 
 def idle(side: Side, slot: int) -> bool:
     """Return whether a unit has no order and fights nobody."""
-    return bool(side.world.order_kind[slot] == OrderKind.IDLE and side.world.target[slot] == NOBODY)
+    return bool(int(side.world.order_kind[slot]) == OrderKind.IDLE and side.world.target[slot] == NOBODY)
 
 
 def bound_for(side: Side, slot: int, point: Point, slack: float) -> bool:
     """Return whether a unit is on its way to a point already."""
     world = side.world
-    walks = world.order_kind[slot] in (OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE)
+    walks = int(world.order_kind[slot]) in (OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE)
     x, y = world.order_point[slot].tolist()
     return bool(walks) and math.dist((x, y), point) <= slack

@@ -241,10 +241,10 @@ def _answer(world: World) -> None:
             if _free_to_answer(world, slot) and world.visible[world.owner[slot], attacker]:
                 _take(world, slot, attacker)
         if world.flees[victim] and world.order_kind[victim] == IDLE and not world.returning[victim]:
-            _flee(world, victim, attacker)
+            flee(world, victim, attacker)
 
 
-def _flee(world: World, victim: int, attacker: int) -> None:
+def flee(world: World, victim: int, attacker: int) -> None:
     """Make an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
     x0, y0, x1, y1 = world.map.terrain.playable
     offset = world.pos[victim] - world.pos[attacker]

@@ -32,11 +32,12 @@ def look_out(world: World) -> None:
     for slot in sorted(world.autocast):
         if world.carrier[slot] == NOBODY and world.can_cast[slot] and not world.casts[slot]:
             for number in world.autocast[slot]:
-                if _try(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
+                if attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
                     break
 
 
-def _try(world: World, slot: int, ability: Ability) -> bool:
+def attempt(world: World, slot: int, ability: Ability) -> bool:
+    """Make a unit use an ability if its player would want that now; return whether it does."""
     order = OrderKind(int(world.order_kind[slot]))
     cast = _choose(world, slot, ability) if ability.transient or order in FREE else None
     if cast is None or (order is OrderKind.HOLD and not casting.in_range(world, cast)):

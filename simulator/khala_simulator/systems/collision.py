@@ -238,10 +238,10 @@ def _off_walls(surface: Surface, before: Floats, after: Floats, cell: Ints, clea
                 distance, room = geometry.length(offset), clearance.take(at)
                 push = np.maximum(room - distance, 0.0) / np.maximum(distance, SAME_POINT)
                 kept[at] += offset * push[:, None]
-    return _free_or_back(surface, before, kept)
+    return free_or_back(surface, before, kept)
 
 
-def _free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
+def free_or_back(surface: Surface, before: Floats, after: Floats) -> Floats:
     """Slide along one axis where the new place is blocked, else stay, else leave towards the nearest free cell."""
     after = np.minimum(np.maximum(after, 0.0), (surface.width - EDGE_MARGIN, surface.height - EDGE_MARGIN))
     bad = ~surface.flat.take(surface.cell(after))

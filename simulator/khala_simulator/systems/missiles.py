@@ -43,25 +43,25 @@ def fly(world: World) -> None:
         missiles.keep(~arriving)
         for shot in arrived:
             damage.hit_with(world, shot)
-            _bounce(world, shot)
+            bounce(world, shot)
 
 
 def launch(world: World, shot: Shot, hit: Hit) -> None:
     """Send the missile of a hit on its way."""
+    step, top, gain = speeds(hit)
+    world.missiles.append(1, **shot._asdict(), pos=shot.start, step=step, top=top, gain=gain)
+
+
+def speeds(hit: Hit) -> tuple[float, float, float]:
+    """Return the first and the highest speed of a hit's missile, and its acceleration, in world units and loops."""
     top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
     gain_n = hit.missile_acceleration_n
-    instant = gain_n is None or gain_n >= INSTANT_ACCELERATION_N
-    world.missiles.append(
-        1,
-        **shot._asdict(),
-        pos=shot.start,
-        step=top if instant else 0.0,
-        top=top,
-        gain=math.inf if gain_n is None or instant else gain_n / LOOPS_PER_NORMAL_SECOND**2,
-    )
+    if gain_n is None or gain_n >= INSTANT_ACCELERATION_N:
+        return top, top, math.inf
+    return 0.0, top, gain_n / LOOPS_PER_NORMAL_SECOND**2
 
 
-def _bounce(world: World, shot: Shot) -> None:
+def bounce(world: World, shot: Shot) -> None:
     """Send on a missile that bounces; one whose target died on the way is lost."""
     hits = world.catalog.weapons[shot.weapon].hits
     if shot.target == NOBODY or shot.hit + 1 >= len(hits) or not hits[shot.hit + 1].bounce:

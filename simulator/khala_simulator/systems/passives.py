@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from khala_simulator.abilities.registry import PASSIVES
 
 if TYPE_CHECKING:
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.columns import Bools
     from khala_simulator.world.world import World
 
 
@@ -21,7 +26,12 @@ def run(world: World) -> None:
 def _look_over(world: World) -> None:
     """List the units whose types have a rule, after a unit came or went."""
     world.passive_units_at, world.passive_units = world.population, {}
-    for slot in world.live.tolist():
-        name = world.unit_type(slot).name
-        if name in PASSIVES:
-            world.passive_units.setdefault(name, []).append(slot)
+    slots = world.live[_has_rule(world.catalog).take(world.type.take(world.live))]
+    for slot in slots.tolist():
+        world.passive_units.setdefault(world.unit_type(slot).name, []).append(slot)
+
+
+@lru_cache(maxsize=4)
+def _has_rule(catalog: Catalog) -> Bools:
+    """Return, by unit row, which types have a rule."""
+    return np.array([unit.name in PASSIVES for unit in catalog.units])

@@ -47,7 +47,7 @@ def look(world: World) -> None:
     if world.fog or changed or (world.hiding and due):
         world.visible[:, : world.top] = False
         world.visible[:, world.live] = _seen_units(world)
-        _reveal(world)
+        reveal(world)
         if world.fog and due:
             for player in range(1, len(world.players)):
                 remember(world, player)
@@ -79,7 +79,7 @@ def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.
     return found
 
 
-def _reveal(world: World) -> None:
+def reveal(world: World) -> None:
     """Show units under a revealing buff to the player that applied it."""
     for row in _buffs(world, _revealing(world.catalog)):
         world.visible[int(row["owner"]), int(row["slot"])] = True
@@ -123,12 +123,18 @@ def _recount(world: World, eyes: Eyes) -> None:
     for sign, of in ((-1, before), (1, now)):
         for owner, x, y, radius, below in of.take(changed, 1).T.tolist():
             _count(eyes.count, terrain, (int(owner), int(x), int(y), radius, int(below)), sign)
+    eyes.units = now
+    count_lights(world, eyes)
+
+
+def count_lights(world: World, eyes: Eyes) -> None:
+    """Count what the eyes see that are no units; only those that come or go."""
     lights = set(_lights(world))
     for light in lights - eyes.lights:
-        _count(eyes.count, terrain, light, 1)
+        _count(eyes.count, world.map.terrain, light, 1)
     for light in eyes.lights - lights:
-        _count(eyes.count, terrain, light, -1)
-    eyes.units, eyes.lights = now, lights
+        _count(eyes.count, world.map.terrain, light, -1)
+    eyes.lights = lights
 
 
 def _unit_eyes(world: World) -> Floats:
@@ -162,7 +168,7 @@ def _view(terrain: Terrain, x: int, y: int, radius: float, below: int) -> tuple[
     Workers come to the same cells again and again.
     """
     width, height = terrain.size
-    mask, half = _disc(radius)
+    mask, half = disc(radius)
     left, low = max(x - half, 0), max(y - half, 0)
     right, high = max(min(x + half + 1, width), left), max(min(y + half + 1, height), low)
     shape = mask[low - y + half : high - y + half, left - x + half : right - x + half]
@@ -201,7 +207,7 @@ def _lighting(catalog: Catalog) -> Bools:
 
 
 @lru_cache(maxsize=64)
-def _disc(radius: float) -> tuple[NDArray[np.bool_], int]:
+def disc(radius: float) -> tuple[NDArray[np.bool_], int]:
     """Return the cells within a radius as a square mask, and how far its middle is from its edge."""
     cells = geometry.disc_cells(radius)
     half = int(np.abs(cells).max(initial=0))

@@ -139,7 +139,7 @@ def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) 
         return
     target = world.target[slots]
     if hit.when:
-        chosen = _branch(world, hit, weapon, slots, target)
+        chosen = branch(world, hit, weapon, slots, target)
         slots, target, moment = slots[chosen], target[chosen], moment[chosen]
     if slots.size:
         at = slots if weapon.is_kamikaze else target  # a suicide attacker is the middle of it
@@ -161,7 +161,7 @@ def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) 
 # branches of the game's own switches ----------------------------------------------------------------------------------
 
 
-def _branch(world: World, hit: Hit, weapon: Weapon, source: Ints, target: Ints) -> Bools:
+def branch(world: World, hit: Hit, weapon: Weapon, source: Ints, target: Ints) -> Bools:
     """Return (k,) whether the game's switch takes the branch of ``hit``; unknown conditions never hold."""
     if hit.when == "else":
         others = [h.when for h in weapon.hits if h.when not in ("", "else")]

@@ -11,7 +11,7 @@ upgrades and order, or it is written again in every loop before it is read.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,13 @@ def state(of: type, empty: float = 0, *, width: int = 0) -> Any:
 def trait(of: type, empty: float = 0, *, width: int = 0) -> Any:
     """Declare a column that follows from others."""
     return Column(DTYPES[of], empty, width, is_state=False)
+
+
+class Native(Protocol):
+    """The columns as compiled code sees them."""
+
+    def clear(self, slot: int) -> None:
+        """Make a slot unused."""
 
 
 class UnitColumns:
@@ -207,7 +214,7 @@ class UnitColumns:
 
     def __init__(self) -> None:
         self.capacity = 0
-        self.native: object | None = None  # the arrays as compiled code sees them, bound when it needs them
+        self.native: Native | None = None  # the arrays as compiled code sees them, bound when it needs them
 
     def grow(self, capacity: int) -> None:
         """Make room for ``capacity`` slots; the values stay, the arrays are new."""
@@ -221,6 +228,9 @@ class UnitColumns:
 
     def clear(self, slot: int) -> None:
         """Make a slot unused."""
+        if self.native is not None:
+            self.native.clear(slot)
+            return
         for name, column in COLUMNS.items():
             getattr(self, name)[slot] = column.empty
 

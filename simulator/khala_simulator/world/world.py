@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import Stats
 from khala_simulator.world.active_buffs import ActiveBuffs
@@ -220,7 +221,7 @@ class World(UnitColumns, WorldCaches):
 
     def passengers(self, carrier: int) -> list[int]:
         """Return the slots of the units inside a carrier, ascending."""
-        inside: list[int] = np.flatnonzero(self.alive & (self.carrier == carrier)).tolist()
+        inside: list[int] = which(self.alive & (self.carrier == carrier)).tolist()
         return inside
 
     def slot_of(self, tag: int) -> int:
@@ -358,15 +359,15 @@ class World(UnitColumns, WorldCaches):
 
     def population_changed(self) -> None:
         """Note that a unit came, went or changed its type."""
-        self.live = np.flatnonzero(self.alive & (self.carrier == NOBODY))
+        self.live = which(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.changes += 1
         self.census = self.tally = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
-        self.regenerating = bool(shields.any()), bool(life.any()), bool(energy.any())
-        self.mortal = bool(self.expires.any())
-        self.hiding = bool((self.cloaked | self.burrowed).any())
+        self.regenerating = _any(shields), _any(life), _any(energy)
+        self.mortal = _any(self.expires)
+        self.hiding = some(self.cloaked | self.burrowed)
 
     def note_traits(self, slot: int) -> None:
         """Note a unit's changed traits for the systems that skip worlds without such units."""
@@ -383,7 +384,7 @@ class World(UnitColumns, WorldCaches):
         self.scan_now = True
 
     def _free_slot(self) -> int:
-        free = np.flatnonzero(~self.alive[1 : self.top])
+        free = which(~self.alive[1 : self.top])
         if free.size:
             return int(free[0]) + 1
         if self.top == self.capacity:
@@ -406,6 +407,11 @@ class World(UnitColumns, WorldCaches):
 def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
     """Return the cells of a footprint as an array (k, 2)."""
     return np.array(cells, dtype=np.int64)
+
+
+def _any(column: Floats | Ints) -> bool:
+    """Return whether any number is not zero; four times as fast as ``any``."""
+    return bool(np.count_nonzero(column))
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:

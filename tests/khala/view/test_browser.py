@@ -120,6 +120,18 @@ def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: Brow
     page.wait_for_function("() => location.hash.includes('s=20')")
 
 
+def test_a_link_holds_though_the_address_is_written_over_before_the_page_hears_of_it(
+    context: BrowserContext, golden: Viewer
+) -> None:
+    page = opened(context, golden.address, "canvas[data-step]")
+    page.evaluate(
+        """() => { const old = location.hash
+            location.hash = old.replace(/&s=\\d+/, '') + '&s=9'
+            history.replaceState(null, '', old) }"""
+    )
+    page.wait_for_selector("canvas[data-step='9']")
+
+
 def test_play_moves_the_clock_to_the_end_and_stops_there(context: BrowserContext, golden: Viewer) -> None:
     page = opened(context, golden.address)
     page.get_by_label("Speed").select_option(label="×16")

@@ -114,6 +114,23 @@ async def test_speech_to_a_stopped_router_holds_neither_the_loop_nor_the_end(
         await agent.close()
 
 
+async def test_publishers_close_at_once_while_clients_leave(opened: OpenBus, socket: str) -> None:
+    host = await opened(BusConfig(mode="router", listen=(socket,)))
+    for _ in range(4):
+        clients = [await opened(BusConfig(connect=(socket,))) for _ in range(3)]
+        states = [await host.publisher(f"state/{one}", Delivery.STATE) for one in range(4)]
+        logs = [await host.publisher(f"log/{one}", Delivery.LOG) for one in range(10)]  # who listens comes in callbacks
+        for client in clients:
+            await client.subscribe("log/**", Delivery.LOG)
+        leaving = [asyncio.create_task(client.close()) for client in clients]
+        async with watching_the_loop() as gap:
+            for publisher in (*states, *logs):
+                await asyncio.sleep(0)
+                await publisher.close()
+            await asyncio.wait(leaving)
+        assert gap.worst_s < 2  # Zenoh's own `undeclare` took 10 s each in most of such rounds
+
+
 async def test_a_process_that_forgets_to_close_ends_all_the_same(opened: OpenBus, start: StartPeer) -> None:
     router = await opened(LOCAL)
     process = await start("forgetful", router.endpoints[0])

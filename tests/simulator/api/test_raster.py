@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, spatial_pb2
 
-from khala_simulator.api.raster import Discs, RasterLayer, draw_discs, sample
+from khala_simulator.api.raster import Discs, RasterLayer, Sampler, draw_discs
 
 
 def discs(*circles: tuple[float, float, float], size: int = 8) -> Discs:
@@ -77,7 +77,7 @@ def test_no_disc_leaves_the_image(circles: list[tuple[float, float, float]]) -> 
 
 def test_samples_outside_of_the_map_are_zero() -> None:
     grid = np.array([[1, 2], [3, 4]], np.uint8)
-    image = sample(grid, np.array([-0.5, 0.5, 1.5, 2.5]), np.array([1.5, 0.5, -0.5]))
+    image = Sampler((2, 2), np.array([-0.5, 0.5, 1.5, 2.5]), np.array([1.5, 0.5, -0.5])).take(grid)
     assert image.tolist() == [[0, 3, 4, 0], [0, 1, 2, 0], [0, 0, 0, 0]]
 
 

@@ -1,4 +1,4 @@
-"""Play a map with random orders, and print the world's digest: run by tests, in processes of their own.
+"""Play a map with random orders, and print the world's digest: run by tests, some in processes of their own.
 
     python random_orders.py MAP SEED LOOPS
 
@@ -15,13 +15,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_simulator.api import abilities
+from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
+from khala_simulator.movement.placement import free_places
+from khala_simulator.systems.triggers import players_of
 from khala_simulator.tables.abilities import Aim
 from khala_simulator.tick import advance, new_game
+from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
-    from khala_simulator.world.world import World
+    from collections.abc import Callable, Sequence
 
+FIELD = "llm_smac/corridor"
 EVERY = 8
 ORDERS = 6
 
@@ -64,20 +69,33 @@ def check(world: World) -> None:
     assert (world.energy[world.live] >= 0).all()
 
 
-def play(name: str, seed: int, loops: int) -> World:
+def play(world: World, seed: int, loops: int, systems: Sequence[Callable[[World], None]] | None = None) -> World:
     """Play at most ``loops`` loops with random orders; every debug state that allows more is on."""
-    world, chance = new_game(load_map(name), seed=seed), random.Random(seed)
+    chance = random.Random(seed)
     for player in world.players[1:]:
         player.cheats += ["tech_tree", "cooldown"]
         player.minerals = player.vespene = 5000.0
     while world.loop < loops and not world.ended:
         if world.loop % EVERY == 0:
             give_orders(world, chance)
-        advance(world)
+        advance(world, 1, systems)
         check(world)
     return world
 
 
+def crowd(units: int, seed: int) -> World:
+    """Return a world with so many units a side, of any types that walk or fly, on a map with walls."""
+    world, chance = World(load_map(FIELD), players_of(load_map(FIELD)), seed=seed), random.Random(seed)
+    kinds = [kind for kind in world.catalog.units if kind.supply > 0]
+    x0, y0, x1, y1 = world.map.terrain.playable
+    for player in (1, 2):
+        home = (chance.uniform(x0, x1), chance.uniform(y0, y1))
+        for kind in chance.choices(kinds, k=units):
+            lifecycle.spawn(world, kind, player, free_places(world, kind, home, 1)[0])
+    return world
+
+
 if __name__ == "__main__":
-    played = play(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    name, seed, loops = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    played = play(new_game(load_map(name), seed=seed), seed, loops)
     sys.stdout.write(f"{played.loop} {played.digest()}\n")

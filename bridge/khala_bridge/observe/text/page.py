@@ -13,6 +13,7 @@ from __future__ import annotations
 import difflib
 import importlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from khala_bridge.observe.text.tokens import tokens
@@ -35,7 +36,7 @@ Part: TypeAlias = Literal[
 """A part of the view that is made only for agents with a section that shows it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Page:
     """The data for the sections."""
 
@@ -56,7 +57,7 @@ class Page:
         """The agent's teams that have units, or need none."""
         return self.observation.view.teams
 
-    @property
+    @cached_property
     def correspondents(self) -> list[str]:
         """Names of all that this agent may write to."""
         return [agent.name for agent in self.task.correspondents(self.observation.agent)]

@@ -118,7 +118,7 @@ def _launch(world: World, carrier: int, prey: int, ability: Ability) -> None:
 def _direct(world: World, slot: int, carrier: int, leash: float) -> None:
     """Attack the Carrier's target, go on with its own one while the leash allows, else return."""
     prey = int(world.target[carrier]) if world.in_reach[carrier] else NOBODY
-    own = int(world.order_target[slot]) if world.order_kind[slot] == OrderKind.ATTACK_UNIT else NOBODY
+    own = int(world.order_target[slot]) if int(world.order_kind[slot]) == OrderKind.ATTACK_UNIT else NOBODY
     if prey == NOBODY and own != NOBODY and gap(world, carrier, own) <= leash:
         prey = own
     if prey != NOBODY:
@@ -129,7 +129,7 @@ def _direct(world: World, slot: int, carrier: int, leash: float) -> None:
         commands.begin(world, slot, None)
         world.stow(slot, carrier)
         refresh(world, slot)
-    elif world.order_kind[slot] != OrderKind.FOLLOW:
+    elif int(world.order_kind[slot]) != OrderKind.FOLLOW:
         commands.begin(world, slot, Order(OrderKind.FOLLOW, MOVE, target=world.tag_of(carrier)))
 
 

@@ -115,7 +115,7 @@ def _hand_over(world: World, slot: int, owner: int) -> None:
     commands.begin(world, slot, None)
     for other in world.units_of(owner).tolist():
         if world.target[other] == slot:
-            if world.order_kind[other] == OrderKind.ATTACK_UNIT:
+            if int(world.order_kind[other]) == OrderKind.ATTACK_UNIT:
                 commands.begin_next(world, other)
             else:
                 disengage(world, other)

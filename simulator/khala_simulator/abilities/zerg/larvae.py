@@ -140,7 +140,7 @@ def _wander(world: World, slots: list[int]) -> None:
         x, y = world.pos[slot].tolist()
         if not world.growth.covers(x, y):
             world.life[slot] = 0.0
-        elif world.order_kind[slot] == OrderKind.IDLE:
+        elif int(world.order_kind[slot]) == OrderKind.IDLE:
             _step(world, slot, x, y)
 
 

@@ -67,7 +67,7 @@ def _room_for_tumor(world: World, cast: Cast) -> ActionResult:
 def _burrow_when_grown(world: World, slots: list[int]) -> None:
     """Burrow finished tumors."""
     for slot in slots:
-        if world.build_progress[slot] >= 1.0 and world.order_kind[slot] == OrderKind.IDLE:
+        if world.build_progress[slot] >= 1.0 and int(world.order_kind[slot]) == OrderKind.IDLE:
             commands.begin(world, slot, Order(OrderKind.CAST, BURROW))
 
 

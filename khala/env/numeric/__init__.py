@@ -1,0 +1,72 @@
+"""SMAC's battles in numbers, on the simulator in this process: observations, states, masks and rewards as SMAC's.
+
+    env = parallel_env("3m")                       PettingZoo, all agents at once
+    env = env("3m")                                PettingZoo, one agent after the other
+    env = CentralEnv("3m")                         Gymnasium, one player for all agents
+    env = gymnasium.make("khala.env.numeric:khala-smac/3m-v0")
+    envs = vector_env("3m", 8, processes=True)     Gymnasium, several at once
+    env = StarCraft2Env("3m")                      SMAC's own interface
+
+All play the same game, and take SMAC's options (`khala.env.numeric.options`), such as `difficulty="A"`.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
+
+from khala.env.numeric.central import CentralEnv
+from khala.env.numeric.maps import MAPS
+from khala.env.numeric.options import Options
+from khala.env.numeric.parallel import NumericParallelEnv
+from khala.env.numeric.starcraft2 import StarCraft2Env
+
+if TYPE_CHECKING:
+    from gymnasium.vector import VectorEnv
+    from pettingzoo import AECEnv
+
+__all__ = ["MAPS", "CentralEnv", "NumericParallelEnv", "Options", "StarCraft2Env", "env", "parallel_env", "vector_env"]
+
+for _name in MAPS:
+    gymnasium.register(f"khala-smac/{_name}-v0", entry_point="khala.env.numeric:CentralEnv", kwargs={"map_name": _name})
+
+
+def parallel_env(
+    map_name: str = "3m", *, max_cycles: int | None = None, render_mode: str | None = None, **options: Any
+) -> NumericParallelEnv:
+    """Return battles in which all agents act at the same time.
+
+    Args:
+        map_name: one of SMAC's 23 maps.
+        max_cycles: steps of an episode; None: as many as in SMAC.
+        render_mode: `rgb_array`: `render()` returns a picture.
+        **options: see `khala.env.numeric.options.Options`.
+
+    Raises:
+        ConfigError: there is no such map, or an option has no such value.
+    """
+    return NumericParallelEnv(map_name, max_cycles=max_cycles, render_mode=render_mode, **options)
+
+
+def env(map_name: str = "3m", **options: Any) -> AECEnv[str, Any, Any]:
+    """Return battles in which one agent after the other is asked; arguments and errors as in `parallel_env`."""
+    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(map_name, **options)))
+
+
+def vector_env(
+    map_name: str = "3m", num_envs: int = 8, *, processes: bool = False, **options: Any
+) -> VectorEnv[Any, Any, Any]:
+    """Return several `CentralEnv` at once. `reset(seed=1)` seeds the first with 1, the next with 2, and so on.
+
+    Args:
+        map_name: one of SMAC's 23 maps.
+        num_envs: how many.
+        processes: whether each has a process of its own; otherwise they play in turn.
+        **options: as in `parallel_env`.
+    """
+    make = [partial(CentralEnv, map_name, **options)] * num_envs
+    return AsyncVectorEnv(make) if processes else SyncVectorEnv(make)

@@ -1,0 +1,199 @@
+"""A battle in this process: orders by tag, game loops, and units as columns, without messages or sockets.
+
+It is the game that a client of the game process plays: the same map, seed and orders make the same world, loop for
+loop, and units have the values that an observation has. It is for maps of one agent without fog, such as SMAC's, whose
+player sees all units at any time. Environments for reinforcement learning are above it; below it is `api`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from s2clientprotocol import common_pb2
+from s2clientprotocol import sc2api_pb2 as sc
+
+from khala_simulator.abilities import commands
+from khala_simulator.api.abilities import UnitCommand, carry_out, judge
+from khala_simulator.api.game import HostedGame, Setup
+from khala_simulator.api.layers import Frame
+from khala_simulator.api.seat import PlayerSeat
+from khala_simulator.api.sight import look
+from khala_simulator.maps.game_map import load_map
+from khala_simulator.tables.versions import DEFAULT_VERSION
+from khala_simulator.tick import advance
+from khala_simulator.world.world import INDEX_SHIFT, NO_TAG, NOBODY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    Bools = NDArray[np.bool_]
+    Ints = NDArray[np.int64]
+    Floats = NDArray[np.float64]
+    Point = tuple[float, float]
+
+PLAYER: Final = 1
+ENEMY: Final = 2
+_SLOT = 0x3FFF
+
+
+class Ground(NamedTuple):
+    """The map, as the game's information on it has it."""
+
+    size: tuple[int, int]
+    """Width and height of the map, world units."""
+    playable: tuple[int, int, int, int]
+    """x0, y0, x1, y1."""
+    walkable: Bools
+    """[height, width], row 0 in the south."""
+    height: NDArray[np.uint8]
+    """[height, width], row 0 in the south."""
+
+
+class Units(NamedTuple):
+    """Columns of units, one row each; numbers are rounded to those of a message, which has 32 bits for each."""
+
+    tag: Ints
+    type_id: Ints
+    x: Floats
+    y: Floats
+    life: Floats
+    life_max: Floats
+    shields: Floats
+    shields_max: Floats
+    energy: Floats
+    cooldown: Floats
+    """Game loops until its weapon can fire again; 0 without one."""
+
+
+class Battle:
+    """One running game."""
+
+    def __init__(
+        self,
+        map_name: str,
+        *,
+        seed: int,
+        difficulty: int = sc.VeryHard,
+        version: str = DEFAULT_VERSION,
+    ) -> None:
+        """Begin a game.
+
+        Args:
+            map_name: of a shipped map, `SMAC_Maps/3m`.
+            seed: of all that the game leaves to chance.
+            difficulty: the API's number of the computer player's level, 1 to 10.
+            version: of the game whose tables it has.
+
+        Raises:
+            ValueError: the map has fog.
+        """
+        players = (
+            sc.PlayerSetup(type=sc.Participant),
+            sc.PlayerSetup(type=sc.Computer, difficulty=difficulty),  # type: ignore[arg-type]  # the API's numbers
+        )
+        game_map = load_map(map_name)
+        if game_map.scenario.visibility.fog:
+            raise ValueError(f"{map_name} has fog: a battle without messages is for maps whose player sees all units")
+        self._game = HostedGame(
+            Setup(game_map, b"", map_name, players, seed=seed, disable_fog=False, realtime=False), version
+        )
+        self._world = self._game.world
+        self._seat: PlayerSeat | None = None
+
+    @property
+    def loop(self) -> int:
+        """Game loops since its begin."""
+        return self._world.loop
+
+    def digest(self) -> str:
+        """Return the SHA-256 of everything that decides the future."""
+        return self._world.digest()
+
+    def ground(self) -> Ground:
+        """Return the map."""
+        terrain = self._world.map.terrain
+        return Ground(terrain.size, terrain.playable, terrain.walk, terrain.height)
+
+    # acting -------------------------------------------------------------------------------------------------------
+
+    def order(self, ability: int, tag: int, *, target: int = NO_TAG, point: Point | None = None) -> None:
+        """Order a unit of the player to use an ability, at a unit, a point or nothing; nothing happens if it cannot.
+
+        Args:
+            ability: its id, general or of the unit's type.
+            tag: of the unit.
+            target: tag of the unit that it is aimed at.
+            point: the world point that it is aimed at.
+        """
+        at = None if point is None else (float(np.float32(point[0])), float(np.float32(point[1])))
+        carry_out(self._world, judge(self._world, PLAYER, UnitCommand(ability, (tag,), target, at)))
+
+    def kill(self, tags: Iterable[int]) -> None:
+        """Kill units of any player; they die in the next loop."""
+        commands.debug_kill(self._world, tags)
+
+    def advance(self, loops: int) -> None:
+        """Play a number of game loops."""
+        advance(self._world, loops)
+
+    def forget_past(self) -> None:
+        """Drop the lists of what has happened, which grow in a long game and which nobody reads here."""
+        world = self._world
+        world.deaths, world.deaths_seen = world.deaths[world.deaths_seen :], 0
+        world.mishaps, world.alerts = [], []
+
+    # seeing -------------------------------------------------------------------------------------------------------
+
+    def tags_of(self, player: int) -> Ints:
+        """Return the tags of a player's units, in the order in which an observation has them."""
+        sight = look(self._world, self._game.types, PLAYER, show_cloaked=False)
+        tags: Ints = sight.tag[sight.owner == player]
+        return tags
+
+    def present(self, tags: Ints) -> Bools:
+        """Return which of these units are in the world."""
+        world, slots = self._world, tags >> INDEX_SHIFT & _SLOT
+        there: Bools = (world.tag[slots] == tags) & (world.carrier[slots] == NOBODY)
+        return there
+
+    def look(self, tags: Ints) -> Units:
+        """Return these units, which are in the world."""
+        world, slots = self._world, tags >> INDEX_SHIFT & _SLOT
+        owner, row = world.owner[slots], world.type[slots]
+        types, stats = self._game.types, world.stats
+        columns = np.stack(
+            (
+                *world.pos[slots].T,
+                world.life[slots],
+                stats.life_max[owner, row],
+                world.shields[slots],
+                stats.shields_max[owner, row],
+                world.energy[slots],
+                np.maximum(world.cooldown[slots], 0.0) * types.armed[row],
+            )
+        )
+        return Units(tags, types.id[row], *columns.astype(np.float32).astype(np.float64))
+
+    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Return a picture of the playable part of the map, [height, width, 3] RGB, as a client has it rendered."""
+        if self._seat is None or (self._seat.screen.columns, self._seat.screen.rows) != (width, height):
+            self._seat = self._camera(width, height)
+        seat, world = self._seat, self._world
+        sight = seat.look()
+        nothing = np.zeros(len(sight), dtype=np.bool_)
+        frame = Frame(world, self._game.types, PLAYER, sight, nothing, seat.camera, sight.pos[nothing], fogged=False)
+        assert seat.renders is not None
+        return seat.renders.screen(frame)
+
+    def _camera(self, width: int, height: int) -> PlayerSeat:
+        """Return a seat whose camera has the whole playable area in its picture."""
+        x0, y0, x1, y1 = self._world.map.terrain.playable
+        wide = max(x1 - x0, (y1 - y0) * width / height)
+        size = common_pb2.Size2DI(x=width, y=height)
+        render = sc.SpatialCameraSetup(width=wide, resolution=size, minimap_resolution=size)
+        seat = PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions(raw=True, render=render))
+        seat.hands.camera = (x0 + x1) / 2, (y0 + y1) / 2
+        return seat
