@@ -45,9 +45,9 @@ def _cells(layer: NDArray[np.bool_], at: Point, radius: float) -> int:
 def creep(lab: Lab) -> Samples:
     """Make one source of each kind and watch its creep."""
     kinds = known(lab, ("Hatchery", "CreepTumorBurrowed", "NydusCanal", "Overlord"))
-    *places, (away_x, away_y) = lab.ground.places(*_WIDE)
-    for kind, (x, y) in zip(kinds, places, strict=False):
-        at = (int(x) + 0.5, int(y) + 0.5)
+    (x, y), *_, (away_x, away_y) = lab.ground.places(*_WIDE)
+    at = (int(x) + 0.5, int(y) + 0.5)
+    for kind in kinds:
         (tag,) = lab.make(Put(kind, at))
         if kind == "Overlord":
             lab.cheat("tech_tree")
