@@ -24,7 +24,7 @@ from khala.experiment.numbers import plain as plain_value
 from khala.games import find
 from khala_bridge.calibrate.catalogue import choose
 from khala_bridge.calibrate.connection import started, version
-from khala_bridge.calibrate.record import Calibration, load
+from khala_bridge.calibrate.record import Calibration, Values, load
 from khala_bridge.calibrate.run import play
 from khala_orchestrator.console import stderr_console
 from khala_protocol.errors import ConfigError
@@ -60,7 +60,10 @@ def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:
     """Print where two files differ."""
     one, other = load(a), load(b)
     found = compare.compare(one, other)
-    typer.echo(json.dumps(plain_value(found)) if as_json else report.write(one, other, found), nl=as_json)
+    if as_json:
+        typer.echo(json.dumps(plain_value(found), default=Values.model_dump))
+    else:
+        typer.echo(report.write(one, other, found), nl=False)
 
 
 def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume: bool, as_json: bool) -> None:

@@ -93,7 +93,7 @@ def test_two_runs_differ_in_nothing_beyond_chance_and_with_the_same_seed_in_noth
     assert found.random >= 9
 
 
-def test_a_comparison_finds_what_differs_and_by_how_much() -> None:
+def test_a_comparison_finds_what_differs_and_by_how_much(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     a = blank().with_probe("move.speed", measured({"Marine": [3.15], "Probe": [3.94], "Old": [1]}, resolution=0.005))
     b = blank().with_probe("move.speed", measured({"Marine": [3.152], "Probe": [3.50], "New": [1]}, resolution=0.005))
     a = a.with_probe("weapon.period", measured({"Marine": range(10, 20), "Ghost": range(8)}, exact=False))
@@ -112,6 +112,10 @@ def test_a_comparison_finds_what_differs_and_by_how_much() -> None:
     assert "**2 differ.**" in text
     assert "| Probe | 3.94 | 3.5 | −0.44 |" in text
     assert "weapon_delay" in text, "the estimate that the probe settles"
+    a.save(tmp_path / "a.json")
+    b.save(tmp_path / "b.json")
+    commands.show_comparison(tmp_path / "a.json", tmp_path / "b.json", as_json=True)
+    assert [one["b"]["mean"] for one in json.loads(capsys.readouterr().out)["differences"]] == [3.5, 34.5]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,9 @@ def refund(lab: Lab) -> Samples:
     yield "lost with its producer", (_minerals(lab) - paid) / (full - paid) if full > paid else 0.0
     full = _minerals(lab)
     lab.order(_MORPH_RAVAGER, roach)
-    lab.step(4)
+    begun = lab.loop
+    while not lab.of("RavagerCocoon") and lab.loop < begun + 40:
+        lab.step()
     paid = _minerals(lab)
     for cocoon in lab.of("RavagerCocoon"):
         lab.order(next((ability for ability in _CANCELS if ability in lab.abilities(cocoon)), _CANCELS[0]), cocoon)

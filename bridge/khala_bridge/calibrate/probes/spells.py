@@ -162,24 +162,34 @@ def damage(lab: Lab) -> Samples:
 
 @probe(
     "spell.area",
-    measures="1 if an ability touches a unit whose middle is so far from the middle of the ability's area.",
+    measures="World units between the middles of an ability's area and of the farthest unit that it touches.",
     settles="Which part of a unit must be within the area of an ability.",
-    unit="share",
+    unit="world units",
+    resolution=0.3,
 )
 def area(lab: Lab) -> Samples:
-    """Stand around the target at growing distances."""
+    """Have units stand at growing distances; the answer is between the farthest touched and the nearest other one."""
+    touched: dict[str, float] = {}
+    spared: dict[str, float] = {}
     for first in (1.0, 1.8, 2.6):
         around = tuple(first + 0.2 * i for i in range(4))
         for casts in _cast(lab, 7.0, names=_AREAS, around=around):
-            before = {cast: [_mark(lab, tag) for tag in cast.others] for cast in casts}
-            touched = {cast: [0.0] * len(around) for cast in casts}
+            goal = {cast: lab.at(cast.target) for cast in casts}
+            before = {
+                (cast, tag): (_mark(lab, tag), math.dist(goal[cast], lab.at(tag)))
+                for cast in casts
+                for tag in cast.others
+            }
             for _ in range(90):
                 lab.step()
-                for cast in casts:
-                    marks = zip(cast.others, before[cast], touched[cast], strict=True)
-                    touched[cast] = [float(was > 0 or _mark(lab, tag) != mark) for tag, mark, was in marks]
-            for cast in casts:
-                yield from ((f"{cast.spell.name} {d:.1f}", hit) for d, hit in zip(around, touched[cast], strict=True))
+                for (cast, tag), (mark, away) in list(before.items()):
+                    name = cast.spell.name
+                    if _mark(lab, tag) != mark:
+                        touched[name] = max(touched.get(name, 0.0), away)
+                        del before[cast, tag]
+            for (cast, _), (_, away) in before.items():
+                spared[cast.spell.name] = min(spared.get(cast.spell.name, math.inf), away)
+    yield from ((name, (touched[name] + spared[name]) / 2) for name in touched.keys() & spared.keys())
 
 
 @probe(
