@@ -40,7 +40,7 @@ def _cells(layer: NDArray[np.bool_], at: Point, radius: float) -> int:
     measures="Cells of creep around a new source after so many loops.",
     settles="How fast creep spreads, in which order, and which cells it covers in the end.",
     unit="cells",
-    resolution=3.0,
+    resolution=7.0,
 )
 def creep(lab: Lab) -> Samples:
     """Make one source of each kind and watch its creep."""

@@ -135,7 +135,7 @@ def _until_hit(lab: Lab, victim: int) -> bool:
 )
 def interrupted(lab: Lab) -> Samples:
     """Use types with a late damage point."""
-    kinds = [kind for kind in ("Marauder", "Zealot", "Stalker", "Ultralisk", "Thor", "Roach") if lab.has(kind)]
+    kinds = [kind for kind in ("Zealot", "Stalker", "Ultralisk", "Thor", "Roach") if lab.has(kind)]
     for pairs in staged(lab, [(kind, sturdy(kind)) for kind in kinds]):
         firing = attack(lab, pairs)
         hits(lab, firing, 12)
