@@ -16,6 +16,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.abilities import commands
 from khala_simulator.api.abilities import UnitCommand, carry_out, judge
 from khala_simulator.api.game import HostedGame, Setup
+from khala_simulator.api.game_info import known_structures, paths
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import look
@@ -47,7 +48,7 @@ class Ground(NamedTuple):
     playable: tuple[int, int, int, int]
     """x0, y0, x1, y1."""
     walkable: Bools
-    """[height, width], row 0 in the south."""
+    """[height, width], row 0 in the south; not under structures."""
     height: NDArray[np.uint8]
     """[height, width], row 0 in the south."""
 
@@ -151,9 +152,10 @@ class Battle:
         return self._world.digest()
 
     def ground(self) -> Ground:
-        """Return the map."""
+        """Return the map as it is now."""
         terrain = self._world.map.terrain
-        return Ground(terrain.size, terrain.playable, terrain.walk, terrain.height)
+        structures = known_structures(PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions()))
+        return Ground(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
 
     # acting -------------------------------------------------------------------------------------------------------
 
