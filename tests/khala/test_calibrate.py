@@ -15,16 +15,19 @@ from khala.cli import main
 from khala_bridge.calibrate.catalogue import PROBES, choose
 from khala_bridge.calibrate.record import Calibration, Measured, Values, load
 from khala_bridge.calibrate.run import play
+from khala_bridge.knowledge.facts import VERSION, unit_facts
 from khala_protocol.errors import ConfigError
 from khala_simulator.process.client import Client
+from khala_simulator.process.session import Session
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.mechanics import entries
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     from khala_bridge.calibrate.probe import Probe
+    from khala_simulator.tables.records import UnitType
 
 IDS = {probe.id for probe in PROBES}
 CHEAP = ("move.speed", "weapon.dead_attacker", "crowd.hover", "spell.knockback")
@@ -35,8 +38,8 @@ WHOLE_S = 900
 class InProcess:
     """A connection to the simulator without a process and without a socket."""
 
-    def __init__(self) -> None:
-        self._client = Client()
+    def __init__(self, build: int = 75689) -> None:
+        self._client = Client(Session(data_dir=".", base_build=build))
 
     def send(self, **request: Any) -> Any:
         (kind,) = request
@@ -51,8 +54,8 @@ def blank(seed: int = 1, **changes: Any) -> Calibration:
     return Calibration(**(told | changes))
 
 
-def played(probes: Sequence[Probe], seed: int = 1) -> Calibration:
-    return play(InProcess(), probes, blank(seed), save=lambda _: None, watch=lambda *_: None)
+def played(probes: Sequence[Probe], seed: int = 1, build: int = 75689) -> Calibration:
+    return play(InProcess(build), probes, blank(seed), save=lambda _: None, watch=lambda *_: None)
 
 
 def measured(values: dict[str, Iterable[float]], *, exact: bool = True, resolution: float = 0.0) -> Measured:
@@ -109,6 +112,42 @@ def test_a_comparison_finds_what_differs_and_by_how_much() -> None:
     assert "**2 differ.**" in text
     assert "| Probe | 3.94 | 3.5 | −0.44 |" in text
     assert "weapon_delay" in text, "the estimate that the probe settles"
+
+
+@pytest.mark.parametrize(
+    ("probe", "of_unit"),
+    [
+        ("move.speed", lambda unit: unit.speed_n * 1.4),
+        pytest.param("vision.radius", lambda unit: unit.sight, marks=pytest.mark.slow),
+    ],
+)
+def test_two_versions_differ_in_what_the_patch_changed_and_in_nothing_else(
+    probe: str, of_unit: Callable[[UnitType], float]
+) -> None:
+    old, new = load_catalog("4.10"), load_catalog("5.0.13")
+    a, b = played(chosen(probe)), played(chosen(probe), build=92440)
+    found = compare(a, b)
+    ids = {name: unit_facts(VERSION)[name].id for name in a.probes[probe].values if name in b.probes[probe].values}
+    changed = {name for name, one in ids.items() if abs(of_unit(old.unit(one)) - of_unit(new.unit(one))) > 0.005}
+    assert {one.name for one in found.differences} == changed
+    assert "BroodLord" in changed or probe != "move.speed"
+    assert found.exact > 60
+
+
+@pytest.mark.slow
+def test_two_versions_differ_in_the_damage_of_types_that_the_patch_changed_only() -> None:
+    """A pair may differ by either side: its weapons, or its armor, life, attributes and plane."""
+    old, new = load_catalog("4.10"), load_catalog("5.0.13")
+    found = compare(played(chosen("damage.pair")), played(chosen("damage.pair"), build=92440))
+
+    def same(name: str) -> bool:
+        a, b = (catalog.unit(unit_facts(VERSION)[name].id) for catalog in (old, new))
+        fields = ("armor", "attributes", "life", "shields", "shield_armor", "radius")
+        weapons = [[replace(weapon, row=0) for weapon in unit.weapons] for unit in (a, b)]
+        return weapons[0] == weapons[1] and all(getattr(a, name) == getattr(b, name) for name in fields)
+
+    assert found.differences
+    assert [one.name for one in found.differences if all(map(same, one.name.split(" > ")))] == []
 
 
 def test_every_random_measurement_can_be_found_to_differ() -> None:

@@ -64,7 +64,7 @@ def targets() -> tuple[str, ...]:
 @functools.cache
 def sturdy(attacker: str) -> str:
     """Return a type that an attacker can hit and that survives a while."""
-    return "Nexus" if any(weapon.targets != "air" for weapon in fact(attacker).weapons) else "Mothership"
+    return "Nexus" if any(weapon.targets != "air" for weapon in fact(attacker).weapons) else "Battlecruiser"
 
 
 def reach(attacker: str) -> float:

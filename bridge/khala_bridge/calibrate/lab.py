@@ -102,6 +102,7 @@ class Lab:
         self.first = frozenset(self.units)
         """Units of the start."""
         self._made: set[int] = set()
+        self._held: set[int] = set()
         self._kept = {tag for tag, unit in self.units.items() if self.name_of.get(unit.unit_type) in _TOWN_HALLS}
         info = self._connection.send(game_info=sc.RequestGameInfo())
         self.ground = Ground(info.start_raw, (_place(self.units[tag]) for tag in self._kept))
@@ -153,6 +154,8 @@ class Lab:
             GameOver: the game ended.
         """
         for start in range(0, loops, _WEEDING_LOOPS):
+            if standing := self._held & self.units.keys():
+                self.order(HOLD, sorted(standing))
             self._watch(min(loops - start, _WEEDING_LOOPS))
             if self.setting.peaceful:
                 self._keep_peace()
@@ -256,6 +259,11 @@ class Lab:
             raw.target_world_space_pos.x, raw.target_world_space_pos.y = point
         return list(self._connection.send(action=sc.RequestAction(actions=[action])).result) == [1]
 
+    def hold(self, tags: Iterable[int]) -> None:
+        """Have enemies hold their position, and tell them again in each step: the computer player orders them, too."""
+        self._held.update(tag for tag in tags if tag)
+        self.order(HOLD, sorted(self._held & self.units.keys()))
+
     def abilities(self, tag: int) -> frozenset[int]:
         """Return the ids of what a unit can be ordered to do now."""
         query = query_pb2.RequestQuery(abilities=[query_pb2.RequestQueryAvailableAbilities(unit_tag=tag)])
@@ -280,6 +288,7 @@ class Lab:
 
     def clear(self) -> None:
         """Remove everything but town halls of the start and the map's own units, and wait until nothing lingers."""
+        self._held.clear()
         for cheat in sorted(self._cheats - {debug_pb2.control_enemy}):
             self._cheat(cheat)
         for _ in range(_QUIET_LOOPS):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_bridge.calibrate.cast import apart, armed, fact, known, targets
-from khala_bridge.calibrate.lab import ATTACK, ENEMY, HOLD, Put
+from khala_bridge.calibrate.lab import ATTACK, ENEMY, Put
 from khala_bridge.calibrate.probe import Samples, probe
 from khala_bridge.calibrate.probes.pairs import attack, hits, period_loops, staged
 
@@ -42,10 +42,8 @@ def pair(lab: Lab) -> Samples:
         firing = attack(lab, pairs)
         for one, found in hits(lab, firing, _WAIT_LOOPS).items():
             if found:
-                attacker = one.name.partition(" ")[0]
-                end = found[0][0] + 0.5 * period_loops(lab, attacker)
-                name = one.name if ">" in one.name else f"{attacker} > itself"
-                yield name, sum(lost for loop, lost in found if loop <= end)
+                end = found[0][0] + 0.5 * period_loops(lab, one.kind)
+                yield f"{one.kind} > {one.against}", sum(lost for loop, lost in found if loop <= end)
 
 
 @probe(
@@ -60,7 +58,7 @@ def splash(lab: Lab) -> Samples:
     places = lab.ground.places(20, 10)
     for kind in known(lab, _SPLASHERS):
         air = all(weapon.targets == "air" for weapon in fact(kind).weapons)
-        target, other = ("Mothership", "Medivac") if air else ("SupplyDepot", "WidowMine")
+        target, other = ("Overlord", "Medivac") if air else ("SupplyDepot", "WidowMine")
         cases = [(side, ring) for side in ("behind", "beside") for ring in range(_RINGS)]
         for start in range(0, len(cases), len(places)):
             batch = list(zip(cases[start : start + len(places)], places, strict=False))
@@ -72,7 +70,7 @@ def splash(lab: Lab) -> Samples:
                 puts += [Put(target, (x, y), ENEMY), Put(kind, (x + near, y)), Put(other, at, ENEMY)]
             tags = lab.make(*puts)
             before = [lab.life(tag) for tag in tags[2::3]]
-            lab.order(HOLD, tags[2::3])
+            lab.hold([*tags[::3], *tags[2::3]])
             for victim, attacker in zip(tags[::3], tags[1::3], strict=True):
                 lab.order(ATTACK, attacker, target=victim)
             lost = [0.0] * len(before)
@@ -98,7 +96,7 @@ def bounce(lab: Lab) -> Samples:
     puts = [Put("Marauder", (x + dx, y), ENEMY) for dx in offsets]
     *victims, attacker = lab.make(*puts, Put("Mutalisk", (x, y + 2)))
     before = [lab.life(tag) for tag in victims]
-    lab.order(HOLD, victims)
+    lab.hold(victims)
     lab.order(ATTACK, attacker, target=victims[0])
     for _ in range(int(period_loops(lab, "Mutalisk"))):
         lab.step()

@@ -148,7 +148,7 @@ def spawn(lab: Lab) -> Samples:
     for kind in ("Marine", "Zergling", "Stalker", "Ultralisk"):
         x, y = lab.ground.places(*_PLACE)[0]
         tags = [tag for tag in lab.make(*(Put(kind, (x, y), ENEMY) for _ in range(8))) if tag]
-        lab.order(HOLD, tags)
+        lab.hold(tags)
         lab.step()
         apart = [((lab.at(tag)[0] - x) ** 2 + (lab.at(tag)[1] - y) ** 2) ** 0.5 for tag in tags]
         yield f"{kind}: mean", sum(apart) / len(apart)

@@ -25,8 +25,10 @@ class Pair(NamedTuple):
 
     attacker: int
     target: int
-    name: str
-    """Of the measurement."""
+    kind: str
+    """Of the attacker."""
+    against: str
+    """Of the target."""
 
 
 def staged(
@@ -54,11 +56,9 @@ def staged(
             puts += [Put(target, (x - west, y), lab.victim), Put(attacker, (at, y))]
         tags = lab.make(*puts)
         pairs = [
-            Pair(tags[2 * i + 1], tags[2 * i], name)
+            Pair(tags[2 * i + 1], tags[2 * i], attacker, target)
             for i, ((attacker, target), _) in enumerate(batch)
-            if (name := attacker if target == sturdy(attacker) else f"{attacker} > {target}")
-            and tags[2 * i]
-            and tags[2 * i + 1]
+            if tags[2 * i] and tags[2 * i + 1]
         ]
         yield pairs
         lab.clear()

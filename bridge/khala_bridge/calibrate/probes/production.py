@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _PLACE: Final = (14, 12)
 _LONGEST_LOOPS: Final = 4200
 """Of anything that is made: level 3 of an upgrade takes 3040."""
+_ATTEMPTS: Final = 4
 _WARP_ZEALOT: Final = 1413
 _LARVA: Final = "Larva"
 _WORKER: Final = {"terran": "SCV", "protoss": "Probe", "zerg": "Drone"}
@@ -35,12 +36,15 @@ def unit(lab: Lab) -> Samples:
     products = [name for name in known(lab, melee_types()) if not fact(name).structure and _maker(lab, name)]
     _produce(lab)
     for kinds, places in _batches(lab, products):
-        makers = lab.make(*(put for kind, at in zip(kinds, places, strict=False) for put in _workshop(lab, kind, at)))
-        begun = {
-            kind: maker
-            for kind, maker in zip(kinds, makers[::3], strict=False)
-            if lab.order(lab.types[kind].ability_id, maker)
-        }
+        begun: dict[str, tuple[int, int]] = {}
+        for _ in range(_ATTEMPTS):
+            left = [(kind, at) for kind, at in zip(kinds, places, strict=False) if kind not in begun]
+            makers = lab.make(*(put for kind, at in left for put in _workshop(lab, kind, at)))[::3]
+            for (kind, _), maker in zip(left, makers, strict=True):
+                if lab.order(lab.types[kind].ability_id, maker):
+                    begun[kind] = (maker, lab.loop)
+                else:
+                    lab.kill(maker)  # a Gateway that has begun to become a Warp Gate; the next one may be in time
         counts = {kind: len(lab.of(kind)) for kind in begun}
         yield from _finished(lab, begun, _is_there(lab, counts))
         lab.clear()
@@ -77,14 +81,13 @@ def _batches(lab: Lab, kinds: Sequence[str]) -> list[tuple[Sequence[str], list[P
     return [(kinds[i : i + len(places)], places) for i in range(0, len(kinds), len(places))]
 
 
-def _finished(lab: Lab, begun: dict[str, int], is_done: Callable[[str, int], bool]) -> Samples:
-    """Yield the loops until each is done; what is not by the longest time is left out."""
-    start = lab.loop
-    while begun and lab.loop < start + _LONGEST_LOOPS:
+def _finished(lab: Lab, begun: dict[str, tuple[int, int]], is_done: Callable[[str, int], bool]) -> Samples:
+    """Yield the loops until each is done, from its own beginning; what is not by the longest time is left out."""
+    end = lab.loop + _LONGEST_LOOPS
+    while begun and lab.loop < end:
         lab.step()
-        for name in [name for name, tag in begun.items() if is_done(name, tag)]:
-            del begun[name]
-            yield name, lab.loop - start
+        for name in [name for name, (tag, _) in begun.items() if is_done(name, tag)]:
+            yield name, lab.loop - begun.pop(name)[1]
 
 
 @probe(
@@ -117,6 +120,7 @@ def structure(lab: Lab) -> Samples:
             lab.order(lab.types[kind].ability_id, worker, point=(x, y) if odd else (x + 0.5, y + 0.5))
         seen: dict[int, int] = {}
         old = set(lab.units)
+        begun = lab.loop
         for _ in range(2400):
             lab.step()
             for tag, one in lab.units.items():
@@ -130,7 +134,7 @@ def structure(lab: Lab) -> Samples:
             for tag in [tag for tag in seen if tag in lab.units and lab.units[tag].build_progress >= 1]:
                 old.add(tag)
                 yield lab.name_of[lab.units[tag].unit_type], lab.loop - seen.pop(tag)
-            if lab.loop % 100 == 0 and not seen and len(old) > len(tags):
+            if lab.loop > begun + 100 and not seen:
                 break
         lab.clear()
         _produce(lab)
@@ -158,7 +162,7 @@ def research(lab: Lab) -> Samples:
             puts += [Put(wanted[name].at[0], (x, y)), Put("Pylon", (x - 4, y))]
         makers = lab.make(*puts)
         begun = {
-            name: maker
+            name: (maker, lab.loop)
             for name, maker in zip(batch, makers[::2], strict=False)
             if lab.order(wanted[name].ability, maker)
         }

@@ -96,7 +96,7 @@ def _cast(
             _Cast(spell, tags[size * i], tags[size * i + 1], tuple(tags[size * i + 2 : size * i + size]))
             for i, (spell, _) in enumerate(batch)
         ]
-        lab.order(HOLD, [tag for tag in tags if tag in lab.units and lab.units[tag].owner == ENEMY])
+        lab.hold(tag for tag in tags if tag in lab.units and lab.units[tag].owner == ENEMY)
         for cast in casts:
             if fact(cast.spell.caster).energy:
                 lab.set(cast.caster, Energy=200.0)

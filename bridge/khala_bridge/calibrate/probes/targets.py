@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from khala_bridge.calibrate.cast import known
-from khala_bridge.calibrate.lab import ATTACK, ENEMY, HOLD, MOVE, STOP, Put
+from khala_bridge.calibrate.lab import ATTACK, ENEMY, MOVE, STOP, Put
 from khala_bridge.calibrate.probe import Samples, probe
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def choice(lab: Lab) -> Samples:
             puts += [Put(far, (x, y + 4), ENEMY), Put(near, (x, y - 3.5), ENEMY), Put("Marine", (x, y))]
         tags = lab.make(*puts)
         before = {tag: lab.life(tag) for tag in tags}
-        lab.order(HOLD, [tag for tag in tags if lab.units[tag].owner == ENEMY])
+        lab.hold(tag for tag in tags if lab.units[tag].owner == ENEMY)
         shot: dict[int, float] = {}
         for _ in range(30):
             lab.step()
@@ -97,7 +97,7 @@ def look_up(lab: Lab) -> Samples:
     for i, (x, y) in enumerate(places):
         lab.step(1 + (5 * i) % 7)
         (enemy,) = lab.make(Put("Zealot", (x, y - 4), ENEMY))
-        lab.order(HOLD, enemy)
+        lab.hold([enemy])
         begun, before = lab.loop, lab.life(enemy)
         while lab.loop < begun + 80 and lab.life(enemy) > before - 0.4:
             lab.step()

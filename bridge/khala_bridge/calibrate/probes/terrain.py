@@ -45,12 +45,13 @@ def _cells(layer: NDArray[np.bool_], at: Point, radius: float) -> int:
 def creep(lab: Lab) -> Samples:
     """Make one source of each kind and watch its creep."""
     kinds = known(lab, ("Hatchery", "CreepTumorBurrowed", "NydusCanal", "Overlord"))
-    for kind, (x, y) in zip(kinds, lab.ground.places(*_WIDE), strict=False):
-        at = (int(x) + 0.5, int(y) + 0.5)
+    (x, y), *_, (away_x, away_y) = lab.ground.places(*_WIDE)
+    at = (int(x) + 0.5, int(y) + 0.5)
+    for kind in kinds:
         (tag,) = lab.make(Put(kind, at))
         if kind == "Overlord":
             lab.cheat("tech_tree")
-            lab.step()
+            lab.make(Put("Hatchery", (int(away_x) + 0.5, int(away_y) + 0.5)))  # a player with creep, as in any game
             lab.order(_GENERATE_CREEP, tag)
         begun = lab.loop
         for loops in (32, 100, 200, 400, 800, 1600):

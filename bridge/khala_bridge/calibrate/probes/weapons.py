@@ -31,7 +31,7 @@ _LONGEST_LOOPS = 70
 """The Tempest fires every 53 loops, and its missile flies."""
 _MISSILES = (
     "Marauder", "Stalker", "Hydralisk", "Ghost", "Queen", "Adept", "Cyclone", "SpineCrawler", "Ravager",
-    "VikingFighter", "Corruptor", "Phoenix", "Tempest", "HighTemplar", "Mutalisk", "Roach", "BroodLord",
+    "VikingFighter", "Corruptor", "Phoenix", "Tempest", "HighTemplar", "Mutalisk", "Roach",
 )  # fmt: skip
 
 
@@ -47,9 +47,9 @@ def period(lab: Lab) -> Samples:
     for pairs in staged(lab, everyone(lab)):
         firing = attack(lab, pairs)
         for pair, found in hits(lab, firing, 14 * 40, refill=True).items():
-            begun = shots(found, 0.5 * period_loops(lab, pair.name))
+            begun = shots(found, 0.5 * period_loops(lab, pair.kind))
             for one, other in islice(pairwise(begun[1:]), _SHOTS):
-                yield pair.name, other - one
+                yield pair.kind, other - one
 
 
 @probe(
@@ -64,7 +64,7 @@ def delay(lab: Lab) -> Samples:
     for pairs in staged(lab, everyone(lab)):
         for pair, found in _second_shots(lab, pairs).items():
             if found:
-                yield pair.name, found[0][0]
+                yield pair.kind, found[0][0]
 
 
 @probe(
@@ -80,7 +80,7 @@ def missile(lab: Lab) -> Samples:
     for pairs in staged(lab, wanted, gap=lambda kind: _longest(kind) - 0.5, place=LONG_PAIR):
         for pair, found in _second_shots(lab, pairs).items():
             if found:
-                yield pair.name, found[0][0]
+                yield pair.kind, found[0][0]
 
 
 def _longest(kind: str) -> float:
@@ -113,7 +113,7 @@ def reach(lab: Lab) -> Samples:
             for pair in [pair for pair, life in waiting.items() if lab.life(pair.target) < life - NOTICEABLE]:
                 del waiting[pair]
                 distance = math.dist(lab.at(pair.attacker), lab.at(pair.target))
-                yield pair.name, distance - apart(pair.name, sturdy(pair.name), 0)
+                yield pair.kind, distance - apart(pair.kind, sturdy(pair.kind), 0)
 
 
 def _until_hit(lab: Lab, victim: int) -> bool:
@@ -147,7 +147,7 @@ def interrupted(lab: Lab) -> Samples:
         lab.step()
         for pair, found in hits(lab, attack(lab, firing), _LONGEST_LOOPS).items():
             if found:
-                yield pair.name, found[0][0] + 3
+                yield pair.kind, found[0][0] + 3
 
 
 @probe(
@@ -174,7 +174,7 @@ def backswing(lab: Lab) -> Samples:
                 if pair.target not in lab.units:
                     after[pair] = after.get(pair, 0) + 1
                     if after[pair] == 6:
-                        yield pair.name.split(" ")[0], math.dist(where[pair], lab.at(pair.attacker))
+                        yield pair.kind, math.dist(where[pair], lab.at(pair.attacker))
 
 
 @probe(
@@ -218,7 +218,7 @@ def shared(lab: Lab) -> Samples:
             victim, attacker, flyer = lab.make(
                 Put("Nexus", (x - 4, y), lab.victim),
                 Put(kind, (x - 4 + near, y)),
-                Put("Mothership", (x + 4, y), lab.victim),
+                Put("Battlecruiser", (x + 4, y), lab.victim),
             )
             lab.order(ATTACK, attacker, target=victim)
             if not _until_hit(lab, victim):
