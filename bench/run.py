@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from bench.figures import Figure
 
 KEPT: Final = (
-    "yardstick", "turn", "bus", "simulator_engine", "engines", "floors", "start", "observe", "act", "abilities",
-    "games_per_hour",
+    "yardstick", "turn", "bus", "simulator_engine", "engines", "simulator_env", "floors", "start", "observe", "act",
+    "abilities", "games_per_hour", "env",
 )  # fmt: skip
 """The measurements whose figures are kept: they have `--json` and `measures`."""
 PRINTED: Final = (
-    "simulator_env", "simulator_memory", "recognition", "macro", "image", "http_client", "recording", "measures",
+    "simulator_memory", "recognition", "macro", "image", "http_client", "recording", "measures",
     "orphans", "strangers", "clocks", "pace", "serve", "scenes", "view", "faults", "resume", "soak", "mining", "crowds",
 )  # fmt: skip
 """Those that print a table and nothing else."""

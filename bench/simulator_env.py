@@ -26,17 +26,20 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from absl import flags
 from s2clientprotocol import sc2api_pb2 as sc
 
 from bench.at_once import floor
 from bench.env_games import FULL, CpuTime, LayersGame, RawGame, attack_of, directory_of, fighters, reinforcements
+from bench.figures import Figure
 from khala_simulator.process.client import Client, interface
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from bench.env_games import EnvGame
 
 WARM_UP_STEPS = 5
@@ -159,6 +162,13 @@ def setting_of(text: str) -> Setting:
     if kind not in SIZES:
         raise argparse.ArgumentTypeError(f"the interface is one of {', '.join(SIZES)}, not {kind!r}")
     return next((known for known in SETTINGS if str(known) == text), Setting(kind, name, int(step_mul)))
+
+
+def measures(found: Mapping[str, Mapping[str, Any]]) -> Iterator[Figure]:
+    """Yield the figures of what `--json` printed."""
+    for name, row in found.items():
+        yield Figure(f"steps a second, {name}", "steps", (row["steps_per_s"],), "more")
+        yield Figure(f"processor time of a step, {name}", "ms", (row["client_cpu_ms"] + row["server_cpu_ms"],))
 
 
 def main() -> None:

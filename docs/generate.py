@@ -21,6 +21,7 @@ from docs.pages import (
     measures,
     messages,
     observations,
+    probes,
     rules,
     simulator,
 )
@@ -47,6 +48,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "model-files.md": configs.model_files_page,
     "rules.md": rules.page,
     "simulator.md": simulator.page,
+    "probes.md": probes.page,
 }
 
 

@@ -241,11 +241,23 @@ def advise(
     run_advise(adviser, connect=connect or (), tls=tls, insecure=insecure, as_json=as_json)
 
 
-def doctor(*, tls: Tls = None, as_json: Json = False) -> None:
+def doctor(
+    *,
+    tls: Tls = None,
+    game: Annotated[
+        str | None,
+        typer.Option(
+            help="Start this game as well, and try its maps: simulator, starcraft2, or a directory.",
+            show_default="none is started",
+            metavar="GAME",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Look at this machine as a match would, and say what to do."""
     from khala import commands  # noqa: PLC0415  # see there
 
-    commands.doctor(tls, as_json=as_json)
+    commands.doctor(tls, game, as_json=as_json)
 
 
 def version(value: bool) -> None:  # typer calls it with the flag

@@ -80,11 +80,11 @@ def why_not_valid(results: Sequence[Result]) -> Iterator[str]:
         yield reason if every == set(those) else f"{', '.join(those)}: {reason}"
 
 
-def doctor(tls: Path | None, *, as_json: bool) -> None:
-    """Look at this machine, and print what was found."""
+def doctor(tls: Path | None, game: str | None, *, as_json: bool) -> None:
+    """Look at this machine, start a game if one is named, and print what was found."""
     from khala.doctor import examine  # noqa: PLC0415  # PySC2 and the game, which a match needs later
 
-    findings = list(examine(tls))
+    findings = list(examine(tls, game))
     wrong = any(finding.state == "wrong" for finding in findings)
     if as_json:
         typer.echo(json.dumps({"ok": not wrong, "findings": [finding.as_dict() for finding in findings]}))

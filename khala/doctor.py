@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from khala_protocol.bus.certificate import Certificate
 
@@ -44,9 +44,9 @@ class Finding:
         return asdict(self)
 
 
-def examine(tls: Path | None = None) -> Iterator[Finding]:
-    """Run every check, in the order in which a newcomer would ask; of certificates if a directory is given."""
-    for check in (*CHECKS, *([_certificates_in(tls)] if tls else [])):
+def examine(tls: Path | None = None, game: str | None = None) -> Iterator[Finding]:
+    """Run every check, in the order in which a newcomer would ask; of certificates and of a game if they are named."""
+    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_started(game)] if game else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
@@ -98,6 +98,38 @@ def _game() -> Iterator[Finding]:
     maps = sum(1 for _ in root.glob("Maps/*/*.SC2Map"))
     advice = "" if maps else "put the maps below Maps/llm_smac, Maps/mini_games, …"
     yield Finding("maps", "ok" if maps else "wrong", f"{maps} below {root / 'Maps'}", advice)
+
+
+def _started(source: str) -> Callable[[], Iterator[Finding]]:
+    def started() -> Iterator[Finding]:
+        from khala.environment import plain  # noqa: PLC0415  # only this check needs them
+        from khala.games import find  # noqa: PLC0415
+        from khala_bridge.calibrate.survey import survey  # noqa: PLC0415
+        from khala_bridge.errors import GameError  # noqa: PLC0415
+
+        try:
+            path, name = find(source)
+            found = survey(path, plain())
+        except GameError as error:
+            yield Finding("game process", "wrong", str(error), "docs/how-to/real-game.md says what it needs")
+            return
+        yield Finding("game process", "ok", f"{name} {found.version}, build {found.build}, answers")
+        yield Finding("maps that load", "ok" if found.loaded else "wrong", _some(found.loaded), "")
+        for map_name, why in found.refused.items():
+            yield Finding(f"map {map_name}", "note", why, "tasks on this map cannot be played with this game")
+        if found.absent:
+            yield Finding(
+                "maps not there", "note", _some(found.absent), "put them below Maps; docs/reference/maps.md lists all"
+            )
+        advice = "" if found.renders else "pictures come from feature layers; a game without a graphics card draws none"
+        yield Finding("rendering", "ok" if found.renders else "note", found.rendering, advice)
+
+    return started
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return f"{len(names)}: {', '.join(names[:8])}{more}" if names else "none"
 
 
 def _engine() -> Iterator[Finding]:

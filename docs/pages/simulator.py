@@ -121,8 +121,8 @@ def _state_name(status: Status) -> str:
 
 
 def _constants() -> str:
-    rows = [(code(e.name), _value(e), e.unit, e.note) for e in entries() if e.source not in SOURCED]
-    return table(("constant", "value", "unit", "meaning"), rows)
+    rows = [(code(e.name), _value(e), e.unit, e.note, code(e.probe)) for e in entries() if e.source not in SOURCED]
+    return table(("constant", "value", "unit", "meaning", "[probe](probes.md) that would settle it"), rows)
 
 
 def _sourced() -> str:

@@ -14,7 +14,7 @@ Examples:\n
     khala calibrate --game starcraft2 --out real.json\n
     khala calibrate --game starcraft2 --out real.json --resume\n
     khala calibrate --only "move.*" --only weapon.range --out moves.json\n
-    khala calibrate --compare real.json simulator.json > report.md
+    khala calibrate --compare real.json simulator.json
 """
 
 

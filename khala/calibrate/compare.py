@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from khala.experiment.statistics import RESAMPLES, Comparison, compare_values, holm
+from khala.experiment.statistics import RESAMPLES, Comparison, compare_values, holm, p_of_values
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -97,9 +97,9 @@ def compare(a: Calibration, b: Calibration) -> Compared:
 
 
 def _beyond_chance(random: list[Difference]) -> Iterator[Difference]:
-    tests = [compare_values(one.b.samples, one.a.samples) for one in random]
-    for one, test, p in zip(random, tests, holm([test.p for test in tests]), strict=True):
+    for one, p in zip(random, holm([p_of_values(one.b.samples, one.a.samples) for one in random]), strict=True):
         if p is not None and p <= LEVEL:
+            test = compare_values(one.b.samples, one.a.samples)
             yield Difference(one.probe, one.name, one.unit, one.a, one.b, test, p)
 
 

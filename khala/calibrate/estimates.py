@@ -1,6 +1,7 @@
 """What the simulator only guesses, and which probe would settle each guess.
 
-The simulator's tables name the probes: `mechanics.yaml` beside each constant, `probes.yaml` for all else. Above:
+The simulator's data names the probes: `simulator/khala_simulator/data/mechanics.yaml` beside each constant,
+`simulator/khala_simulator/data/probes.yaml` for all else. Above:
 `report`, `commands`, and the page of the probes.
 """
 

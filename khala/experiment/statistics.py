@@ -243,8 +243,13 @@ def compare_values(
     if n < 2:
         return Comparison("permutation test", Interval(value, -math.inf, math.inf, n, confidence), 1.0)
     bounds = _bootstrap(_difference, (x, y), confidence, seed, paired=False)
-    p = _permutation(_difference, (x, y), "independent", seed)
-    return Comparison("permutation test", Interval(value, *bounds, n, confidence), p)
+    return Comparison("permutation test", Interval(value, *bounds, n, confidence), p_of_values(a, b, seed=seed))
+
+
+def p_of_values(a: Sequence[float | None], b: Sequence[float | None], *, seed: int = 0) -> float:
+    """Return the p of `compare_values` alone, which takes a tenth of its time."""
+    (x,), (y,) = _known(a), _known(b)
+    return _permutation(_difference, (x, y), "independent", seed) if min(len(x), len(y)) > 1 else 1.0
 
 
 def compare_paired_values(

@@ -23,12 +23,14 @@ SHORT = {
     "bus": ("--agents", "1", "--scale", "0.05"),
     "simulator_engine": ("--seconds", "0.05", "--maps", "llm_smac/2s3z", "--sizes", "10"),
     "engines": ("--rounds", "1", "--seconds", "0.05"),
+    "simulator_env": ("layers:2s3z:8", "--steps", "20"),
     "floors": ("layers:2s3z:8", "--rounds", "1", "--steps", "20"),
     "start": ("--times", "1"),
     "observe": (),
     "act": (),
     "abilities": (),
     "games_per_hour": ("--tasks", "2s3z_pair", "--games", "2", "--jobs", "2"),
+    "env": ("--maps", "2s3z", "--seconds", "0.1", "--rounds", "1", "--at-once", "1"),
 }
 """By measurement, the options of its shortest run."""
 

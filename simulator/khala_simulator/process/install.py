@@ -143,8 +143,10 @@ def _write_maps(maps: Path) -> None:
         (maps / folder).mkdir(parents=True, exist_ok=True)
     for relative, data in placeholders():
         path = maps / relative
-        if not path.exists() or is_placeholder(path.read_bytes()):
-            path.write_bytes(data)
+        if not path.exists() or not path.stat().st_size or is_placeholder(path.read_bytes()):
+            fresh = path.with_suffix(".new")
+            fresh.write_bytes(data)
+            fresh.replace(path)  # in one step: an interrupted write would leave an empty map for good
 
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:

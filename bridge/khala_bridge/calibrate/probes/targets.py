@@ -147,7 +147,7 @@ def switch(lab: Lab) -> Samples:
     resolution=0.5,
 )
 def flee(lab: Lab) -> Samples:
-    """Hit each once."""
+    """Hit each, and send the Marine away."""
     kinds = known(
         lab, ("Probe", "SCV", "Drone", "Overlord", "Medivac", "HighTemplar", "Observer", "WarpPrism", "Infestor")
     )
@@ -160,7 +160,7 @@ def flee(lab: Lab) -> Samples:
             lab.step()
             if lab.life(victim) < life - 0.4:
                 break
-        lab.kill(attacker)
+        lab.order(MOVE, attacker, point=(x + 14, y))  # it lives: nobody flees from the dead
         lab.step(60)
         yield kind, math.dist(before, lab.at(victim))
         lab.clear()
