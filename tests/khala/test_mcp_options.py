@@ -46,7 +46,7 @@ def test_wrong_options_say_what_is_right(tmp_path: Path, given: dict[str, Any], 
 def test_a_taken_port_is_said(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=rf"^--port: cannot listen on port {port}: "):
+        with pytest.raises(ConfigError, match=rf"^--port: cannot listen on 127.0.0.1:{port}: "):
             run_mcp(wanted(tmp_path, port=port))
 
 
