@@ -77,9 +77,14 @@ class _Recorded(Session):
     async def answer(self, data: bytes) -> bytes:
         """Answer one request, and keep the answer."""
         answer = await super().answer(data)
-        self._file.write(_LENGTH.pack(len(answer)) + answer)
-        self._file.flush()
+        keep(self._file, answer)
         return answer
+
+
+def keep(file: BinaryIO, answer: bytes) -> None:
+    """Append an answer to a file of them; the game may be killed right after."""
+    file.write(_LENGTH.pack(len(answer)) + answer)
+    file.flush()
 
 
 def record(sock: socket.socket, data_dir: str, answers: Path) -> None:

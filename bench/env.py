@@ -22,8 +22,9 @@ import sys
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from bench.figures import Figure
 from bench.smac import package_root
 from khala import games
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 ROOT = Path(__file__).parent.parent
-COUNTS = (1, 8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +67,19 @@ class Kind:
             text=True,
             env=environment,
         )
+
+
+def measures(found: Any) -> list[Figure]:
+    """Return the figures of what `--json` prints."""
+    return [
+        figure
+        for row in found["rows"]
+        for name in [f"{row['map']}, {row['kind']}, {row['envs']} at once"]
+        for figure in (
+            Figure(f"{name}: steps", "1/s", (row["steps_per_s"],), better="more"),
+            Figure(f"{name}: processor time of a step", "ms", (row["cpu_ms"],)),
+        )
+    ]
 
 
 def kinds_of(options: argparse.Namespace) -> Iterator[Kind]:
@@ -129,16 +142,22 @@ def main() -> None:
     parser.add_argument("--smac", type=Path, help="a checkout of SMAC")
     parser.add_argument("--smaclite", type=Path, help="a checkout of SMAClite")
     parser.add_argument("--smaclite-python", type=Path, default=Path(sys.executable))
-    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--at-once", type=int, nargs="+", default=[1, 8], help="how many environments play at a time")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     options = parser.parse_args()
     kinds = list(kinds_of(options))
     if not options.json:
         print("| map | environment | at once | steps/s | CPU ms a step |\n|---|---|---:|---:|---:|")
+    rows = []
     for map_name in options.maps:
-        for count in COUNTS:
+        for count in options.at_once:
             for row in measured(map_name, kinds, count, options.seconds, options.rounds):
+                rows.append(asdict(row))
                 text = f"| {row.map} | {row.kind} | {row.envs} | {row.steps_per_s:.0f} | {row.cpu_ms:.2f} |"
-                print(json.dumps(asdict(row)) if options.json else text, flush=True)
+                if not options.json:
+                    print(text, flush=True)
+    if options.json:
+        print(json.dumps({"rows": rows}))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@
 
 The learner is PPO with shared weights (`bench.ppo`), in this process, with all environments in turn. Printed are the
 win rate of the last 200 episodes as they were sampled, and, at the end, that of 100 new battles in which each agent
-takes its most likely action. Minutes are those of the processor, so that a busy machine changes nothing.
+takes its most likely action. Minutes are those of the processor, so that a busy machine changes nothing. Ctrl-C ends
+the training, and what there is is drawn.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import argparse
 import json
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,8 +48,8 @@ class Run:
     won: list[float] = field(default_factory=list)
     """Part of the episodes before."""
     episodes: int = 0
-    greedy: float = 0.0
-    """Part of the battles that were won at the end, with the most likely actions."""
+    greedy: float | None = None
+    """Part of the battles that were won at the end, with the most likely actions; None if it was interrupted."""
 
 
 class Team:
@@ -90,17 +92,18 @@ def train(map_name: str, seed: int, envs: int, minutes: float, tell: Callable[[R
     (agents, size), (state_size,) = first["observation"].shape, first["state"].shape
     learner = Learner(agents, size, state_size, team.envs[0].battles.n_actions, seed)
     run, begun_s, told, steps = Run(map_name, seed), time.process_time(), 0.0, 0
-    while (spent := (time.process_time() - begun_s) / 60) < minutes:
-        learner.learn(team.play(learner, STEPS), team.states())
-        steps += STEPS * envs
-        if spent >= told and team.won:
-            told = spent + min(0.25, minutes / 40)
-            run.minutes.append(spent)
-            run.steps.append(steps)
-            run.won.append(sum(team.won) / len(team.won))
-            run.episodes = team.episodes
-            tell(run)
-    run.greedy = tested(map_name, learner)
+    with suppress(KeyboardInterrupt):
+        while (spent := (time.process_time() - begun_s) / 60) < minutes:
+            learner.learn(team.play(learner, STEPS), team.states())
+            steps += STEPS * envs
+            if spent >= told and team.won:
+                told = spent + min(0.25, minutes / 40)
+                run.minutes.append(spent)
+                run.steps.append(steps)
+                run.won.append(sum(team.won) / len(team.won))
+                run.episodes = team.episodes
+                tell(run)
+        run.greedy = tested(map_name, learner)
     return run, learner
 
 
@@ -128,11 +131,8 @@ def draw(runs: list[Run], path: Path) -> None:
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     axes = figure.subplots()
     for run in runs:
-        axes.plot(
-            run.minutes,
-            run.won,
-            label=f"seed {run.seed}: {run.steps[-1] / 1000:.0f} 000 steps, greedy {run.greedy:.2f}",
-        )
+        greedy = "" if run.greedy is None else f", greedy {run.greedy:.2f}"
+        axes.plot(run.minutes, run.won, label=f"seed {run.seed}: {run.steps[-1] / 1000:.0f} 000 steps{greedy}")
     axes.set(xlabel="minutes of one processor core", ylabel=f"won of the last {RECENT}", ylim=(0, 1), title=runs[0].map)
     axes.grid(alpha=0.3)
     axes.legend()
@@ -155,9 +155,14 @@ def main() -> None:
             options.map, seed, options.envs, options.minutes, lambda run: None if options.json else _tell(run)
         )
         runs.append(run)
-        print(json.dumps(asdict(run)) if options.json else f"seed {seed}: greedy {run.greedy:.2f} of {TESTED} battles")
+        if options.json:
+            print(json.dumps(asdict(run)))
+        elif run.greedy is not None:
+            print(f"seed {seed}: greedy {run.greedy:.2f} of {TESTED} battles")
         if options.out:
             draw(runs, options.out)
+        if run.greedy is None:
+            break
 
 
 def _tell(run: Run) -> None:

@@ -27,6 +27,7 @@ from khala.help import Group
 from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.mcp.cli import MCP_EPILOG, mcp
+from khala.openenv.cli import OPENENV_EPILOG, openenv
 from khala.options import (
     Assemble,
     BaseUrl,
@@ -300,6 +301,7 @@ for command, epilog in (
     (stop, None),
     (view, VIEW_EPILOG),
     (mcp, MCP_EPILOG),
+    (openenv, OPENENV_EPILOG),
     (calibrate, CALIBRATE_EPILOG),
     (doctor, None),
 ):

@@ -10,6 +10,7 @@ import os
 import shutil
 import socket
 import tempfile
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,8 @@ PREFIX = "khala-bus-"
 SOCKET = "bus.sock"
 LONGEST_PATH_BYTES = 103
 """Of a unix socket on macOS; Linux takes 107."""
+SETTLED_S = 60.0
+"""Age of a socket at which nobody is between binding it and listening on it, however busy the machine is."""
 
 
 @contextlib.contextmanager
@@ -45,13 +48,19 @@ def running() -> list[str]:
 def remove_forgotten() -> None:
     """Remove the directories of our matches that were killed: nobody listens on their sockets."""
     for directory in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        if _is_ours(directory) and _is_dead(directory / SOCKET):
+        if _is_ours(directory) and _is_old(directory / SOCKET) and _is_dead(directory / SOCKET):
             shutil.rmtree(directory, ignore_errors=True)
 
 
 def _is_ours(directory: Path) -> bool:
     with contextlib.suppress(OSError):
         return directory.stat(follow_symlinks=False).st_uid == os.getuid()
+    return False
+
+
+def _is_old(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return time.time() - path.stat(follow_symlinks=False).st_mtime > SETTLED_S
     return False
 
 

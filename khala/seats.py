@@ -12,6 +12,7 @@ waits for the caller. Above it are doors of other tools, such as an environment 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections import deque
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -26,7 +27,7 @@ from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Report, Result
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from types import TracebackType
 
     from khala.minds import Minds
@@ -34,9 +35,9 @@ if TYPE_CHECKING:
     from khala_bridge.game.env import Launched
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
-    from khala_protocol.messages import Briefing, Observation, Wire
+    from khala_protocol.messages import Briefing, ImageRef, Observation, Wire
 
-__all__ = ["CallerPolicy", "NotAsked", "Seat", "SeatedMatch", "Seen", "Turn", "seats_of", "unhurried"]
+__all__ = ["CallerPolicy", "NotAsked", "Seat", "SeatedMatch", "Seen", "Turn", "seat_named", "seats_of", "unhurried"]
 
 
 class NotAsked(KhalaError):
@@ -57,6 +58,11 @@ class Seen:
     briefing: Briefing
     observation: Observation
     pictures: Sequence[bytes] = ()
+
+    def arrived(self) -> Iterator[tuple[ImageRef, bytes]]:
+        """Yield the pictures, each with what the observation says of it."""
+        files = {hashlib.sha256(picture).hexdigest(): picture for picture in self.pictures}
+        return ((ref, files[ref.sha256]) for ref in self.observation.images if ref.sha256 in files)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +246,19 @@ class SeatedMatch:
 def seats_of(task: TaskConfig) -> list[Seat]:
     """Return the seats that a caller may take: those of all agents, in the order of the match."""
     return [Seat(side.side, agent.name) for side in task.per_side() for agent in side.agents]
+
+
+def seat_named(name: str, there_are: Sequence[Seat], *, source: str) -> Seat:
+    """Return the seat of an agent, which is named with its side if agents of two sides have the same name.
+
+    Raises:
+        ConfigError: there is none, or there are several; it names the source.
+    """
+    found = [seat for seat in there_are if name in (seat.agent, str(seat))]
+    if len(found) == 1:
+        return found[0]
+    what = f"there are {' and '.join(map(str, found))}" if found else f"there is no {name}"
+    raise ConfigError(f"{what}: give one of {', '.join(map(str, there_are))}", source=source)
 
 
 def unhurried(task: TaskConfig) -> TaskConfig:

@@ -12,7 +12,7 @@ import os
 import sys
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -201,18 +201,33 @@ def load_policy(name: str) -> Policy:
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
         raise ConfigError(f"'{name}' is no policy: write {', '.join(PLAYERS)} or module:name, such as my_agent:decide")
+    found = load_attribute(module_name, attribute, source=f"policy {name}")
+    try:
+        return as_policy(found() if isinstance(found, type) else found)
+    except TypeError as error:
+        raise ConfigError(str(error), source=f"policy {name}") from None
+
+
+def load_attribute(module_name: str, attribute: str, *, source: str) -> Any:
+    """Return what the user's module has under a name. It is also looked for in the current directory.
+
+    Args:
+        module_name: of the module.
+        attribute: the name.
+        source: for errors, what wants it.
+
+    Raises:
+        ConfigError: there is no such module or name, or importing it failed.
+    """
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
         module = importlib.import_module(module_name)
     except ModuleNotFoundError as error:
-        raise ConfigError(f"there is no module '{error.name}'", source=f"policy {name}") from None
+        raise ConfigError(f"there is no module '{error.name}'", source=source) from None
     except Exception as error:  # an import runs the user's code, which may raise anything
-        raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=f"policy {name}") from error
+        raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=source) from error
     found = getattr(module, attribute, None)
     if found is None:
-        raise ConfigError(f"the module {module_name} has no '{attribute}'", source=f"policy {name}")
-    try:
-        return as_policy(found() if isinstance(found, type) else found)
-    except TypeError as error:
-        raise ConfigError(str(error), source=f"policy {name}") from None
+        raise ConfigError(f"the module {module_name} has no '{attribute}'", source=source)
+    return found

@@ -14,9 +14,9 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from khala.env.onlooker import Onlooker
-from khala.env.rewards import battle
-from khala.env.thread import LoopThread
+from khala.loop_thread import LoopThread
 from khala.minds import Minds, minds_of
+from khala.rewards import battle
 from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError, KhalaError
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from khala.env.rewards import SideReward
+    from khala.rewards import SideReward
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Result
 

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 from khala.matches import new
 from khala.mcp.table import Table
 from khala.minds import Minds, minds_of
-from khala.seats import seats_of, unhurried
+from khala.seats import seat_named, seats_of, unhurried
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
-
-    from khala.seats import Seat
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +59,7 @@ def table_of(wanted: Wanted) -> Table:
     if wanted.match["max_wait_s"] is None:
         config = config.model_copy(update={"task": unhurried(config.task)})
     there_are = seats_of(config.task)
-    seats = [_named(name, there_are) for name in wanted.seats]
+    seats = [seat_named(name, there_are, source="--seat") for name in wanted.seats]
     if wanted.port is None:
         if len(seats) > 1:
             raise ConfigError("over stdio one client plays one agent: give one seat, or --port", source="--seat")
@@ -69,11 +67,3 @@ def table_of(wanted: Wanted) -> Table:
     sides = [side.side for side in config.task.per_side()]
     minds = minds_of(sides, Minds(budget_usd=wanted.budget_usd).named(wanted.others), {})
     return Table(config, seats or there_are, minds, game=wanted.game)
-
-
-def _named(name: str, there_are: Sequence[Seat]) -> Seat:
-    found = [seat for seat in there_are if name in (seat.agent, str(seat))]
-    if len(found) == 1:
-        return found[0]
-    what = f"there are {' and '.join(map(str, found))}" if found else f"there is no {name}"
-    raise ConfigError(f"{what}: give one of {', '.join(map(str, there_are))}", source="--seat")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import socket
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +17,8 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 
 from khala.exit_codes import SIGNALLED
+from khala.listening import bound
 from khala.mcp.server import server_of
-from khala_protocol.errors import ConfigError
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ async def over_http(table: Table, port: int) -> None:
             yield
 
     app = Starlette(routes=[Mount(f"/{seat}", app=one) for seat, one in apps.items()], lifespan=running)
-    with _bound(port) as listening:
+    with bound(HOST, port) as listening:
         for seat in table.seats:
             sys.stderr.write(f"{seat}: http://{HOST}:{listening.getsockname()[1]}/{seat}/mcp\n")
         server = _Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
@@ -102,10 +101,3 @@ def _first_signal() -> asyncio.Future[signal.Signals]:
 def _resolve(signalled: asyncio.Future[signal.Signals], number: signal.Signals) -> None:
     if not signalled.done():
         signalled.set_result(number)
-
-
-def _bound(port: int) -> socket.socket:
-    try:
-        return socket.create_server((HOST, port))
-    except OSError as error:
-        raise ConfigError(f"cannot listen on port {port}: {error.strerror}", source="--port") from None

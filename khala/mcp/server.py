@@ -7,7 +7,6 @@ own, with an address of its own: protocol versions from 2026-07-28 on have no se
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
     from khala.mcp.table import Look, Table
     from khala.seats import Seat, Seen
-    from khala_protocol.messages import ImageRef, Report
+    from khala_protocol.messages import Report
 
 WITHIN_S = 25.0
 """Longest time that a tool waits for the match: clients give up after 60 s, or sooner."""
@@ -121,7 +120,7 @@ class _SeatServer:
             self._briefed = True
             text = f"{briefing_page(look.seen.briefing)}\n{text}"
         shown: list[str | Image] = [text]
-        for ref, picture in _pictures(look.seen):
+        for ref, picture in look.seen.arrived():
             self._add(f"pictures/{ref.name}", ref.title, ref.media_type, partial(self._picture, ref.name))
             shown += [ref.title or ref.name, Image(data=picture, format=ref.media_type.removeprefix("image/"))]
         return shown
@@ -145,16 +144,10 @@ class _SeatServer:
         return self._newest().observation.text
 
     async def _picture(self, name: str) -> bytes:
-        for ref, picture in _pictures(self._newest()):
+        for ref, picture in self._newest().arrived():
             if ref.name == name:
                 return picture
         raise ResourceNotFoundError(f"the newest observation has no picture {name}")
-
-
-def _pictures(seen: Seen) -> Iterator[tuple[ImageRef, bytes]]:
-    """Yield the pictures that arrived, each with what the observation says of it."""
-    arrived = {hashlib.sha256(picture).hexdigest(): picture for picture in seen.pictures}
-    return ((ref, arrived[ref.sha256]) for ref in seen.observation.images if ref.sha256 in arrived)
 
 
 @contextlib.contextmanager

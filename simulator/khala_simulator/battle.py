@@ -16,6 +16,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.abilities import commands
 from khala_simulator.api.abilities import UnitCommand, carry_out, judge
 from khala_simulator.api.game import HostedGame, Setup
+from khala_simulator.api.game_info import known_structures, paths
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import look
@@ -47,25 +48,63 @@ class Ground(NamedTuple):
     playable: tuple[int, int, int, int]
     """x0, y0, x1, y1."""
     walkable: Bools
-    """[height, width], row 0 in the south."""
+    """[height, width], row 0 in the south; not under structures."""
     height: NDArray[np.uint8]
     """[height, width], row 0 in the south."""
 
 
 class Units(NamedTuple):
-    """Columns of units, one row each; numbers are rounded to those of a message, which has 32 bits for each."""
+    """Columns of units, one for each; numbers are rounded to those of a message, which has 32 bits for each."""
 
     tag: Ints
     type_id: Ints
-    x: Floats
-    y: Floats
-    life: Floats
-    life_max: Floats
-    shields: Floats
-    shields_max: Floats
-    energy: Floats
-    cooldown: Floats
-    """Game loops until its weapon can fire again; 0 without one."""
+    numbers: Floats
+    """[8, n]: x, y, life, life_max, shields, shields_max, energy, cooldown."""
+
+    @property
+    def x(self) -> Floats:
+        """World units from the west."""
+        return _row(self.numbers, 0)
+
+    @property
+    def y(self) -> Floats:
+        """World units from the south."""
+        return _row(self.numbers, 1)
+
+    @property
+    def life(self) -> Floats:
+        """Hit points."""
+        return _row(self.numbers, 2)
+
+    @property
+    def life_max(self) -> Floats:
+        """Hit points of an unhurt unit."""
+        return _row(self.numbers, 3)
+
+    @property
+    def shields(self) -> Floats:
+        """Shield points."""
+        return _row(self.numbers, 4)
+
+    @property
+    def shields_max(self) -> Floats:
+        """Shield points of an unhurt unit."""
+        return _row(self.numbers, 5)
+
+    @property
+    def energy(self) -> Floats:
+        """Energy."""
+        return _row(self.numbers, 6)
+
+    @property
+    def cooldown(self) -> Floats:
+        """Game loops until its weapon can fire again; 0 without one."""
+        return _row(self.numbers, 7)
+
+
+def _row(numbers: Floats, number: int) -> Floats:
+    row: Floats = numbers[number]
+    return row
 
 
 class Battle:
@@ -113,9 +152,10 @@ class Battle:
         return self._world.digest()
 
     def ground(self) -> Ground:
-        """Return the map."""
+        """Return the map as it is now."""
         terrain = self._world.map.terrain
-        return Ground(terrain.size, terrain.playable, terrain.walk, terrain.height)
+        structures = known_structures(PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions()))
+        return Ground(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
 
     # acting -------------------------------------------------------------------------------------------------------
 
@@ -153,29 +193,21 @@ class Battle:
         tags: Ints = sight.tag[sight.owner == player]
         return tags
 
-    def present(self, tags: Ints) -> Bools:
-        """Return which of these units are in the world."""
+    def look(self, tags: Ints) -> tuple[Bools, Units]:
+        """Return which of these units are in the world, and all of them; of the others, the numbers mean nothing."""
         world, slots = self._world, tags >> INDEX_SHIFT & _SLOT
         there: Bools = (world.tag[slots] == tags) & (world.carrier[slots] == NOBODY)
-        return there
-
-    def look(self, tags: Ints) -> Units:
-        """Return these units, which are in the world."""
-        world, slots = self._world, tags >> INDEX_SHIFT & _SLOT
         owner, row = world.owner[slots], world.type[slots]
         types, stats = self._game.types, world.stats
-        columns = np.stack(
-            (
-                *world.pos[slots].T,
-                world.life[slots],
-                stats.life_max[owner, row],
-                world.shields[slots],
-                stats.shields_max[owner, row],
-                world.energy[slots],
-                np.maximum(world.cooldown[slots], 0.0) * types.armed[row],
-            )
-        )
-        return Units(tags, types.id[row], *columns.astype(np.float32).astype(np.float64))
+        numbers = np.empty((8, len(tags)), dtype=np.float32)
+        numbers[:2] = world.pos[slots].T
+        numbers[2] = world.life[slots]
+        numbers[3] = stats.life_max[owner, row]
+        numbers[4] = world.shields[slots]
+        numbers[5] = stats.shields_max[owner, row]
+        numbers[6] = world.energy[slots]
+        numbers[7] = np.maximum(world.cooldown[slots], 0.0) * types.armed[row]
+        return there, Units(tags, types.id[row], numbers.astype(np.float64))
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Return a picture of the playable part of the map, [height, width, 3] RGB, as a client has it rendered."""

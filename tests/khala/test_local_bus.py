@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import os
 import socket
 import tempfile
 from pathlib import Path
@@ -41,15 +43,19 @@ def test_agents_meet_where_no_other_user_can_enter_and_nothing_is_left(temporary
 
 
 def test_a_match_removes_what_killed_ones_left_and_nothing_of_those_that_live(temporary: Path) -> None:
-    dead, alive, starting = (temporary / f"khala-bus-{name}" for name in ("dead", "alive", "starting"))
-    for directory in (dead, alive, starting):
+    names = ("dead", "alive", "starting", "binding")
+    dead, alive, starting, binding = (temporary / f"khala-bus-{name}" for name in names)
+    for directory in (dead, alive, starting, binding):
         directory.mkdir()
-    with socket.socket(socket.AF_UNIX) as forgotten, socket.socket(socket.AF_UNIX) as listening:
-        forgotten.bind(str(dead / "bus.sock"))
-        listening.bind(str(alive / "bus.sock"))
-        listening.listen()
+    with contextlib.ExitStack() as stack:
+        sockets = {place: stack.enter_context(socket.socket(socket.AF_UNIX)) for place in (dead, alive, binding)}
+        for place, bound in sockets.items():
+            bound.bind(str(place / "bus.sock"))
+        sockets[alive].listen()
+        for place in (dead, alive):
+            os.utime(place / "bus.sock", (0, 0))
         with local_endpoint():
-            assert {alive, starting} < set(temporary.iterdir())
+            assert {alive, starting, binding} < set(temporary.iterdir())
             assert not dead.exists()
 
 

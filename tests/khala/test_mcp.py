@@ -9,7 +9,6 @@ import json
 import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,6 @@ import typer
 from mcp import Client, MCPError, StdioServerParameters
 from mcp.types import BlobResourceContents, CallToolResult, ImageContent, TextContent, TextResourceContents
 
-from khala.mcp.commands import Wanted, run_mcp, table_of
 from khala.mcp.serve import over_http
 from khala.mcp.server import server_of
 from khala.mcp.table import Look, Table, with_messages
@@ -30,8 +28,7 @@ from khala.seats import Seat, unhurried
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol import speech
-from khala_protocol.errors import ConfigError
-from khala_protocol.messages import Message, Reply, Result
+from khala_protocol.messages import Message, Observation, Reply, Result
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
@@ -204,6 +201,35 @@ async def test_a_client_plays_over_stdio_while_a_policy_plays_the_others(tmp_pat
     assert result_in(tmp_path).statuses == {"Stalkers": {"ok": 2}, "Zealots": {"ok": 2}}
 
 
+@pytest.mark.slow
+@game
+@pytest.mark.parametrize(("ends", "code"), [("signal", 128 + signal.SIGTERM), ("stdin", 0)])
+def test_a_server_over_stdio_ends_in_order_in_the_middle_of_a_match(tmp_path: Path, ends: str, code: int) -> None:
+    info = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "test", "version": "1"}}
+    calls = [
+        {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": info},
+        {"jsonrpc": "2.0", "method": "notifications/initialized"},
+        {"jsonrpc": "2.0", "id": 2, "method": "tools/call", "params": {"name": "observe", "arguments": {}}},
+    ]
+    with subprocess.Popen(
+        server_command(tmp_path), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for call in calls:
+            process.stdin.write(json.dumps(call) + "\n")
+            process.stdin.flush()
+        while json.loads(process.stdout.readline()).get("id") != 2:
+            pass
+        if ends == "signal":
+            process.send_signal(signal.SIGTERM)
+        else:
+            process.stdin.close()
+        assert process.wait(timeout=60) == code
+    (path,) = tmp_path.glob("*/recording.mcap")
+    assert len(list(Recording.open(path).of(Observation))) == 2
+
+
 @contextlib.contextmanager
 def http_server(tmp_path: Path, *options: str) -> Iterator[dict[str, str]]:
     """Start a server, yield its addresses by seat, and end it in order."""
@@ -288,43 +314,3 @@ def test_messages_stand_behind_a_reply_and_are_read_as_written() -> None:
 def test_a_player_without_a_question_reads_why(others: list[Seat], over: bool, says: str) -> None:
     config = MatchConfig(task=load_task("2s3z_pair"), run="mcp")
     assert page(Look(None, None, [], [], over, others), config) == says
-
-
-def wanted(tmp_path: Path, *seats: str, task: str | None = "duel_3m", port: int | None = None, **match: Any) -> Wanted:
-    given = {"seed": None, "episodes": None, "assemble_s": None, "max_wait_s": None, **match}
-    return Wanted(task, seats, port, "silent", None, "simulator", None, tmp_path, given)
-
-
-def test_options_choose_seats_and_their_time(tmp_path: Path) -> None:
-    blue, red = Seat("blue", "Captain"), Seat("red", "Captain")
-    alone = table_of(wanted(tmp_path))
-    assert (alone.seats, alone.config.task.clock.max_wait_s) == ((blue,), None)
-    assert table_of(wanted(tmp_path, "red/Captain", max_wait_s=60.0)).config.task.clock.max_wait_s == 60
-    assert table_of(wanted(tmp_path, port=0)).seats == (blue, red)
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ({"task": None}, "give a task, such as 2s3z_pair: `khala tasks` lists them"),
-        ({"seats": ["Captain"]}, "--seat: there are blue/Captain and red/Captain: give one of"),
-        ({"seats": ["Nobody"]}, "--seat: there is no Nobody: give one of blue/Captain, red/Captain"),
-        ({"seats": ["red/Captain", "blue/Captain"]}, "--seat: over stdio one client plays one agent"),
-    ],
-)
-def test_wrong_options_say_what_is_right(tmp_path: Path, given: dict[str, Any], says: str) -> None:
-    with pytest.raises(ConfigError, match=f"^{says}"):
-        run_mcp(wanted(tmp_path, *given.pop("seats", ()), **given))
-
-
-def test_a_taken_port_is_said(tmp_path: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        with pytest.raises(ConfigError, match=rf"^--port: cannot listen on port {port}: "):
-            run_mcp(wanted(tmp_path, port=port))
-
-
-def test_without_the_sdk_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala.mcp.serve", None)
-    with pytest.raises(ConfigError, match=r"pip install 'khala\[mcp\]'$"):
-        run_mcp(wanted(tmp_path))

@@ -14,7 +14,7 @@ from khala_simulator.battle import ENEMY, PLAYER
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala.env.numeric.maps import Kind
+    from khala.env.numeric.maps import Kind, SmacMap
     from khala_simulator.battle import Battle, Units
 
     Bools = NDArray[np.bool_]
@@ -52,39 +52,34 @@ _ENEMY_SHIELDS = {STALKER: 80, ZEALOT: 50, COLOSSUS: 150}
 
 
 class Force:
-    """One side. Columns have a row for each unit of the beginning; a dead one keeps its last place.
+    """One side. Columns have an entry for each unit of the beginning; a dead one keeps its last place.
 
     Attributes:
-        now: the units as they were last seen.
+        now: the units as they were last seen, as `Units` has their numbers.
         alive: which of them live.
         life: their life; 0 of the dead.
-        code: place of their type in SMAC's one-hot code.
+        types: [n, bits] SMAC's one-hot code of their types.
         most_shields: what SMAC divides their shields by.
         before: life and shields of each before the last step.
         died: those that died in the last step.
     """
 
-    def __init__(self, units: Units, code: Ints, most_shields: Floats) -> None:
-        self.now, self.code, self.most_shields = units, code, most_shields
+    def __init__(self, units: Units, types: Floats, most_shields: Floats) -> None:
+        self.now, self.types, self.most_shields = units, types, most_shields
         self.alive: Bools = np.ones(len(units.tag), dtype=np.bool_)
-        self.life: Floats = units.life
+        self.life: Floats = units.life.copy()
         self.before: Floats = units.life + units.shields
         self.died: Bools = ~self.alive
 
     def __len__(self) -> int:
         return len(self.alive)
 
-    def look(self, battle: Battle) -> None:
-        """Take in what has become of the units."""
-        there = self.alive & battle.present(self.now.tag)
+    def take(self, there: Bools, numbers: Floats) -> None:
+        """Take in which units are in the world now, and what they are like."""
         self.before = self.life + self.now.shields
+        there = self.alive & there
         self.died = self.alive & ~there
-        if there.all():
-            self.now = battle.look(self.now.tag)
-        else:
-            seen = battle.look(self.now.tag[there])
-            for column, new in zip(self.now, seen, strict=True):
-                column[there] = new
+        np.copyto(self.now.numbers, numbers, where=there)
         self.alive = there
         self.life = self.now.life * there
 
@@ -97,14 +92,14 @@ class OwnForce(Force):
         most_cooldown: what SMAC divides their cooldown, or a Medivac's energy, by.
     """
 
-    def __init__(self, units: Units, kind: Kind) -> None:
+    def __init__(self, units: Units, spec: SmacMap) -> None:
         first = int(units.type_id.min())
-        names = dict(enumerate(_OWN_TYPES[kind], start=first))
-        types = [names.get(number, "") for number in units.type_id.tolist()]
-        shields = np.array([_MOST_SHIELDS.get(name, 0) for name in types], dtype=np.float64)
-        super().__init__(units, units.type_id - first, shields)
-        self.heals: Bools = np.array([name == "medivac" for name in types])
-        self.most_cooldown: Floats = np.array([_MOST_COOLDOWN.get(name, 15) for name in types], dtype=np.float64)
+        names = dict(enumerate(_OWN_TYPES[spec.kind], start=first))
+        kinds = [names.get(number, "") for number in units.type_id.tolist()]
+        shields = np.array([_MOST_SHIELDS.get(name, 0) for name in kinds], dtype=np.float64)
+        super().__init__(units, _one_hot(units.type_id - first, spec), shields)
+        self.heals: Bools = np.array([name == "medivac" for name in kinds])
+        self.most_cooldown: Floats = np.array([_MOST_COOLDOWN.get(name, 15) for name in kinds], dtype=np.float64)
 
     @property
     def charge(self) -> Floats:
@@ -113,17 +108,32 @@ class OwnForce(Force):
         return charge
 
 
-def own_force(battle: Battle, kind: Kind) -> OwnForce:
+def own_force(battle: Battle, spec: SmacMap) -> OwnForce:
     """Return the agents' units as they are now."""
-    units = battle.look(battle.tags_of(PLAYER))
+    _, units = battle.look(battle.tags_of(PLAYER))
     order = np.lexsort((units.y, units.x, units.type_id))
-    return OwnForce(battle.look(units.tag[order]), kind)
+    return OwnForce(battle.look(units.tag[order])[1], spec)
 
 
-def enemy_force(battle: Battle, kind: Kind) -> Force:
+def enemy_force(battle: Battle, spec: SmacMap) -> Force:
     """Return the enemies as they are now, in the order of observations."""
-    units = battle.look(battle.tags_of(ENEMY))
-    codes = _ENEMY_CODES.get(kind, ())
+    _, units = battle.look(battle.tags_of(ENEMY))
+    codes = _ENEMY_CODES.get(spec.kind, ())
     places = [codes.index(number) if number in codes else len(codes) for number in units.type_id.tolist()]
     shields = np.array([_ENEMY_SHIELDS.get(number, 0) for number in units.type_id.tolist()], dtype=np.float64)
-    return Force(units, np.array(places, dtype=np.int64), shields)
+    return Force(units, _one_hot(np.array(places, dtype=np.int64), spec), shields)
+
+
+def look(battle: Battle, *forces: Force) -> None:
+    """Have forces take in what has become of their units."""
+    there, units = battle.look(np.concatenate([force.now.tag for force in forces]))
+    first = 0
+    for force in forces:
+        last = first + len(force)
+        force.take(there[first:last], units.numbers[:, first:last])
+        first = last
+
+
+def _one_hot(places: Ints, spec: SmacMap) -> Floats:
+    types: Floats = (places[:, None] == np.arange(spec.type_bits)).astype(np.float64)
+    return types

@@ -18,7 +18,7 @@ import numpy as np
 
 from khala.env.numeric import rewards, sizes
 from khala.env.numeric.features import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP, STOP, Board, Scene
-from khala.env.numeric.forces import enemy_force, own_force
+from khala.env.numeric.forces import enemy_force, look, own_force
 from khala.env.numeric.maps import smac_map
 from khala.env.numeric.options import Options
 from khala_simulator.battle import Battle
@@ -115,12 +115,12 @@ class StarCraft2Env:
     def _launch(self) -> None:
         seed = secrets.randbelow(_MOST_SEED) if self._seed is None else self._seed
         self._battle = Battle(f"SMAC_Maps/{self.map_name}", seed=seed, difficulty=self.options.level)
-        self._board = Board.of(self._battle.ground())
+        self._board = Board.of(self._battle.ground(), self.options.move_amount)
 
     def _arrivals(self) -> tuple[OwnForce, Force]:
         """Return both sides, once all units are there."""
         while True:
-            own, enemy = own_force(self.battle, self._spec.kind), enemy_force(self.battle, self._spec.kind)
+            own, enemy = own_force(self.battle, self._spec), enemy_force(self.battle, self._spec)
             if (len(own), len(enemy)) == (self.n_agents, self.n_enemies):
                 return own, enemy
             self.battle.advance(1)
@@ -142,8 +142,7 @@ class StarCraft2Env:
             self._order(agent, action)
         self.battle.advance(self.options.step_mul)
         self._steps += 1
-        self._own.look(self.battle)
-        self._enemy.look(self.battle)
+        look(self.battle, self._own, self._enemy)
         self._look()
         return self._outcome()
 

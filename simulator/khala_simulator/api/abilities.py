@@ -164,6 +164,7 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
     aimed = _without_snapshot(world, player, command)
     if aimed.point is not None and not all(map(math.isfinite, aimed.point)):
         return _refused(command, ActionResult.MUST_TARGET_VISIBLE_LOCATION)
+    aimed = _on_the_map(world, aimed)
     groups = _groups(world, own, command.ability)
     if not groups:
         return _refused(command, ActionResult.NOT_SUPPORTED)
@@ -215,6 +216,15 @@ def _without_snapshot(world: World, player: int, command: UnitCommand) -> UnitCo
     if world.catalog.units[snapshot.row].resource and world.slot_of(snapshot.unit) != NOBODY:
         return dataclasses.replace(command, target=snapshot.unit)
     return dataclasses.replace(command, target=NO_TAG, point=snapshot.pos)
+
+
+def _on_the_map(world: World, command: UnitCommand) -> UnitCommand:
+    """Return a command at a point beyond the map as one at the nearest point of its edge."""
+    if command.point is None:
+        return command
+    (x, y), (width, height) = command.point, world.map.terrain.size
+    point = min(max(x, 0.0), float(width)), min(max(y, 0.0), float(height))
+    return command if point == command.point else dataclasses.replace(command, point=point)
 
 
 def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:

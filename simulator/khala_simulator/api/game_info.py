@@ -45,10 +45,10 @@ class GameInfo:
 
     def encode(self) -> list[Part]:
         """Return the parts of a `ResponseGameInfo`."""
-        known = _known_structures(self._seat)
+        known = known_structures(self._seat)
         if known != self._known:
             start = raw_pb2.StartRaw()
-            _write_image(start.pathing_grid, _crop(self._seat, _paths(self._world, known)), 1)
+            _write_image(start.pathing_grid, _crop(self._seat, paths(self._world, known)), 1)
             self._known, self._paths = known, start.SerializeToString()
         return [self._fixed, *wire.embed(_START_RAW, [self._map, self._paths])]
 
@@ -104,7 +104,7 @@ def _crop(seat: PlayerSeat, grid: NDArray[np.generic]) -> NDArray[np.generic]:
     return grid[y0:y1, x0:x1]
 
 
-def _known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
+def known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
     """Return the structures and resources that the player sees or remembers; its game info omits others."""
     sight = seat.look()
     stays = seat.types.structure[sight.row] | (sight.alliance == Alliance.NEUTRAL.value)
@@ -112,7 +112,8 @@ def _known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
     return tuple((row, x, y) for row, (x, y) in zip(rows, points, strict=True))
 
 
-def _paths(world: World, structures: tuple[Structure, ...]) -> NDArray[np.bool_]:
+def paths(world: World, structures: tuple[Structure, ...]) -> NDArray[np.bool_]:
+    """Return [y, x] where ground units can walk, if these structures are all that stands there."""
     grid, catalog = world.map.terrain.walk.copy(), world.catalog
     for row, x, y in structures:
         footprint = catalog.footprints.get(catalog.units[row].footprint)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import spatial_pb2
 
+from khala_simulator import compiled
 from khala_simulator.api import wire
 from khala_simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
 from khala_simulator.api.raster import RasterLayer, Sampler, disc_layers
@@ -221,12 +222,22 @@ def unit_values(frame: Frame) -> Ints:
     while it is being built and 0 afterwards. The last of several buffs on a unit is shown; its duration is the part
     that remains, 0 to 255, and stays at 255 without an end.
     """
-    sight = frame.sight
+    sight, kernel = frame.sight, compiled.part("sight")
     values = np.zeros((len(VALUES), len(sight)), np.int32)
+    (write_values if kernel is None else kernel.layer_values)(sight, frame.selected, values)
+    worn = seen_buffs(frame.world, sight)
+    if worn is not None:
+        values[15, worn.row] = worn.id
+        values[16, worn.row] = np.where(worn.total > 0, _ratio(worn.remain, worn.total), 255)
+    return values
+
+
+def write_values(sight: Sight, selected: Bools, values: Ints) -> None:
+    """Write the rows of values that every unit has; `compiled.sight` does the same in one pass."""
     values[0] = sight.owner
     values[1] = sight.alliance
     values[2] = sight.type_id
-    values[3] = frame.selected
+    values[3] = selected
     values[4], values[5] = sight.life, _ratio(sight.life, sight.life_max)
     values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
     values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
@@ -235,11 +246,6 @@ def unit_values(frame: Frame) -> Ints:
     values[12] = sight.active
     values[13] = (sight.build_progress < 1) * sight.build_progress * 255
     values[14] = sight.display == Display.PLACEHOLDER.value
-    worn = seen_buffs(frame.world, sight)
-    if worn is not None:
-        values[15, worn.row] = worn.id
-        values[16, worn.row] = np.where(worn.total > 0, _ratio(worn.remain, worn.total), 255)
-    return values
 
 
 def _ratio(part: Floats, whole: Floats) -> Floats:

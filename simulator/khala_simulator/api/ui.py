@@ -40,7 +40,12 @@ def _encode_multi(world: World, types: Types, slots: list[int], player: int) -> 
     if kernel is not None:
         encoded: bytes = kernel.encode_panel(world, types, slots, player)
         return encoded
-    return ui_pb2.MultiPanel(units=(_unit(world, types, slot, player) for slot in slots)).SerializeToString()
+    return multi_panel(world, types, slots, player).SerializeToString()
+
+
+def multi_panel(world: World, types: Types, slots: list[int], player: int) -> ui_pb2.MultiPanel:
+    """Return the panel of several units."""
+    return ui_pb2.MultiPanel(units=(_unit(world, types, slot, player) for slot in slots))
 
 
 def _write_one(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, player: int) -> None:

@@ -27,6 +27,7 @@ SYSTEMS: Final = (
     "acquire",
     "autocast",
     "avoidance",
+    "buffs",
     "casts",
     "collision",
     "construction",

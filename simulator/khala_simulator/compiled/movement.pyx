@@ -66,7 +66,9 @@ cdef face_targets(world, Columns c):
         for i in range(n):
             slot = slots[i]
             if faces(c, slot):
-                c.heading[slot] = turned(c.heading[slot], c.toward[slot], c.turn_still_cos[slot], c.turn_still_sin[slot])
+                c.heading[slot] = turned(
+                    c.heading[slot], c.toward[slot], c.turn_still_cos[slot], c.turn_still_sin[slot]
+                )
 
 
 cdef inline bint faces(Columns c, int64_t slot) noexcept:

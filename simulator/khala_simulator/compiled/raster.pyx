@@ -13,6 +13,10 @@ cdef enum:
     LAYERS = 64
 
 
+cdef double SLACK = 1e-6
+"""Pixels beside the edge of a disc for which nothing is decided without the root, as it is rounded."""
+
+
 cdef class DiscLayers:
     """Layers that show values of discs; it draws into the message itself and clears only what was drawn before."""
 
@@ -106,12 +110,14 @@ cdef class DiscLayers:
     cdef void draw(self, double* x, double* y, double* radius, Py_ssize_t n) noexcept:
         """Find the pixels of all discs, the topmost disc of each, how many there are, and how much they cover."""
         cdef Py_ssize_t disc, column, row, left, right, low, high, middle_x, middle_y, pixel
-        cdef double reach, distance, dx, dy, cover
+        cdef double reach, distance, dx, dy, cover, squared, far, close
         cdef bint inside
         for disc in range(n):
             reach = ceil(radius[disc] + 0.5)
             if not (-reach <= x[disc] < self.columns + reach and -reach <= y[disc] < self.rows + reach):
                 continue
+            far = (radius[disc] + 0.5 + SLACK) * (radius[disc] + 0.5 + SLACK)
+            close = most(radius[disc] - 0.5 - SLACK, 0.0) * most(radius[disc] - 0.5 - SLACK, 0.0)
             middle_x, middle_y = <Py_ssize_t>floor(x[disc]), <Py_ssize_t>floor(y[disc])
             left, right = max(middle_x - <Py_ssize_t>reach, 0), min(middle_x + <Py_ssize_t>reach + 1, self.columns)
             low, high = max(middle_y - <Py_ssize_t>reach, 0), min(middle_y + <Py_ssize_t>reach + 1, self.rows)
@@ -119,11 +125,18 @@ cdef class DiscLayers:
                 dy = row + 0.5 - y[disc]
                 for column in range(left, right):
                     dx = column + 0.5 - x[disc]
-                    distance = sqrt(dx * dx + dy * dy)
-                    cover = least(most(radius[disc] - distance + 0.5, 0.0), 1.0)
-                    inside = distance <= radius[disc] or (column == middle_x and row == middle_y)
-                    if not (inside or cover > 0.0):
+                    squared = dx * dx + dy * dy
+                    inside = column == middle_x and row == middle_y
+                    if squared > far and not inside:
                         continue
+                    if squared < close:
+                        inside, cover = True, 1.0
+                    else:  # at the edge, where a pixel is covered in part
+                        distance = sqrt(squared)
+                        cover = least(most(radius[disc] - distance + 0.5, 0.0), 1.0)
+                        inside = inside or distance <= radius[disc]
+                        if not (inside or cover > 0.0):
+                            continue
                     pixel = row * self.columns + column
                     if self.top[pixel] == 0 and self.discs[pixel] == 0 and self.covered[pixel] == 0.0:
                         self.pixels[self.drawn] = <int32_t>pixel

@@ -1,6 +1,6 @@
 """What a player perceives of units, compiled; `api.sight` has the rules, and all that is remembered or planned."""
 cimport numpy as cnp
-from libc.stdint cimport int64_t, uint8_t
+from libc.stdint cimport int32_t, int64_t, uint8_t
 
 from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
 from khala_simulator.compiled.heights cimport Heights
@@ -20,6 +20,7 @@ cdef int64_t NEUTRAL = rules.Alliance.NEUTRAL
 cdef int64_t ENEMY = rules.Alliance.ENEMY
 cdef int64_t VISIBLE = rules.Display.VISIBLE
 cdef int64_t HIDDEN = rules.Display.HIDDEN
+cdef int64_t PLACEHOLDER = rules.Display.PLACEHOLDER
 cdef int64_t UNKNOWN = rules.Cloak.UNKNOWN
 cdef int64_t CLOAKED = rules.Cloak.CLOAKED
 cdef int64_t DETECTED = rules.Cloak.DETECTED
@@ -134,6 +135,45 @@ cdef columns(world, types, Columns c, int64_t player, cnp.ndarray slot_column, c
         shields=shields, shields_max=shields_max, energy=energy, energy_max=energy_max, build_progress=progress,
         flying=flying, burrowed=burrowed, hallucination=fakes, active=active,
     )  # fmt: skip
+
+
+def layer_values(sight, selected, cnp.ndarray values):
+    """Write the first rows of `api.layers.unit_values`, those that every unit has, into values [k, n]."""
+    cdef Py_ssize_t n = cnp.PyArray_DIM(values, 1), i
+    cdef int32_t* out = <int32_t*>cnp.PyArray_DATA(values)
+    cdef int64_t* owner = ints(sight.owner)
+    cdef int64_t* alliance = ints(sight.alliance)
+    cdef int64_t* type_id = ints(sight.type_id)
+    cdef int64_t* cloak = ints(sight.cloak)
+    cdef int64_t* display = ints(sight.display)
+    cdef boolean* chosen = flags(selected)
+    cdef boolean* fake = flags(sight.hallucination)
+    cdef boolean* active = flags(sight.active)
+    cdef double* progress = floats(sight.build_progress)
+    cdef double* life = floats(sight.life)
+    cdef double* life_max = floats(sight.life_max)
+    cdef double* shields = floats(sight.shields)
+    cdef double* shields_max = floats(sight.shields_max)
+    cdef double* energy = floats(sight.energy)
+    cdef double* energy_max = floats(sight.energy_max)
+    for i in range(n):
+        out[i] = <int32_t>owner[i]
+        out[n + i] = <int32_t>alliance[i]
+        out[2 * n + i] = <int32_t>type_id[i]
+        out[3 * n + i] = chosen[i]
+        out[4 * n + i], out[5 * n + i] = <int32_t>life[i], ratio(life[i], life_max[i])
+        out[6 * n + i], out[7 * n + i] = <int32_t>shields[i], ratio(shields[i], shields_max[i])
+        out[8 * n + i], out[9 * n + i] = <int32_t>energy[i], ratio(energy[i], energy_max[i])
+        out[10 * n + i] = fake[i]
+        out[11 * n + i] = cloak[i] != NOT_CLOAKED and cloak[i] != UNKNOWN
+        out[12 * n + i] = active[i]
+        out[13 * n + i] = <int32_t>(progress[i] * 255) if progress[i] < 1 else 0
+        out[14 * n + i] = display[i] == PLACEHOLDER
+
+
+cdef inline int32_t ratio(double part, double whole) noexcept:
+    """Return a share as 0 to 255."""
+    return <int32_t>(least(part / most(whole, 1e-9), 1.0) * 255)
 
 
 cdef inline cnp.ndarray new_flags(Py_ssize_t n):

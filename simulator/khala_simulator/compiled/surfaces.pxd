@@ -1,9 +1,8 @@
 """The surfaces of `movement.pathfinding` as compiled systems read them."""
 cimport cython
-cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point, boolean
+from khala_simulator.compiled.columns cimport Point, boolean
 
 @cython.final
 cdef class Grid:

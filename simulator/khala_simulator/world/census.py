@@ -6,11 +6,15 @@ Taken again when a unit comes, dies or changes; nothing here decides anything.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from khala_simulator.numeric.arrays import some
+
 if TYPE_CHECKING:
+    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.world import World
 
 
@@ -31,18 +35,28 @@ class Census:
     def of(cls, world: World) -> Census:
         """Look at all living units."""
         slots = world.live
-        units = [world.catalog.units[row] for row in sorted(set(world.type[slots].tolist()))]
-        weapons = [weapon for unit in units for weapon in unit.weapons]
+        turrets, beams, rolling_guns = _arms(world.catalog, frozenset(world.type.take(slots).tolist()))
         return cls(
-            turrets=any(w.turret_deg_n is not None for w in weapons),
-            beams=any(w.is_beam for w in weapons),
-            rolling_guns=any(w.moves == "moving" for w in weapons),
-            guns_walking=bool(world.guns_walking[slots].any()),
-            drifting_flyers=bool(world.glides[slots].any()),
-            brakers=bool(np.isfinite(world.step_loss[slots]).any()),
-            low_priority_bodies=bool((world.lightness[slots] != 1.0).any()),
-            weapons_with_filters=bool(world.spares_structures[slots].any() or (world.least_range[slots] > 0.0).any()),
+            turrets=turrets,
+            beams=beams,
+            rolling_guns=rolling_guns,
+            guns_walking=some(world.guns_walking.take(slots)),
+            drifting_flyers=some(world.glides.take(slots)),
+            brakers=some(np.isfinite(world.step_loss.take(slots))),
+            low_priority_bodies=some(world.lightness.take(slots) != 1.0),
+            weapons_with_filters=some(world.spares_structures.take(slots) | (world.least_range.take(slots) > 0.0)),
         )
+
+
+@lru_cache(maxsize=256)
+def _arms(catalog: Catalog, rows: frozenset[int]) -> tuple[bool, bool, bool]:
+    """Return whether the types in these rows have turrets, beams, and weapons that fire while they move."""
+    weapons = [weapon for row in rows for weapon in catalog.units[row].weapons]
+    return (
+        any(w.turret_deg_n is not None for w in weapons),
+        any(w.is_beam for w in weapons),
+        any(w.moves == "moving" for w in weapons),
+    )
 
 
 def census(world: World) -> Census:

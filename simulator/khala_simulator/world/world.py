@@ -20,7 +20,7 @@ import numpy as np
 from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some, which
 from khala_simulator.tables.catalog import load_catalog
-from khala_simulator.tables.stats import Stats
+from khala_simulator.tables.stats import new_stats
 from khala_simulator.world.active_buffs import ActiveBuffs
 from khala_simulator.world.caches import WorldCaches
 from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
@@ -114,7 +114,7 @@ class World(UnitColumns, WorldCaches):
         self.loop = 0
         self.players: list[Player] = [Player(NEUTRAL, "neutral", "none")]
         self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
-        self.stats = Stats(self.catalog, len(self.players))
+        self.stats = new_stats(self.catalog, len(self.players))
         self.ground = Ground(game_map.terrain)
         self.fog: bool = fog and game_map.scenario.visibility.fog
         self.visibility: NDArray[np.uint8]  # (players, h, w): 0 never seen, 1 seen before, 2 visible

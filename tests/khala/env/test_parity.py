@@ -20,6 +20,7 @@ from khala.env.numeric import MAPS, StarCraft2Env, starcraft2
 from khala_bridge.compat import run_configs
 from khala_simulator.api.game import HostedGame
 from khala_simulator.battle import ENEMY, PLAYER, Battle
+from khala_simulator.maps.game_map import load_map
 from khala_simulator.process.client import Client, command
 from khala_simulator.process.replay import Replay
 from khala_simulator.tables.versions import DEFAULT_VERSION
@@ -130,15 +131,15 @@ def mirrored(door: Door) -> type[Battle]:
             assert seen.game_loop == self.loop
             for player in (PLAYER, ENEMY):
                 theirs = [unit for unit in seen.raw_data.units if unit.owner == player]
-                ours = self.look(self.tags_of(player))
+                there, ours = self.look(self.tags_of(player))
+                assert there.all()
                 np.testing.assert_array_equal(columns(ours, own=player == PLAYER), read(theirs, own=player == PLAYER))
 
     return Mirrored
 
 
 def columns(units: Units, *, own: bool) -> np.ndarray[Any, Any]:
-    hidden = {"energy", "cooldown"} if not own else set()
-    return np.stack([column for name, column in units._asdict().items() if name not in hidden])
+    return np.concatenate(([units.tag, units.type_id], units.numbers if own else units.numbers[:6]))
 
 
 def read(units: Iterable[Any], *, own: bool) -> np.ndarray[Any, Any]:
@@ -182,6 +183,17 @@ def played(door: Door, name: str, episodes: int, monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize("name", ["MMM", *(pytest.param(n, marks=pytest.mark.slow) for n in MAPS if n != "MMM")])
 def test_a_battle_in_this_process_is_that_behind_the_messages(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     played(InMemory(), name, 2, monkeypatch)
+
+
+def test_the_map_is_that_of_the_games_information_with_the_structures_on_it() -> None:
+    door = InMemory()
+    door.begin("SMAC_Maps/2s_vs_1sc", 1)
+    told = door.client.ask(game_info=sc.RequestGameInfo()).game_info.start_raw
+    ground = Battle("SMAC_Maps/2s_vs_1sc", seed=1).ground()
+    assert ground.size == (told.map_size.x, told.map_size.y)
+    assert np.packbits(ground.walkable).tobytes() == told.pathing_grid.data
+    assert ground.height.tobytes() == told.terrain_height.data
+    assert ground.walkable.sum() < load_map("SMAC_Maps/2s_vs_1sc").terrain.walk.sum()  # a SpineCrawler stands there
 
 
 @pytest.fixture

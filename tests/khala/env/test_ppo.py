@@ -61,4 +61,5 @@ def test_a_team_is_trained_and_tested() -> None:
     run, _ = train.train("3m", seed=1, envs=4, minutes=0.05, tell=lambda _: None)
     assert run.steps == sorted(run.steps)
     assert len(run.won) == len(run.minutes) > 0
+    assert run.greedy is not None
     assert 0.0 <= run.greedy <= 1.0

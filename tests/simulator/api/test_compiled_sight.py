@@ -1,13 +1,15 @@
-"""The compiled sight perceives what the rules do: the same rows, to the last bit."""
+"""The compiled sight perceives what the rules do: the same rows, and values in the layers, to the last bit."""
 
 from __future__ import annotations
 
 import dataclasses
 import random
 
+import numpy as np
 import pytest
 
 from khala_simulator import compiled
+from khala_simulator.api.layers import write_values
 from khala_simulator.api.sight import Sight, units_seen
 from khala_simulator.api.types import types_of
 from khala_simulator.maps.game_map import load_map
@@ -39,6 +41,11 @@ def differences_in_a_game(name: str, loops: int) -> int:
             for show_cloaked, through_fog in ((False, False), (True, False), (True, True)):
                 rule = units_seen(world, types, watcher, show_cloaked, through_fog)
                 assert bits(kernel.units_seen(world, types, watcher, show_cloaked, through_fog)) == bits(rule)
+                half, blank = np.arange(len(rule)) % 2 == 0, np.zeros((15, len(rule)), np.int32)
+                one, other = blank.copy(), blank.copy()
+                write_values(rule, half, one)
+                kernel.layer_values(rule, half, other)
+                assert one.tobytes() == other.tobytes()
                 seen += len(rule)
     return seen
 

@@ -1,4 +1,4 @@
-"""The compiled writer of units writes what the message classes do, to the byte."""
+"""The compiled writers of units and of the panel write what the message classes do, to the byte."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from khala_simulator.api.effects import seen_buffs
 from khala_simulator.api.raw import Units
 from khala_simulator.api.sight import look
 from khala_simulator.api.types import types_of
+from khala_simulator.api.ui import multi_panel
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tick import advance, new_game
@@ -49,6 +50,8 @@ def add_rarities(world: World) -> None:
 
 def fields_of_a_game(name: str, loops: int) -> set[str]:
     """Compare every observation of a game with random orders, and return the fields of units that occurred."""
+    kernel = compiled.part("units")
+    assert kernel is not None
     world, chance, seen = new_game(load_map(name), seed=3), random.Random(3), set()
     for player in world.players[1:]:
         player.cheats += ["tech_tree", "cooldown", "food"]
@@ -61,6 +64,9 @@ def fields_of_a_game(name: str, loops: int) -> set[str]:
             raw = raw_pb2.ObservationRaw()
             units.write(raw)
             assert units.encode() == raw.SerializeToString()
+            live = world.live.tolist()
+            panel = kernel.encode_panel(world, units.types, live, units.player)
+            assert panel == multi_panel(world, units.types, live, units.player).SerializeToString()
             seen |= {field.name for unit in raw.units for field, _ in unit.ListFields()}
     return seen
 

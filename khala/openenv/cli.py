@@ -1,0 +1,67 @@
+"""The command `khala openenv`; `khala.cli` mounts it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from khala.options import Game
+
+OPENENV_EPILOG = """
+Examples:\n
+    khala openenv\n
+    khala openenv pvz_task6_level1 --sessions 16 --port 8000\n
+    khala openenv duel_3m --others focus-fire --allow openai\n
+    khala openenv 2s3z --rubric my_rewards:Mine --out runs\n
+"""
+
+
+def openenv(
+    task: Annotated[
+        str,
+        typer.Argument(
+            help="What is played if a client names no task: one of `khala tasks`, or a file.", metavar="TASK"
+        ),
+    ] = "2s3z_pair",
+    *,
+    host: Annotated[
+        str, typer.Option(help="Address to serve on; 0.0.0.0 is all of this machine.", metavar="ADDRESS")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0 takes a free one.")] = 8000,
+    sessions: Annotated[int, typer.Option(min=1, help="Most sessions at a time; each has a game of its own.")] = 8,
+    idle: Annotated[float, typer.Option(min=1, help="End a session that does nothing for so many seconds.")] = 3600.0,
+    others: Annotated[
+        str,
+        typer.Option(
+            help="Model or policy of the agents that no client plays: skilled, openai, module:name.", metavar="MODEL"
+        ),
+    ] = "skilled",
+    allow: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Another model or policy that clients may choose for them; may be given several times.",
+            metavar="MODEL",
+            show_default="the scripted players",
+        ),
+    ] = None,
+    rubric: Annotated[
+        str | None,
+        typer.Option(
+            help="Your rubric, or a function that makes one.", metavar="MODULE:NAME", show_default="win, value, ..."
+        ),
+    ] = None,
+    game: Game = "simulator",
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Directory for recordings of all sessions.", metavar="DIR", show_default="none is made"),
+    ] = None,
+) -> None:
+    """Serve OpenEnv: clients such as TRL play agents of matches, with rewards.
+
+    Each session is a match of its own; with reset, a client chooses task, agents, seed and pictures. It plays one agent
+    or all of a side, over a websocket or HTTP. The server has no password: on other addresses than this machine's,
+    whoever reaches the port can play.
+    """
+    from khala.openenv.commands import Wanted, run_openenv  # noqa: PLC0415  # the server, which --help can do without
+
+    run_openenv(Wanted(task, host, port, sessions, idle, others, tuple(allow or ()), rubric, game, out))

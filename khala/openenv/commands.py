@@ -1,0 +1,95 @@
+"""The work of `khala openenv`: the server that its options describe."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from khala.listening import bound
+from khala.minds import Minds
+from khala_agents.build import load_attribute
+from khala_orchestrator.config import load_task
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from openenv.core.rubrics import Rubric
+
+    from khala.openenv.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the command line says; names are those of its options."""
+
+    task: str
+    host: str
+    port: int
+    sessions: int
+    idle_s: float
+    others: str
+    allow: Sequence[str]
+    rubric: str | None
+    game: str
+    out: Path | None
+
+
+def run_openenv(wanted: Wanted) -> None:
+    """Serve until a signal comes.
+
+    Raises:
+        ConfigError: an option is wrong, or OpenEnv is not installed.
+    """
+    try:
+        import uvicorn  # noqa: PLC0415  # of the extra `openenv`, as all below it
+
+        from khala.openenv.server import app_of  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"there is no module {error.name}: pip install 'khala[openenv]'", source="khala openenv"
+        ) from None
+    app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s)
+    with bound(wanted.host, wanted.port) as listening:
+        sys.stderr.write(f"http://{wanted.host}:{listening.getsockname()[1]}\n")
+        config = uvicorn.Config(app, log_config=None, ws="websockets-sansio", timeout_graceful_shutdown=5)
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def settings_of(wanted: Wanted) -> Settings:
+    """Return what the server decides.
+
+    Raises:
+        ConfigError: there is no such task, model, policy or rubric.
+    """
+    from khala.openenv.rubrics import Battle  # noqa: PLC0415  # of the extra `openenv`
+    from khala.openenv.settings import Settings  # noqa: PLC0415
+
+    load_task(wanted.task)
+    for name in {wanted.others, *wanted.allow}:
+        Minds().named(name).check()
+    rubric = Battle if wanted.rubric is None else rubric_of(wanted.rubric)
+    return Settings(wanted.task, wanted.others, wanted.allow, rubric, wanted.game, wanted.out)
+
+
+def rubric_of(name: str) -> Callable[[], Rubric]:
+    """Return what makes the rubric at `module:name` for each session.
+
+    Raises:
+        ConfigError: there is none, or it makes something else.
+    """
+    from openenv.core.rubrics import Rubric  # noqa: PLC0415  # of the extra `openenv`
+
+    source = f"rubric {name}"
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        raise ConfigError("write module:name, such as my_rewards:Mine", source=source)
+    made = load_attribute(module, attribute, source=source)
+    if not callable(made) or isinstance(made, Rubric):
+        raise ConfigError("give a class or a function that makes a rubric: each session has its own", source=source)
+    if not isinstance(made(), Rubric):
+        raise ConfigError("it makes no openenv.core.rubrics.Rubric", source=source)
+    return partial(made)

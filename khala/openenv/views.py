@@ -1,0 +1,46 @@
+"""What a client reads of the messages of a match."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import TYPE_CHECKING
+
+from khala.openenv.models import AgentView, ChatTurn, Outcome, Picture
+from khala_agents.prompt import Prompt
+
+if TYPE_CHECKING:
+    from khala.seats import Seen
+    from khala_protocol.messages import Briefing, Result
+
+
+def view_of(seen: Seen, *, briefed: bool) -> AgentView:
+    """Return what an agent sees, behind its briefing if it has not been briefed."""
+    observation = seen.observation
+    return AgentView(
+        text=observation.text,
+        briefing=[] if briefed else _briefing(seen.briefing),
+        accepted=list(observation.accepted),
+        rejections=[f"{one.text}: {one.message}" for one in observation.rejections],
+        pictures=[
+            Picture(title=ref.title or ref.name, media_type=ref.media_type, data=b64encode(picture).decode())
+            for ref, picture in seen.arrived()
+        ],
+    )
+
+
+def _briefing(briefing: Briefing) -> list[ChatTurn]:
+    stable = Prompt(briefing).messages("")[: Prompt.STABLE]
+    return [ChatTurn(role=message.role, content=message.content) for message in stable]
+
+
+def outcome_of(result: Result) -> Outcome:
+    """Return how an episode ended."""
+    return Outcome(
+        outcome=result.outcome,
+        cause=result.cause,
+        valid=result.valid,
+        killed_value=result.killed.value,
+        lost_value=result.lost.value,
+        steps=result.steps,
+        game_s=result.game_s,
+    )
