@@ -373,6 +373,26 @@ def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
     assert "khala sc2 install" in wrong["advice"]
 
 
+def test_the_doctor_says_what_a_game_needs_that_is_not_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, out = tell(capsys, "doctor", "--game", str(tmp_path), "--json")
+    found = {finding["name"]: finding for finding in json.loads(out)["findings"]}
+    assert code == 1
+    assert "no directory Versions" in found["game process"]["found"]
+    assert "real-game.md" in found["game process"]["advice"]
+
+
+@pytest.mark.slow
+@pytest.mark.game
+def test_the_doctor_starts_a_game_and_tries_its_maps(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out = tell(capsys, "doctor", "--game", "simulator", "--json")
+    found = {finding["name"]: finding for finding in json.loads(out)["findings"]}
+    assert "build 75689" in found["game process"]["found"]
+    assert found["maps that load"]["state"] == found["rendering"]["state"] == "ok"
+    assert [name for name in found if name.startswith("map ")] == []
+
+
 def test_keys_are_made_shown_and_examined(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     keys = str(tmp_path / "keys")
     agent, adviser = ["agent", "Stalkers", keys, "--days", "7"], ["adviser", "Ada", keys, "--side", "red"]
