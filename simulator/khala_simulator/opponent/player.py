@@ -20,6 +20,7 @@ from khala_simulator.opponent.side import Side
 from khala_simulator.world.opponent_memory import OpponentMemory
 
 if TYPE_CHECKING:
+    from khala_simulator.world.casts import Point
     from khala_simulator.world.world import World
 
 PATIENCE: Final = 0.08
@@ -51,7 +52,7 @@ def begin(world: World, player: int) -> OpponentMemory:
     owner = world.players[player]
     draws = np.random.default_rng([world.seed, player]).random(2).tolist()
     places = bases.find(world, player, world.catalog.unit(load_race(owner.race).hall))
-    own = owner.start or places[0]
+    own = owner.start or next(iter(places), None) or _middle(world, player)
     starts = [place for place in world.map.scenario.start_locations if math.dist(place, own) > 1.0]
     return OpponentMemory(
         build=name_of(owner.build, draws[0]),
@@ -60,6 +61,14 @@ def begin(world: World, player: int) -> OpponentMemory:
         resources=bases.resources(world),
         enemy_start=min(starts, default=own),
     )
+
+
+def _middle(world: World, player: int) -> Point:
+    """Return the middle of a player's units, or of the map: where it is at home if the map does not say it."""
+    slots = world.units_of(player)
+    x0, y0, x1, y1 = world.map.terrain.playable
+    x, y = world.pos[slots].mean(axis=0).tolist() if slots.size else ((x0 + x1) / 2, (y0 + y1) / 2)
+    return x, y
 
 
 def tax(side: Side) -> None:

@@ -28,7 +28,7 @@ WITHERING: Final = "ZergBuildingNotOnCreep"
 def spread(world: World) -> None:
     """Look for new and lost sources, take the steps that are due, and harm structures that have lost their creep."""
     creep = world.growth
-    if creep.looked_at != world.population or (creep.sources and world.loop % LOOK_PERIOD == 0):
+    if creep.looked_at != world.population or ((creep.sources or creep.has_makers) and world.loop % LOOK_PERIOD == 0):
         _look_over(world)
     if creep.sources and creep.due <= world.loop:
         _step(world)
@@ -41,6 +41,7 @@ def _look_over(world: World) -> None:
     creep = world.growth
     creep.looked_at = world.population
     slots = world.live[makers(world.catalog)[world.type[world.live]]]
+    creep.has_makers = bool(slots.size)
     stand = {world.tag_of(s): s for s in slots.tolist() if _generates(world, s)}
     for source in creep.sources:
         slot = stand.get(source.tag, NOBODY)

@@ -213,6 +213,15 @@ def test_an_overlord_lets_creep_fall_after_it_has_stood_a_while(ground: Any, ove
     assert not world.creep[45, 52]
 
 
+def test_an_overlord_lets_creep_fall_where_nothing_else_makes_any(ground: Any) -> None:
+    slot = ground.put("Overlord", 1, 45.5, 45.5)
+    ground.world.players[1].cheats.append("tech_tree")
+    ground.play(1)
+    assert ground.order(slot, GENERATE)
+    ground.play(200)
+    assert ground.world.creep[45, 45]
+
+
 @pytest.mark.parametrize("how", ["it is told to stop", "it flies away"])
 def test_an_overlords_creep_recedes(ground: Any, overlord: int, how: str) -> None:
     world = ground.world

@@ -439,6 +439,15 @@ def test_only_a_level_that_cheats_by_vision_knows_what_it_does_not_see() -> None
 # whole games ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("army", [True, False])
+def test_on_a_map_without_places_to_start_it_is_at_home_where_its_units_are(army: bool) -> None:
+    world = game(map_name="Melee/Empty128")
+    if army:
+        lifecycle.spawn(world, world.catalog.unit("Zealot"), 1, (40.0, 30.0))
+    advance(world, 400)
+    assert side_of(world).mind.bases[0] == ((40.0, 30.0) if army else (64.0, 64.0))
+
+
 def test_a_scenarios_own_computer_player_is_left_alone() -> None:
     world = new_game(load_map("llm_smac/2s3z"), seed=1)
     advance(world, 2)
