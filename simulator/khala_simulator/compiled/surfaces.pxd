@@ -10,6 +10,7 @@ cdef class Grid:
 
     cdef object surface
     cdef dict fields  # goal -> the ways to it
+    cdef Py_ssize_t fields_kept  # so many
     cdef tuple arrays  # keeps the memory alive
     cdef int64_t width
     cdef int64_t height

@@ -37,7 +37,7 @@ cdef class Grid:
         self.walls_low, self.walls_high = <Point*>start(self.arrays[7]), <Point*>start(self.arrays[8])
         self.sums, self.part = <int64_t*>start(self.arrays[9]), <int64_t*>start(self.arrays[10])
         self.steps = <boolean*>start(self.arrays[11])
-        self.fields = {}
+        self.fields, self.fields_kept = {}, surface.fields_kept
 
     def __reduce__(self):
         """Return what makes None: a copy of a surface is read anew."""

@@ -19,7 +19,6 @@ cnp.import_array()
 
 cdef double SIDE_CLEARANCE = rules.SIDE_CLEARANCE
 cdef double SAMPLE_STEP = rules.SAMPLE_STEP
-cdef Py_ssize_t FIELDS_KEPT = rules.FIELDS_KEPT
 cdef enum:
     AHEAD = 8
     NEIGHBOURS = 8
@@ -156,7 +155,7 @@ cdef Field field_of(Grid grid, int64_t goal):
     """Return the ways to a goal."""
     found = grid.fields.get(goal)
     if found is None:
-        if len(grid.fields) >= FIELDS_KEPT:
+        if len(grid.fields) >= grid.fields_kept:
             grid.fields.clear()
         found = grid.fields[goal] = Field(goal, grid.width * grid.height)
     return <Field>found

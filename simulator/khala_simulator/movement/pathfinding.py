@@ -28,7 +28,10 @@ if TYPE_CHECKING:
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-FIELDS_KEPT: Final = 2048
+PLACES_KEPT: Final = 2048
+FIELDS_MB: Final = 32
+"""Memory that the ways of one surface may take; more goals than that are forgotten, and searched again."""
+FIELD_BYTES: Final = 17  # a cell of a field: its distance, the next cell, and whether it is settled
 SIDE_CLEARANCE: Final = 0.3
 SAMPLE_STEP: Final = 0.35
 NEAR_SIDE: Final = 0.2
@@ -65,6 +68,7 @@ class Surface:
         # (height + 1, width + 1) how many cells are free below and to the left
         self.sums: Ints = np.pad(np.cumsum(np.cumsum(free, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
         self._fields: dict[int, _Field] = {}
+        self.fields_kept = max((FIELDS_MB << 20) // (FIELD_BYTES * self.flat.size), 1)
         self._places: dict[tuple[float, ...], tuple[Ints, Floats]] = {}
         # (cells,) bit i says that a step to the i-th neighbour is free; diagonals need both sides free
         self.steps: list[int] = self._free_steps(blocked).tolist()
@@ -122,7 +126,7 @@ class Surface:
         key = (*point.tolist(), part)
         found = self._places.get(key)
         if found is None:
-            if len(self._places) >= FIELDS_KEPT:
+            if len(self._places) >= PLACES_KEPT:
                 self._places.clear()
             distance = geometry.length(self._centres[part] - point)
             near = which(distance <= distance.min() * (1.0 + NEAR_SIDE) / (1.0 - NEAR_SIDE) + EDGE)
@@ -236,7 +240,7 @@ class Surface:
         """Return the ways to ``goal``, as far as they are needed from ``cells``."""
         found = self._fields.get(goal)
         if found is None:
-            if len(self._fields) >= FIELDS_KEPT:
+            if len(self._fields) >= self.fields_kept:
                 self._fields.clear()
             found = self._fields[goal] = _Field(goal, self.flat.size)
         found.reach(cells, self.steps, self._edges)

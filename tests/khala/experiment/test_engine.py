@@ -94,7 +94,7 @@ def test_an_experiment_from_the_command_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_runner_that_is_killed_again_and_again_ends_with_the_same_table() -> None:
-    killed = asyncio.run(experiments.kills(2, seed=5, seeds=2, steps=4))
+    killed = asyncio.run(experiments.kills(2, seed=5, seeds=6, steps=4, after_s=(2, 4)))
     assert killed.is_good, killed
     assert killed.kills > 0
 
