@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 KEPT: Final = (
     "yardstick", "turn", "bus", "simulator_engine", "engines", "simulator_env", "floors", "start", "observe", "act",
-    "abilities", "games_per_hour", "env",
+    "abilities", "games_per_hour", "env", "openenv",
 )  # fmt: skip
 """The measurements whose figures are kept: they have `--json` and `measures`."""
 PRINTED: Final = (
