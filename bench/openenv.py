@@ -4,11 +4,11 @@
     python -m bench.openenv --clients 1 8 --steps 5      fewer clients, shorter episodes
     python -m bench.openenv --json                       one JSON object
 
-The server is `khala openenv` in a process of its own, and each client has a session. `sessions` are whole ones a second:
-a client connects, begins an episode of 2s3z with a seed, plays some steps without orders, disconnects, and begins again.
-The start of a game is in it, and most of it. `steps` are those a second of all clients together while their games run on
-from episode to episode. Memory is PSS, in which pages that processes share count once: of the server, and of a game, at
-their highest.
+The server is `khala openenv` in a process of its own, and each client has a session. `sessions` are whole
+ones a second: a client connects, begins an episode of 2s3z with a seed, plays some steps without orders,
+disconnects, and begins again. The start of a game is in it, and most of it. `steps` are those a second of all
+clients together while their games run on from episode to episode. Memory is PSS, in which pages that
+processes share count once: of the server, and of a game, at their highest.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ def main() -> None:
         print(json.dumps(found))
         return
     print(
-        f"{'clients':>8} {'sessions/s':>11} {'steps/s':>8} {'reset p50':>10} {'step p50':>9} {'server':>8} {'a game':>8}"
+        f"{'clients':>8} {'sessions/s':>11} {'steps/s':>8} {'reset p50':>10} {'step p50':>9}"
+        f" {'server':>8} {'a game':>8}"
     )
     for row in found["rows"]:
         print(
@@ -86,7 +87,7 @@ async def measured(address: str, count: int, steps: int, seconds: float, server:
     await asyncio.gather(*(client(address, number, steps, end_s, counts) for number in range(count)))
     took_s = time.monotonic() - began_s
     watching.cancel()
-    server_mb, game_mb = (await asyncio.gather(watching, return_exceptions=True))[0]
+    server_mb, game_mb = await watching  # which returns when it is cancelled
     return {
         "sessions_per_s": counts.sessions / took_s,
         "steps_per_s": await steady(address, count, seconds),
