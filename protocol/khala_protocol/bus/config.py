@@ -26,6 +26,8 @@ BATCH_BYTES = 65_535
 WAIT_BEFORE_DROP_S = 0.02
 """How long a put of one batch waits for a slot before it is dropped. With Zenoh's 1 ms, bursts of 128 samples of 20 kB
 were dropped on a busy machine, and came 0.3 s later; a batch takes 5 ms on a link of 100 Mbit."""
+WAIT_BEFORE_CLOSE_S = 0.5
+"""How long a put that must not be dropped waits for a slot before its link is closed."""
 UNIX_PATH_BYTES = 107
 _ENDPOINT = re.compile(r"(?P<transport>[a-z-]+)/(?P<address>[^?#]+)(?P<rest>[?#].*)?")
 _HOST_PORT = re.compile(
@@ -149,7 +151,7 @@ def settings(config: BusConfig) -> dict[str, Any]:
         "transport/shared_memory/enabled": config.shared_memory,
         # Default is 5 s, after which the link is closed. SPEECH promises to wait half a second at most.
         f"{queue}/congestion_control/drop/wait_before_drop": round(WAIT_BEFORE_DROP_S * 1e6),
-        f"{queue}/congestion_control/block/wait_before_close": 500_000,
+        f"{queue}/congestion_control/block/wait_before_close": round(WAIT_BEFORE_CLOSE_S * 1e6),
         "transport/link/tx/batch_size": BATCH_BYTES,
         # Only a session that picked a free port has to be asked for it.
         "adminspace/enabled": any(endpoint.endswith(":0") for endpoint in config.listen_on),

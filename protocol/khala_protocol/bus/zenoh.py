@@ -34,7 +34,7 @@ from zenoh.handlers import Callback
 
 from khala_protocol.bus import Delivery, Liveness, Sample
 from khala_protocol.bus.audience import Audience
-from khala_protocol.bus.config import BusConfig, check, settings
+from khala_protocol.bus.config import WAIT_BEFORE_CLOSE_S, BusConfig, check, settings
 from khala_protocol.bus.diagnosis import plain, why_not_connected, why_not_listening
 from khala_protocol.bus.inbox import Doorbell, Inbox
 from khala_protocol.bus.keyexpr import check_key, check_key_expr
@@ -161,15 +161,14 @@ class ZenohBus:
         """See `khala_protocol.bus.Bus.publisher`."""
         self._check_open()
         check_key(key)
+        self._question = self._question or key
         if delivery is Delivery.STATE:
             state = _declare_state_publisher(self._session, key)
             self._held.add(state)
             return _Publisher(key, self._held, self._bulk_lane(), state.put, (state,))
-        if delivery is Delivery.SPEECH:
-            self._question = self._question or key
         qos, lane = (_SPEECH, self._speech) if delivery is Delivery.SPEECH else (_LOG, self._bulk_lane())
         publisher = self._session.declare_publisher(key, **qos)
-        audience = Audience()
+        audience = Audience(partial(self._settle, key, timeout_s=WAIT_BEFORE_CLOSE_S), once=delivery is Delivery.LOG)
         listener = Callback(partial(self._hand_over, partial(_see_audience, audience)), indirect=False)
         declared = (publisher, publisher.declare_matching_listener(listener))
         self._held.add(*declared)
@@ -243,7 +242,20 @@ class ZenohBus:
     def _shut(self) -> None:
         for thread in self._threads:
             thread.shutdown()
+        if self._is_client and self._question:
+            self._settle_puts()
         self._session.close()  # type: ignore[no-untyped-call]  # Zenoh's stub lacks the `-> None`
+
+    def _settle_puts(self) -> None:
+        """Return when all puts have arrived at the router: closing a session drops what its link has not taken yet."""
+        last = self._session.get(
+            self._question,
+            priority=_LOG["priority"],
+            congestion_control=CongestionControl.BLOCK,
+            timeout=ANSWER_TIMEOUT_S,
+        )
+        for _ in last:  # nobody answers; it ends when the question was everywhere
+            pass
 
     def _check_open(self) -> None:
         if self._held.closed:
@@ -257,11 +269,14 @@ class ZenohBus:
         self._sightings.discard(sightings)
         self._forget(mailbox, watcher)
 
-    async def _settle(self, key_expr: str) -> None:
-        """Wait until the router knows what was declared: a question without a listener follows it, and comes back."""
+    async def _settle(self, key_expr: str, timeout_s: float = ANSWER_TIMEOUT_S) -> None:
+        """Wait until the router knows what was declared here, and we what it had to tell.
+
+        A question without a listener follows the one, and its end the other.
+        """
         back = self._loop.create_future()
         done = partial(self._hand_over, _resolve, back)
-        self._session.get(key_expr, Callback(_ignore, done, indirect=False), timeout=ANSWER_TIMEOUT_S)
+        self._session.get(key_expr, Callback(_ignore, done, indirect=False), timeout=timeout_s)
         await back
 
     def _ask(self, answer: Callable[[bool], None]) -> None:
@@ -341,11 +356,11 @@ class _Publisher:
         return self._key
 
     async def put(self, payload: bytes) -> None:
-        if self._audience is not None:
-            await self._audience.wait()
-        if self._closed or self._held.closed:
-            raise BusClosed(f"the publisher of {self._key!r} is closed")
+        self._check_open()
         try:
+            if self._audience is not None:
+                await self._audience.wait()
+                self._check_open()
             await self._lane.put(self._put, payload)
         except zenoh.ZError as error:
             if self._held.closed:
@@ -359,6 +374,10 @@ class _Publisher:
             declared, self._declared = self._declared, ()
             del self._put
             self._held.take_back(*declared)
+
+    def _check_open(self) -> None:
+        if self._closed or self._held.closed:
+            raise BusClosed(f"the publisher of {self._key!r} is closed")
 
 
 class _Token:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
@@ -234,28 +233,45 @@ async def test_an_error_of_a_put_is_raised_where_it_was_given() -> None:
 # --- audience ---------------------------------------------------------------------------------------
 
 
-async def test_a_first_word_waits_for_somebody_to_listen() -> None:
-    audience = Audience()
+class Router:
+    """Answers when told to, and counts the questions."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.answer = asyncio.Event()
+
+    async def ask(self) -> None:
+        self.asked += 1
+        await self.answer.wait()
+
+
+async def test_a_first_word_waits_until_the_router_has_told_who_listens() -> None:
+    router = Router()
+    audience = Audience(router.ask, once=True)
     waiting = asyncio.ensure_future(audience.wait())
     await asyncio.wait([waiting], timeout=0)
     assert not waiting.done()
     audience.see(present=True)
+    router.answer.set()
     await waiting
-
-
-async def test_if_nobody_comes_the_wait_is_short_and_not_repeated() -> None:
-    audience = Audience()
-    began = time.perf_counter()
     await audience.wait()
-    assert 0.01 < time.perf_counter() - began < 5
-    async with asyncio.timeout(0):
+    assert router.asked == 1
+
+
+@pytest.mark.parametrize(("once", "questions"), [(True, 1), (False, 3)])
+async def test_if_nobody_listens_each_word_asks_or_only_the_first(once: bool, questions: int) -> None:
+    router = Router()
+    router.answer.set()
+    audience = Audience(router.ask, once=once)
+    for _ in range(3):
         await audience.wait()
+    assert router.asked == questions
     audience.see(present=True)
-    audience.see(present=False)
-    waiting = asyncio.ensure_future(audience.wait())
-    await asyncio.wait([waiting], timeout=0)
-    assert not waiting.done()  # they left, and may come back
-    await waiting
+    await audience.wait()
+    assert router.asked == questions
+    audience.see(present=False)  # they left, and may come back
+    await audience.wait()
+    assert router.asked == questions + 1
 
 
 # --- sightings --------------------------------------------------------------------------------------

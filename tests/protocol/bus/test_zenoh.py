@@ -114,6 +114,23 @@ async def test_speech_to_a_stopped_router_holds_neither_the_loop_nor_the_end(
         await agent.close()
 
 
+async def test_speech_that_waits_for_its_link_arrives_although_the_sender_closes(
+    opened: OpenBus, start: StartPeer, socket: str
+) -> None:
+    router = await start("router", socket)
+    agent, listener = await opened(BusConfig(connect=(socket,))), await opened(BusConfig(connect=(socket,)))
+    replies = await listener.subscribe("reply", Delivery.SPEECH)
+    publisher = await agent.publisher("reply", Delivery.SPEECH)
+    sent = [bytes([number]) * 20_000 for number in range(30)]  # more than fits into the kernel's buffers
+    await publisher.put(b"first")
+    os.kill(router.pid, signal.SIGSTOP)
+    asyncio.get_running_loop().call_later(0.3, os.kill, router.pid, signal.SIGCONT)
+    for payload in sent:
+        await publisher.put(payload)
+    await agent.close()
+    assert [sample.payload for sample in await take(replies, 31)] == [b"first", *sent]
+
+
 async def test_publishers_close_at_once_while_clients_leave(opened: OpenBus, socket: str) -> None:
     host = await opened(BusConfig(mode="router", listen=(socket,)))
     for _ in range(4):
