@@ -40,6 +40,7 @@ FOREIGN = {
     "my_model.yaml": "a reader writes it",
     "my_sections.py": "a reader writes it",
     "my_agent.py": "a reader writes it",
+    "my_rewards.py": "a reader writes it",
     "run.py": "a reader writes it, or has it of a bot",
     "my_bot/run.py": "a reader has it",
     "tests/golden.mcap": "a reader records it",
