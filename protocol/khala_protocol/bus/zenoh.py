@@ -189,12 +189,7 @@ class ZenohBus:
             declared = (self._session.declare_subscriber(key_expr, take),)
         self._mailboxes.add(mailbox)
         self._held.add(*declared)
-        try:
-            await self._settle(key_expr)
-            self._check_open()
-        except BaseException:  # also if cancelled: nothing else could close it
-            await mailbox.close()
-            raise
+        await self._settled(key_expr, mailbox)
         return mailbox
 
     async def announce(self, key: str) -> Token:
@@ -217,6 +212,8 @@ class ZenohBus:
         self._mailboxes.add(mailbox)
         self._sightings.add(sightings)
         self._held.add(watcher)
+        # A token that ends while its session tells of it was often reported after its end, and for good.
+        await self._settled(key_expr, mailbox, self._session.liveliness().get)
         return mailbox
 
     async def close(self) -> None:
@@ -269,14 +266,26 @@ class ZenohBus:
         self._sightings.discard(sightings)
         self._forget(mailbox, watcher)
 
-    async def _settle(self, key_expr: str, timeout_s: float = ANSWER_TIMEOUT_S) -> None:
+    async def _settled(self, key_expr: str, mailbox: Inbox[Any], get: Callable[..., Any] | None = None) -> None:
+        """Settle what fills a mailbox, or close it."""
+        try:
+            await self._settle(key_expr, get=get)
+            self._check_open()
+        except BaseException:  # also if cancelled: nothing else could close it
+            await mailbox.close()
+            raise
+
+    async def _settle(
+        self, key_expr: str, timeout_s: float = ANSWER_TIMEOUT_S, *, get: Callable[..., Any] | None = None
+    ) -> None:
         """Wait until the router knows what was declared here, and we what it had to tell.
 
         A question without a listener follows the one, and its end the other.
         """
         back = self._loop.create_future()
         done = partial(self._hand_over, _resolve, back)
-        self._session.get(key_expr, Callback(_ignore, done, indirect=False), timeout=timeout_s)
+        get = get or self._session.get
+        get(key_expr, Callback(_ignore, done, indirect=False), timeout=timeout_s)
         await back
 
     def _ask(self, answer: Callable[[bool], None]) -> None:
