@@ -1,19 +1,19 @@
 """A game in which units are made, ordered, watched and removed again, one probe after another.
 
 The computer player is there because the game wants two; it loses its workers, and its units are ordered by us. Above:
-the probes. Below: `connection` and `ground`.
+the probes. Below: `setting`, `connection` and `ground`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from s2clientprotocol import common_pb2, debug_pb2, query_pb2
+from s2clientprotocol import debug_pb2, query_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_bridge.calibrate.ground import Ground, Point, grid
+from khala_bridge.calibrate.setting import Setting, new_game
 from khala_bridge.errors import GameError
 from khala_bridge.knowledge.facts import VERSION, unit_facts
 from khala_bridge.knowledge.load import is_structure, is_worker
@@ -54,18 +54,6 @@ class Put(NamedTuple):
     owner: int = ME
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """The kind of game that a probe needs; probes of one setting share a game."""
-
-    map: str = "Melee/Flat128.SC2Map"
-    fog: bool = False
-    race: str = "Terran"
-    level: int = 1
-    peaceful: bool = True
-    """Whether the workers of both players are removed."""
-
-
 class Lab:
     """One game, seen by its first player."""
 
@@ -88,7 +76,7 @@ class Lab:
         """Begin another game in the same process; errors as above."""
         self.setting = setting
         self._cheats: set[int] = set()
-        self._new_game(setting, seed)
+        new_game(self._connection, setting, seed)
         known = self._connection.send(data=sc.RequestData(unit_type_id=True))
         kinds = {kind.unit_id: kind for kind in known.units if kind.name}
         self.types: dict[str, Any] = {
@@ -113,32 +101,6 @@ class Lab:
             self.victim = NEUTRAL if self._makes(NEUTRAL) else ME
             """Owner of targets that do nothing: nobody, if the game makes such units."""
             self.clear()
-
-    def _new_game(self, setting: Setting, seed: int) -> None:
-        race = common_pb2.Race.Value(setting.race)
-        players = [
-            sc.PlayerSetup(type=sc.Participant),
-            sc.PlayerSetup(
-                type=sc.Computer,
-                race=race,
-                difficulty=setting.level,  # type: ignore[arg-type]  # stubs want the enum's own type
-            ),
-        ]
-        wanted = sc.RequestCreateGame(
-            local_map=sc.LocalMap(map_path=setting.map),
-            player_setup=players,
-            disable_fog=not setting.fog,
-            random_seed=seed,
-        )
-        made = self._connection.send(create_game=wanted)
-        if made.HasField("error"):
-            name = sc.ResponseCreateGame.Error.Name(made.error)
-            raise GameError(f"the game refuses the map {setting.map}: {name} {made.error_details}".rstrip())
-        options = sc.InterfaceOptions(raw=True, score=True, show_cloaked=True, show_burrowed_shadows=True)
-        joined = self._connection.send(join_game=sc.RequestJoinGame(race=race, options=options))
-        if joined.HasField("error"):
-            name = sc.ResponseJoinGame.Error.Name(joined.error)
-            raise GameError(f"the game refuses to be joined: {name} {joined.error_details}".rstrip())
 
     # time -------------------------------------------------------------------------------------------------------------
 

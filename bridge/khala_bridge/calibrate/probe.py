@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from khala_bridge.calibrate.lab import Setting
+from khala_bridge.calibrate.setting import Setting
 
 if TYPE_CHECKING:
     from khala_bridge.calibrate.lab import Lab

@@ -1,10 +1,11 @@
-"""Commands: which ability a requested id means to each unit, the orders that follow, and their outcome.
+"""Commands: which ability a requested id means to each unit, and whether the units can do it.
 
 Clients name an ability by its general or by its specific id. A general id stands for the specific one of each unit:
 Attack (3674) is an attack (23) to a Stalker and a scan-move (19) to an Observer. The report on a command has the
 specific id.
 
-Above: `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves and fights), `casting.py` (the rest).
+Above: `giving.py`, `actions.py`, `query.py`, `observation.py`. Below: `commands.py` (moves and fights), `casting.py`
+(the rest).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from khala_simulator.world.casts import Cast
 from khala_simulator.world.world import NO_TAG, NOBODY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from khala_simulator.tables.catalog import Ability, Catalog
     from khala_simulator.world.world import World
@@ -71,15 +72,6 @@ class OrderPlan:
     target: int = NO_TAG
     point: Point | None = None
     parts: tuple[tuple[Ability, tuple[Cast, ...]], ...] = ()
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Outcome:
-    """The outcome of a command: its result, the specific ability, and the units that took it."""
-
-    result: Result
-    ability: int = 0
-    slots: tuple[int, ...] = ()
 
 
 def result_of(why: ActionResult) -> Result:
@@ -187,23 +179,6 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
     return OrderPlan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
 
 
-def carry_out(world: World, plan: OrderPlan) -> Outcome:
-    """Give a command to the units that can take it, as judged in the present world."""
-    if plan.result != error_pb2.Success:
-        return Outcome(plan.result)
-    taken: list[int] = []
-    for ability, casts in plan.parts:
-        if ability.effect not in GIVE and taken:  # what an earlier part has cost may be missing now
-            slots = [cast.slot for cast in casts]
-            queue = plan.asked.queue
-            taken += casting.use(world, slots, ability, target=plan.target, point=plan.point, queue=queue)
-        else:
-            taken += _give(world, ability, casts, plan)
-    if not taken:
-        return Outcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if plan.asked.queue else ActionResult.ERROR))
-    return Outcome(error_pb2.Success, plan.ability, tuple(taken))
-
-
 def _refused(command: UnitCommand, why: ActionResult) -> OrderPlan:
     return OrderPlan(command, result_of(why))
 
@@ -281,60 +256,3 @@ def _cant_attack(world: World, slot: int, target: int) -> ActionResult:
         return ActionResult.SUCCESS
     flies = world.unit_type(target).flying
     return ActionResult.CANT_TARGET_AIR_UNITS if flies else ActionResult.CANT_TARGET_THAT_UNIT
-
-
-# giving ---------------------------------------------------------------------------------------------------------------
-
-
-def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: OrderPlan) -> list[int]:
-    give = GIVE.get(ability.effect)
-    if give is None:
-        return casting.order(world, casts, ability, queue=plan.asked.queue)
-    return give(world, [cast.slot for cast in casts], plan)
-
-
-def _move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    if plan.point is not None:
-        return commands.move(world, slots, plan.point, queue=plan.asked.queue)
-    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
-
-
-def _patrol(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    x, y = plan.point or world.pos[world.slot_of(plan.target)].tolist()
-    return commands.patrol(world, slots, (x, y), queue=plan.asked.queue)
-
-
-def _attack(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    if plan.point is not None:
-        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
-    return commands.attack_unit(world, slots, plan.target, queue=plan.asked.queue)
-
-
-def _scan_move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    if plan.point is not None:
-        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
-    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
-
-
-def _stop(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    return commands.stop(world, slots, queue=plan.asked.queue)
-
-
-def _hold(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    return commands.hold(world, slots, queue=plan.asked.queue)
-
-
-def _smart(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
-    return casting.smart(world, slots, point=plan.point, target=plan.target, queue=plan.asked.queue)
-
-
-GIVE: dict[str, Callable[[World, list[int], OrderPlan], list[int]]] = {
-    "smart": _smart,
-    "stop": _stop,
-    "move": _move,
-    "patrol": _patrol,
-    "hold_position": _hold,
-    "attack": _attack,
-    "scan_move": _scan_move,
-}
-"""Commands that are no skills; all others go through ``casting.order``."""

@@ -5,7 +5,7 @@ advances: as it was judged, or judged again if something else has taken effect s
 it in every form that the client's interface has: a raw command also as the equivalent click, a click also as the
 equivalent raw command. Nothing in an action is a usage error.
 
-Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` (commands).
+Above: `game.py`. Below: `clicks.py` (selection and panels), `abilities.py` and `giving.py` (commands).
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import casting
 from khala_simulator.api import abilities, clicks, pixels
-from khala_simulator.api.abilities import OrderPlan, Outcome, UnitCommand
+from khala_simulator.api.abilities import OrderPlan, UnitCommand
+from khala_simulator.api.giving import Outcome, carry_out
 from khala_simulator.api.selection import at_point, panel_order
 from khala_simulator.tables.abilities import Aim
 
@@ -164,7 +165,7 @@ def _takes_units(seat: PlayerSeat, requested: int) -> bool:
 
 
 def _give(seat: PlayerSeat, plan: OrderPlan, loop: int, *, by_tags: bool) -> None:
-    command, outcome = plan.asked, abilities.carry_out(seat.world, plan)
+    command, outcome = plan.asked, carry_out(seat.world, plan)
     if outcome.result != error_pb2.Success:
         tag = command.tags[0] if command.tags else 0
         seat.hands.errors.append(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from khala_simulator.api import abilities
+from khala_simulator.api import abilities, giving
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.movement.placement import free_places
@@ -53,7 +53,7 @@ def _give(world: World, player: int, slot: int, ability: int, chance: random.Ran
         point = (x + chance.uniform(-9, 9), y + chance.uniform(-9, 9))
     queue = chance.random() < 0.2
     command = abilities.UnitCommand(ability, (world.tag_of(slot),), target, point, queue)
-    abilities.carry_out(world, abilities.judge(world, player, command))
+    giving.carry_out(world, abilities.judge(world, player, command))
 
 
 def check(world: World) -> None:

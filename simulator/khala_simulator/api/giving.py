@@ -1,0 +1,103 @@
+"""Give a command that was judged to the units that can take it.
+
+Above: `actions.py`. Below: `abilities.py` (which judges), `commands.py` (moves and fights), `casting.py` (the rest).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from s2clientprotocol import error_pb2
+
+from khala_simulator.abilities import casting, commands
+from khala_simulator.api.abilities import result_of
+from khala_simulator.tables.action_result import ActionResult
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from khala_simulator.api.abilities import OrderPlan, Result
+    from khala_simulator.tables.catalog import Ability
+    from khala_simulator.world.casts import Cast
+    from khala_simulator.world.world import World
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Outcome:
+    """The outcome of a command: its result, the specific ability, and the units that took it."""
+
+    result: Result
+    ability: int = 0
+    slots: tuple[int, ...] = ()
+
+
+def carry_out(world: World, plan: OrderPlan) -> Outcome:
+    """Give a command to the units that can take it, as judged in the present world."""
+    if plan.result != error_pb2.Success:
+        return Outcome(plan.result)
+    taken: list[int] = []
+    for ability, casts in plan.parts:
+        if ability.effect not in GIVE and taken:  # what an earlier part has cost may be missing now
+            slots = [cast.slot for cast in casts]
+            queue = plan.asked.queue
+            taken += casting.use(world, slots, ability, target=plan.target, point=plan.point, queue=queue)
+        else:
+            taken += _give(world, ability, casts, plan)
+    if not taken:
+        return Outcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if plan.asked.queue else ActionResult.ERROR))
+    return Outcome(error_pb2.Success, plan.ability, tuple(taken))
+
+
+def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: OrderPlan) -> list[int]:
+    give = GIVE.get(ability.effect)
+    if give is None:
+        return casting.order(world, casts, ability, queue=plan.asked.queue)
+    return give(world, [cast.slot for cast in casts], plan)
+
+
+def _move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    if plan.point is not None:
+        return commands.move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _patrol(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    x, y = plan.point or world.pos[world.slot_of(plan.target)].tolist()
+    return commands.patrol(world, slots, (x, y), queue=plan.asked.queue)
+
+
+def _attack(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    if plan.point is not None:
+        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.attack_unit(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _scan_move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    if plan.point is not None:
+        return commands.attack_move(world, slots, plan.point, queue=plan.asked.queue)
+    return commands.follow(world, slots, plan.target, queue=plan.asked.queue)
+
+
+def _stop(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    return commands.stop(world, slots, queue=plan.asked.queue)
+
+
+def _hold(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    return commands.hold(world, slots, queue=plan.asked.queue)
+
+
+def _smart(world: World, slots: list[int], plan: OrderPlan) -> list[int]:
+    return casting.smart(world, slots, point=plan.point, target=plan.target, queue=plan.asked.queue)
+
+
+GIVE: dict[str, Callable[[World, list[int], OrderPlan], list[int]]] = {
+    "smart": _smart,
+    "stop": _stop,
+    "move": _move,
+    "patrol": _patrol,
+    "hold_position": _hold,
+    "attack": _attack,
+    "scan_move": _scan_move,
+}
+"""Commands that are no skills; all others go through ``casting.order``."""
