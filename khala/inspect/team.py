@@ -107,7 +107,7 @@ class _Player:
         for picture in seen.pictures:
             await store.put(picture)
         context = Context(seen.briefing, seen.observation, store, calls.append)
-        async with span(f"{seat.agent}, step {seen.observation.step}"):
+        async with span(seat.agent, type="agent"):
             text = await self._policy.decide(context)
             await self._policy.reflect(context)
         self._show(seat, seen, text, await store.get(seen.observation.images, 0))
