@@ -4,6 +4,7 @@ import errno
 import re
 import stat
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,19 @@ def test_installing_twice_repairs_and_keeps_what_a_user_added(tmp_path: Path) ->
     assert shipped.exists()
     assert own.read_bytes() == b"MPQ\x1b mine"
     assert is_installed(root)
+
+
+def test_matches_that_start_at_once_install_at_once(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as threads:
+        assert set(threads.map(install, [tmp_path] * 40)) == {tmp_path}
+    assert not list(tmp_path.rglob("*.new"))
+
+
+def test_what_is_there_already_is_not_written_again(tmp_path: Path) -> None:
+    files = [path for path in install(tmp_path).rglob("*") if path.is_file()]
+    numbers = [path.stat().st_ino for path in files]
+    install(tmp_path)
+    assert [path.stat().st_ino for path in files] == numbers
 
 
 def test_a_map_file_that_a_user_replaced_is_kept(tmp_path: Path) -> None:

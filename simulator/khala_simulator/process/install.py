@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shlex
 import shutil
 import sys
@@ -130,10 +131,20 @@ def _write_launcher(path: Path) -> None:
     code = f"import sys; sys.path.append({str(package_root)!r}); from khala_simulator.__main__ import main; main()"
     command = f'exec {shlex.quote(sys.executable)} -I -c {shlex.quote(code)} -executable "$0" "$@"'
     path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_suffix(".new")
-    fresh.write_text(f"#!/bin/sh\n{_MARK}\n{malloc}\n{command}\n")
-    fresh.chmod(0o755)
-    fresh.replace(path)  # in one step: a client may be starting the game right now
+    _put(path, f"#!/bin/sh\n{_MARK}\n{malloc}\n{command}\n".encode(), mode=0o755)
+
+
+def _put(path: Path, data: bytes, *, mode: int = 0o644) -> None:
+    """Write a file, unless it is there already; in one step, as others may be installing, or starting the game."""
+    if path.exists() and path.read_bytes() == data and path.stat().st_mode & 0o777 == mode:
+        return
+    fresh = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
+    try:
+        fresh.write_bytes(data)
+        fresh.chmod(mode)
+        fresh.replace(path)
+    finally:
+        fresh.unlink(missing_ok=True)
 
 
 def _write_maps(maps: Path) -> None:
@@ -144,9 +155,7 @@ def _write_maps(maps: Path) -> None:
     for relative, data in placeholders():
         path = maps / relative
         if not path.exists() or not path.stat().st_size or is_placeholder(path.read_bytes()):
-            fresh = path.with_suffix(".new")
-            fresh.write_bytes(data)
-            fresh.replace(path)  # in one step: an interrupted write would leave an empty map for good
+            _put(path, data)
 
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:
