@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import gc
 import json
 import statistics
 import subprocess
@@ -124,6 +125,8 @@ class Bench:
             for agent in self.task.agents:
                 await announcer.brief(briefing(self.task, agent, self.run, 0))
             await roster.assemble(self.seats, 120)
+            gc.collect()
+            gc.freeze()  # as a host does when a match begins
             for number in range(steps + 1):
                 await self._step(turn, number, measured if number else Measured(0))
             await log.close()
