@@ -136,7 +136,6 @@ def _match(text: str, game: str, url: str | None, actor: Any) -> tuple[str, byte
         here = Path(directory) / job.config.record.name
         config = job.config.model_copy(update={"record": here})
         done = asyncio.run(worker.played(job.model_copy(update={"config": config}), game, gates_at(actor)))
-        worker.tidy()
         recording = here.read_bytes() if here.exists() else None
     if url is None or recording is None:
         return done.model_dump_json(), recording

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import gc
 import logging
 import sys
 from typing import TYPE_CHECKING
@@ -49,13 +48,6 @@ async def _work(game: str) -> None:
         done = await played(Job.model_validate_json(line), game)
         sys.stdout.write(done.model_dump_json() + "\n")
         sys.stdout.flush()
-        tidy()
-
-
-def tidy() -> None:
-    """Free what a match leaves behind."""
-    gc.unfreeze()  # the host freezes what it finds; a process of many matches would keep all of them
-    gc.collect()
 
 
 async def played(job: Job, game: str, gates: Gates = own_turns) -> Done:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+import weakref
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -36,6 +38,13 @@ CLOCK = "jumps"
 RUN = "test"
 STOP = "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xb)>"
 """The units do not move, but this is an order that the game gets."""
+
+
+class Left:
+    """A circle, as a match leaves many."""
+
+    def __init__(self) -> None:
+        self.own = self
 
 
 def now_s() -> float:
@@ -85,6 +94,17 @@ async def test_who_watches_sees_the_card_every_report_and_every_result(hall: Hal
     assert [(report.episode, report.step) for report in hall.reports] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     assert [message for message in hall.watched if isinstance(message, Result)] == results
     assert hall.game.calls == ["reset", "act", "act", "reset", "act", "act"]
+
+
+async def test_a_process_of_many_matches_keeps_none_of_them(hall: Hall, config: MakeConfig) -> None:
+    await hall.play(config(max_steps=1))
+    first = Left()
+    gone = weakref.finalize(first, lambda: None)
+    del first
+    frozen = gc.get_freeze_count()
+    await hall.play(config(max_steps=1))
+    assert not gone.alive
+    assert 0 < gc.get_freeze_count() <= frozen
 
 
 async def test_nobody_need_watch(hall: Hall, config: MakeConfig, peer: MakePeer) -> None:
