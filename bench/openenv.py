@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import statistics
 import subprocess
 import sys
 import time
@@ -28,7 +29,7 @@ from openenv.core.generic_client import GenericEnvClient
 from bench.figures import Figure
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
 CLIENTS = (1, 8, 32)
 LOOK_S = 0.25
@@ -91,8 +92,8 @@ async def measured(address: str, count: int, steps: int, seconds: float, server:
     return {
         "sessions_per_s": counts.sessions / took_s,
         "steps_per_s": await steady(address, count, seconds),
-        "reset_p50_s": median(counts.reset_s),
-        "step_p50_s": median(counts.step_s),
+        "reset_p50_s": statistics.median(counts.reset_s),
+        "step_p50_s": statistics.median(counts.step_s),
         "server_mb": server_mb,
         "game_mb": game_mb,
     }
@@ -155,10 +156,6 @@ def pss_mb(process: psutil.Process) -> float:
         return float(process.memory_full_info().pss) / 1e6
     except psutil.Error:  # it has ended
         return 0.0
-
-
-def median(values: Sequence[float]) -> float:
-    return sorted(values)[len(values) // 2]
 
 
 def measures(found: dict[str, Any]) -> Iterator[Figure]:

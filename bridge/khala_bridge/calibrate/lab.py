@@ -58,16 +58,7 @@ class Lab:
     """One game, seen by its first player."""
 
     def __init__(self, connection: Connection, setting: Setting, *, seed: int) -> None:
-        """Begin a game.
-
-        Args:
-            connection: to a game that plays nothing, or something that may end.
-            setting: of the game.
-            seed: of its chance.
-
-        Raises:
-            GameError: the game refuses the map or the join.
-        """
+        """Begin a game; arguments and errors are those of `new_game`."""
         self._connection = connection
         self.seed = seed
         self.begin(setting, seed)

@@ -168,7 +168,9 @@ class ZenohBus:
             return _Publisher(key, self._held, self._bulk_lane(), state.put, (state,))
         qos, lane = (_SPEECH, self._speech) if delivery is Delivery.SPEECH else (_LOG, self._bulk_lane())
         publisher = self._session.declare_publisher(key, **qos)
-        audience = Audience(partial(self._settle, key, timeout_s=WAIT_BEFORE_CLOSE_S), once=delivery is Delivery.LOG)
+        audience = Audience(
+            partial(self._settle, self._session.get, key, WAIT_BEFORE_CLOSE_S), once=delivery is Delivery.LOG
+        )
         listener = Callback(partial(self._hand_over, partial(_see_audience, audience)), indirect=False)
         declared = (publisher, publisher.declare_matching_listener(listener))
         self._held.add(*declared)
@@ -189,7 +191,7 @@ class ZenohBus:
             declared = (self._session.declare_subscriber(key_expr, take),)
         self._mailboxes.add(mailbox)
         self._held.add(*declared)
-        await self._settled(key_expr, mailbox)
+        await self._settled(self._session.get, key_expr, mailbox)
         return mailbox
 
     async def announce(self, key: str) -> Token:
@@ -213,7 +215,7 @@ class ZenohBus:
         self._sightings.add(sightings)
         self._held.add(watcher)
         # A token that ends while its session tells of it was often reported after its end, and for good.
-        await self._settled(key_expr, mailbox, self._session.liveliness().get)
+        await self._settled(self._session.liveliness().get, key_expr, mailbox)
         return mailbox
 
     async def close(self) -> None:
@@ -266,25 +268,22 @@ class ZenohBus:
         self._sightings.discard(sightings)
         self._forget(mailbox, watcher)
 
-    async def _settled(self, key_expr: str, mailbox: Inbox[Any], get: Callable[..., Any] | None = None) -> None:
+    async def _settled(self, get: Callable[..., Any], key_expr: str, mailbox: Inbox[Any]) -> None:
         """Settle what fills a mailbox, or close it."""
         try:
-            await self._settle(key_expr, get=get)
+            await self._settle(get, key_expr)
             self._check_open()
         except BaseException:  # also if cancelled: nothing else could close it
             await mailbox.close()
             raise
 
-    async def _settle(
-        self, key_expr: str, timeout_s: float = ANSWER_TIMEOUT_S, *, get: Callable[..., Any] | None = None
-    ) -> None:
+    async def _settle(self, get: Callable[..., Any], key_expr: str, timeout_s: float = ANSWER_TIMEOUT_S) -> None:
         """Wait until the router knows what was declared here, and we what it had to tell.
 
         A question without a listener follows the one, and its end the other.
         """
         back = self._loop.create_future()
         done = partial(self._hand_over, _resolve, back)
-        get = get or self._session.get
         get(key_expr, Callback(_ignore, done, indirect=False), timeout=timeout_s)
         await back
 
