@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import gc
 import json
 import statistics
 import subprocess
@@ -29,6 +28,7 @@ from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.transport import AiohttpTransport
+from khala_protocol.garbage import tidy_memory
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
@@ -100,8 +100,7 @@ def main() -> None:
         assert server.stdout is not None
         try:
             base_url = json.loads(server.stdout.readline())["base_url"]
-            gc.collect()
-            gc.freeze()
+            tidy_memory()
             rows = [row for count in options.calls for row in asyncio.run(compare(base_url, count, options.rounds))]
         finally:
             server.terminate()

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import gc
 import json
 import statistics
 import time
@@ -33,6 +32,7 @@ from khala_bridge.observe import Observer
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 from khala_orchestrator.config import load_task
+from khala_protocol.garbage import tidy_memory
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def measure_full_game(places: int) -> dict[str, Any]:
     observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
     observe_ms = []
     observation = observer.observe(snapshots[1])
-    gc.freeze()  # as a host does when a match begins
+    tidy_memory()  # as a host does when a match begins
     for round_ in range(ROUNDS):
         began = time.perf_counter()
         observation = observer.observe(snapshots[round_ % 2])

@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import gc
 import json
 import statistics
 import subprocess
@@ -53,6 +52,7 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.certificates import certify_agent, files_of, make_authority
 from khala_protocol.codec import decode_as
+from khala_protocol.garbage import tidy_memory
 from khala_protocol.keys import Topic, every_agent
 from khala_protocol.keys import parse as parse_key
 from khala_protocol.messages import ModelCall, Observation, Run
@@ -126,8 +126,7 @@ class Bench:
             for agent in self.task.agents:
                 await announcer.brief(briefing(self.task, agent, self.run, 0))
             await roster.assemble(self.seats, 120)
-            gc.collect()
-            gc.freeze()  # as a host does when a match begins
+            tidy_memory()  # as a host does when a match begins
             for number in range(steps + 1):
                 await self._step(turn, number, measured if number else Measured(0))
             await log.close()

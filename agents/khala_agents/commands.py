@@ -7,7 +7,6 @@ servers take half a second to import, and `--help` need not wait for that.
 from __future__ import annotations
 
 import asyncio
-import gc
 import json
 import os
 from contextlib import AsyncExitStack
@@ -28,6 +27,7 @@ from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.common_names import agent_name
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import BusError, ConfigError
+from khala_protocol.garbage import tidy_memory
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, check_name
 from khala_protocol.signals import stop_on_signal
@@ -163,12 +163,6 @@ def _with_model(model: str, memory: str | None, fallback: str | None) -> WorkerS
         raise ConfigError(words_of(error.errors(include_url=False)[0]), source="--memory") from None
 
 
-def _settle_memory() -> None:
-    """Exclude imported objects from garbage collection: scanning them stops every agent for 40 ms."""
-    gc.collect()
-    gc.freeze()
-
-
 async def _play(
     links: Sequence[Link], run: str, side: str, policies: dict[str, Policy], stop: asyncio.Event
 ) -> dict[str, WorkerTally]:
@@ -178,7 +172,7 @@ async def _play(
         buses = [await _opened(link, stack) for link in links]
         of = {name: bus for bus, link in zip(buses, links, strict=True) for name in link.names}
         _say(f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {where}")
-        _settle_memory()
+        tidy_memory()
         async with asyncio.TaskGroup() as group:
             playing = [
                 group.create_task(run_workers(bus, run, side, {n: policies[n] for n in link.names}, stop=stop))
@@ -262,7 +256,7 @@ def _plain(tally: WorkerTally) -> dict[str, Any]:
 
 async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | None, *, as_json: bool) -> None:
     async with endpoint:
-        _settle_memory()
+        tidy_memory()
         ready = json.dumps({"base_url": endpoint.base_url, "pid": os.getpid(), "models": list(PLAYERS)})
         _say(f"scripted models {', '.join(PLAYERS)} at {endpoint.base_url}")
         if ready_file is not None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import gc
 from typing import TYPE_CHECKING, Self
 
 from khala_orchestrator.advisers import AdviceInbox
@@ -22,6 +21,7 @@ from khala_orchestrator.roster import Roster
 from khala_orchestrator.scenery import Scenery
 from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Turn
+from khala_protocol.garbage import tidy_memory
 from khala_protocol.recording import Recorder
 
 if TYPE_CHECKING:
@@ -90,23 +90,11 @@ async def host(
         match = Match(config, game, sides, turn, observer, pacing_of(config.task.clock), scenery, asks)
         for briefing in match.briefings(past.episode if past else 0):  # by which agents know that the host is there
             await announcer.brief(briefing)
-        _tidy_memory()
+        tidy_memory()
         await roster.assemble(required, config.assemble_s)
         if past is None:
             return [result async for result in match.play()]
         return [*past.results, *[result async for result in _resumed(match, past, observer)]]
-
-
-def _tidy_memory() -> None:
-    """Free what earlier matches left, and leave what was imported out of garbage collections.
-
-    To scan what was imported would stop a step for 40 ms. A match leaves megabytes of observations in circles of few
-    objects, which Python alone would collect too late, and never if they were left out as well: a process of many
-    matches grew by 7 MB with each.
-    """
-    gc.collect()
-    if not gc.get_freeze_count():
-        gc.freeze()
 
 
 def _recorder(config: MatchConfig, path: Path, past: Unfinished | None) -> OwnedSink:
