@@ -142,7 +142,7 @@ class ZenohBus:
             return self._config.connect_to
         if not any(endpoint.endswith(":0") for endpoint in self._config.listen_on):
             return self._config.listen_on
-        for reply in self._session.get(f"@/{self._session.zid()}/{self._config.mode}", timeout=ANSWER_TIMEOUT_S):
+        for reply in self._session.get(f"@/{self._session.zid()}/router", timeout=ANSWER_TIMEOUT_S):
             if reply.ok is not None:
                 return tuple(json.loads(reply.ok.payload.to_bytes())["locators"])
         raise BusError("the session did not tell where it listens")
@@ -206,7 +206,7 @@ class ZenohBus:
         self._check_open()
         check_key_expr(key_expr)
         mailbox: Inbox[Liveness] = Inbox(depth, on_close=lambda: self._stop_watching(mailbox, sightings, watcher))
-        # Only a client has one link, which is its own; a router or peer that loses one has lost the other side.
+        # Only a client has one link, which is its own; a router that loses one has lost the other side.
         patience_s = PATIENCE_S if self._is_client else 0.0
         sightings = Sightings(mailbox, patience_s=patience_s, link_up=bool(self._links) or not self._is_client)
         see = Callback(partial(self._hand_over, partial(_see, sightings)), indirect=False)
@@ -306,14 +306,14 @@ class ZenohBus:
             log.debug("the loop is closed; %s is not called", action)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
-        peer = str(event.transport.zid)
+        other = str(event.transport.zid)
         if event.kind == SampleKind.PUT:
-            self._links.add(peer)
+            self._links.add(other)
         else:
-            self._links.discard(peer)
+            self._links.discard(other)
         if not self._is_client or self._held.closed:
             return
-        log.info("the link to router %s is %s", peer, "up" if self._links else "down; trying to get it back")
+        log.info("the link to router %s is %s", other, "up" if self._links else "down; trying to get it back")
         for sightings in self._sightings:
             sightings.link(up=bool(self._links))
 

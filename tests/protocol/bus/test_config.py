@@ -60,20 +60,21 @@ LONG = "unixsock-stream//tmp/" + "x" * 103
         ({"connect": ["tcp/127.0.0.1:70000"]}, needs_port("tcp/127.0.0.1:70000")),
         ({"mode": "router", "listen": ["tcp/::1:7447"]}, needs_port("tcp/::1:7447")),
         ({"connect": [LONG]}, f"{LONG!r} has too long a path: a unix socket's has at most 107 bytes"),
+        ({"listen": ["tcp/127.0.0.1:7447"]}, "a client does not listen: remove `listen`, or use mode 'router'"),
         (
-            {"listen": ["tcp/127.0.0.1:7447"]},
-            "a client does not listen: remove `listen`, or use mode 'peer' or 'router'",
+            {"mode": "router", "connect": ["tcp/127.0.0.1:7447"]},
+            "a router does not connect: remove `connect`, and let clients connect to it",
         ),
         ({"mode": "router", "listen": ["tcp/0.0.0.0:7447"]}, open_to_all("tcp/0.0.0.0:7447")),
         ({"mode": "router", "listen": ["tcp/[::]:7447"]}, open_to_all("tcp/[::]:7447")),
-        ({"mode": "peer", "listen": ["tcp/10.1.2.3:0"]}, open_to_all("tcp/10.1.2.3:0")),
+        ({"mode": "router", "listen": ["tcp/10.1.2.3:0"]}, open_to_all("tcp/10.1.2.3:0")),
         ({"mode": "router", "listen": ["ws/router.example:80"]}, open_to_all("ws/router.example:80")),
         (
             {"connect": ["tls/router.example:7447"]},
             "tls/router.example:7447 needs TLS files: give `tls` with ca, certificate and key, or --tls DIR",
         ),
         ({"connect": ["tcp/10.0.0.5:7447"]}, in_the_open("10.0.0.5:7447")),
-        ({"mode": "router", "connect": ["tcp/router.example:1"]}, in_the_open("router.example:1")),
+        ({"connect": ["tcp/router.example:1"]}, in_the_open("router.example:1")),
     ],
 )
 def test_a_wrong_configuration_is_refused_with_what_to_do(config: dict[str, Any], text: str) -> None:
@@ -93,7 +94,6 @@ def test_a_wrong_configuration_is_refused_with_what_to_do(config: dict[str, Any]
         {"mode": "router", "listen": ["tcp/127.0.0.1:0", "tcp/[::1]:7447", "tcp/localhost:7447"]},
         {"mode": "router", "listen": ["unixsock-stream//run/bus.sock"]},
         {"mode": "router", "listen": ["tcp/0.0.0.0:7447"], "insecure": True},
-        {"mode": "peer"},
     ],
 )
 def test_a_right_configuration_is_accepted(config: dict[str, Any]) -> None:
@@ -160,7 +160,6 @@ def test_with_tls_no_endpoint_is_without_it(tls: TlsFiles, transport: str) -> No
 def test_a_client_and_a_router_without_endpoints_meet_on_this_machine(tls: TlsFiles) -> None:
     assert BusConfig().connect_to == BusConfig(mode="router").listen_on == ("tcp/127.0.0.1:7447",)
     assert BusConfig(tls=tls).connect_to == BusConfig(mode="router", tls=tls).listen_on == ("tls/127.0.0.1:7447",)
-    assert BusConfig(mode="peer").connect_to == BusConfig(mode="peer").listen_on == ()
 
 
 def test_nobody_is_looked_for_and_memory_is_not_shared_unless_asked() -> None:
@@ -183,7 +182,6 @@ def test_nobody_is_looked_for_and_memory_is_not_shared_unless_asked() -> None:
     [
         ({"lease_s": 10}, "transport/link/tx/lease", 10_000),
         ({"connect_timeout_s": 0.5}, "connect/timeout_ms", 500),
-        ({"mode": "router", "connect": ["tcp/127.0.0.1:1"]}, "connect/timeout_ms", -1),
         ({"send_buffer_bytes": 65536}, "transport/link/tcp/so_sndbuf", 65536),
         ({"mode": "router", "listen": ["tcp/127.0.0.1:0"]}, "adminspace/enabled", True),
         ({"zenoh": {"mode": "peer", "qos/network": []}}, "mode", "peer"),

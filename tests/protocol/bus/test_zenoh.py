@@ -200,19 +200,6 @@ async def test_a_client_waits_for_a_router_that_comes_up_later(opened: OpenBus, 
         assert (await client).routers == (router.identity,)
 
 
-async def test_peers_need_no_router(opened: OpenBus, socket: str) -> None:
-    one = await opened(BusConfig(mode="peer", listen=(socket,)))
-    two = await opened(BusConfig(mode="peer", connect=(socket,)))
-    subscription = await one.subscribe("a/*", Delivery.SPEECH)
-    watch = await one.watch("**")
-    await two.announce("a/alive")
-    assert await take(watch, 1) == [Liveness("a/alive", alive=True)]
-    await (await two.publisher("a/b", Delivery.SPEECH)).put(b"x")
-    assert await take(subscription, 1) == [Sample("a/b", b"x")]
-    await two.close()
-    assert await take(watch, 1) == [Liveness("a/alive", alive=False, link_up=True)]
-
-
 # --- the session ------------------------------------------------------------------------------------
 
 
