@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import inspect
 import re
+from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
 
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts, remarks
 from khala_protocol import keys, messages
-from khala_protocol.messages import MESSAGE_TYPES, Wire
+from khala_protocol.messages import MESSAGE_TYPES, Wire, to_agents, to_all
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 DESCRIBER = Describer()
-LITERALS = {"AgentStatus": "AgentReport.status", "RejectionReason": "Rejection.reason"}
-"""Literals of the module whose values have remarks, and the field that holds one."""
+LITERALS = {"AgentStatus": (to_all, "AgentReport.status"), "RejectionReason": (to_agents, "Rejection.reason")}
+"""Literals whose values have remarks, their module, and the field that holds one."""
 
 
 def page() -> str:
     """Return the page of keys, messages, their parts, and single words."""
     return join(
-        head("Messages", "`protocol/khala_protocol/messages.py` and `protocol/khala_protocol/keys.py`"),
+        head("Messages", "`protocol/khala_protocol/messages` and `protocol/khala_protocol/keys.py`"),
         "UTF-8 JSON, one object a message, with its `kind`. Unknown fields are errors, and so is another major "
         "version `v`. How they are delivered: [the bus](../design/bus.md).",
         "## Keys",
@@ -33,7 +37,7 @@ def page() -> str:
         "## Parts",
         *(_section(model, "###") for model in parts(MESSAGE_TYPES)),
         "## Words",
-        *(_words(name, field) for name, field in LITERALS.items()),
+        *(_words(module, name, field) for name, (module, field) in LITERALS.items()),
     )
 
 
@@ -58,10 +62,10 @@ def _first(model: type) -> str:
 
 
 def _frames() -> str:
-    """Return the module's text on frames and units, without its first sentence."""
-    return (inspect.getdoc(messages) or "").split("\n\n", 1)[1].partition("provider is imported here. ")[2]
+    """Return the package's text on frames and units."""
+    return (inspect.getdoc(messages) or "").partition("provider is imported here. ")[2]
 
 
-def _words(name: str, field: str) -> str:
-    rows = [(code(value), remark) for value, remark in remarks(messages, name)]
+def _words(module: ModuleType, name: str, field: str) -> str:
+    rows = [(code(value), remark) for value, remark in remarks(module, name)]
     return join(f"### {code(field)}", table(("value", "meaning"), rows))

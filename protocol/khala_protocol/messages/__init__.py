@@ -1,0 +1,200 @@
+"""The messages, as frozen pydantic models with a literal `kind` each.
+
+A module has what goes the same way: `to_agents`, `from_agents`, `to_all`, and `whole_map` to those who watch. `view` and
+`usage` have parts of several messages, `base` what all have in common.
+
+They stand alone: no game, no bus, no model provider is imported here. Positions are in one of two frames,
+x right and y down in both: *screen*, `[0, 24)` cells of one world unit around the centre of a team's
+(virtual) camera, and *minimap*, `[0, 64)`. The world frame never leaves the host.
+
+Lengths are counted in game loops (22.4 per second at the speed called "faster") where a name ends in
+`_loops` or is `game_loop`, in seconds where it ends in `_s`, in world units otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from khala_protocol.messages.base import LOOPS_PER_S, MOST, SCHEMA_VERSION, Count, Frozen, Point, Wire
+from khala_protocol.messages.from_agents import (
+    MAX_ADVICE_CHARACTERS,
+    MAX_DETAIL_CHARACTERS,
+    MAX_REPLY_CHARACTERS,
+    Advice,
+    Call,
+    ChatMessage,
+    ModelCall,
+    Purpose,
+    Reply,
+)
+from khala_protocol.messages.to_agents import (
+    AgentKind,
+    Briefing,
+    Clock,
+    Contact,
+    Example,
+    Frames,
+    ImageRef,
+    MemoryRule,
+    Observation,
+    Received,
+    Rejection,
+    RejectionReason,
+    TeamSpec,
+)
+from khala_protocol.messages.to_all import (
+    AgentCard,
+    AgentReport,
+    AgentStatus,
+    Casualties,
+    Ending,
+    Fate,
+    Forked,
+    Message,
+    Outcome,
+    Report,
+    Result,
+    Run,
+    Timings,
+    Trigger,
+    Unasked,
+)
+from khala_protocol.messages.usage import Pace, Usage
+from khala_protocol.messages.view import (
+    ActionCost,
+    ActionSpec,
+    Alert,
+    Alliance,
+    Army,
+    ArmyPart,
+    Counts,
+    Economy,
+    EnemyCount,
+    Event,
+    Landmark,
+    NoteView,
+    OrderView,
+    Place,
+    Production,
+    Resources,
+    StandingView,
+    TeamReport,
+    TeamView,
+    Toll,
+    TypeCount,
+    UnavailableAction,
+    UnitDetails,
+    UnitView,
+    ValidArguments,
+    View,
+    WarpGates,
+)
+from khala_protocol.messages.whole_map import (
+    EffectMark,
+    GridView,
+    PlayerMark,
+    PowerMark,
+    ResourceMark,
+    Scene,
+    Terrain,
+    UnitFlag,
+    UnitMark,
+)
+
+AnyMessage = Annotated[
+    Run | Briefing | Observation | Reply | Advice | Message | ModelCall | Report | Result | Terrain | Scene,
+    Field(discriminator="kind"),
+]
+
+MESSAGE_TYPES: tuple[type[Wire], ...] = (
+    Run, Briefing, Observation, Reply, Advice, Message, ModelCall, Report, Result, Terrain, Scene,
+)  # fmt: skip
+
+__all__ = [
+    "LOOPS_PER_S",
+    "MAX_ADVICE_CHARACTERS",
+    "MAX_DETAIL_CHARACTERS",
+    "MAX_REPLY_CHARACTERS",
+    "MESSAGE_TYPES",
+    "MOST",
+    "SCHEMA_VERSION",
+    "ActionCost",
+    "ActionSpec",
+    "Advice",
+    "AgentCard",
+    "AgentKind",
+    "AgentReport",
+    "AgentStatus",
+    "Alert",
+    "Alliance",
+    "AnyMessage",
+    "Army",
+    "ArmyPart",
+    "Briefing",
+    "Call",
+    "Casualties",
+    "ChatMessage",
+    "Clock",
+    "Contact",
+    "Count",
+    "Counts",
+    "Economy",
+    "EffectMark",
+    "Ending",
+    "EnemyCount",
+    "Event",
+    "Example",
+    "Fate",
+    "Forked",
+    "Frames",
+    "Frozen",
+    "GridView",
+    "ImageRef",
+    "Landmark",
+    "MemoryRule",
+    "Message",
+    "ModelCall",
+    "NoteView",
+    "Observation",
+    "OrderView",
+    "Outcome",
+    "Pace",
+    "Place",
+    "PlayerMark",
+    "Point",
+    "PowerMark",
+    "Production",
+    "Purpose",
+    "Received",
+    "Rejection",
+    "RejectionReason",
+    "Reply",
+    "Report",
+    "ResourceMark",
+    "Resources",
+    "Result",
+    "Run",
+    "Scene",
+    "StandingView",
+    "TeamReport",
+    "TeamSpec",
+    "TeamView",
+    "Terrain",
+    "Timings",
+    "Toll",
+    "Trigger",
+    "TypeCount",
+    "Unasked",
+    "UnavailableAction",
+    "UnitDetails",
+    "UnitFlag",
+    "UnitMark",
+    "UnitView",
+    "Usage",
+    "ValidArguments",
+    "View",
+    "WarpGates",
+    "Wire",
+]

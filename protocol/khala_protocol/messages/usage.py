@@ -1,0 +1,62 @@
+"""What requests to a model cost, in tokens, money and time."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from khala_protocol.messages.base import MOST, Count, Frozen
+
+
+class Usage(Frozen):
+    """The usage of requests to a model. Sums with `+`, and no sum is more than `MOST`."""
+
+    requests: Count = 0
+    prompt_tokens: Count = 0
+    completion_tokens: Count = 0
+    cached_tokens: Count = 0
+    """The part of `prompt_tokens` that the provider had in its cache."""
+    cache_write_tokens: Count = 0
+    """The part of `prompt_tokens` that the provider put into its cache."""
+    reasoning_tokens: Count = 0
+    """The part of `completion_tokens` that was reasoning."""
+    cost_usd: float | None = Field(default=None, ge=0, le=MOST)
+    """None if no price is known for the model."""
+    unknown_requests: Count = 0
+    """Requests that were cancelled or failed, whose tokens are unknown."""
+    images: Count = 0
+    """Number of pictures that were sent along."""
+    image_tokens: Count = 0
+    """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
+
+    def __add__(self, other: Usage) -> Usage:
+        costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
+        return Usage(
+            requests=min(self.requests + other.requests, MOST),
+            prompt_tokens=min(self.prompt_tokens + other.prompt_tokens, MOST),
+            completion_tokens=min(self.completion_tokens + other.completion_tokens, MOST),
+            cached_tokens=min(self.cached_tokens + other.cached_tokens, MOST),
+            cache_write_tokens=min(self.cache_write_tokens + other.cache_write_tokens, MOST),
+            reasoning_tokens=min(self.reasoning_tokens + other.reasoning_tokens, MOST),
+            cost_usd=min(sum(costs), MOST) if costs else None,
+            unknown_requests=min(self.unknown_requests + other.unknown_requests, MOST),
+            images=min(self.images + other.images, MOST),
+            image_tokens=min(self.image_tokens + other.image_tokens, MOST),
+        )
+
+
+class Pace(Frozen):
+    """How long a model takes, as a function of what it reads and writes, so that the same reply always costs the same.
+
+    seconds = requests * latency_s + tokens read / read_tokens_per_s + tokens written / write_tokens_per_s
+    """
+
+    latency_s: float = Field(default=0.5, ge=0, le=3600)
+    """Seconds of each request, whatever its length."""
+    read_tokens_per_s: float = Field(default=5000.0, gt=0)
+    write_tokens_per_s: float = Field(default=50.0, gt=0)
+
+    def seconds(self, usage: Usage) -> float:
+        """Return the seconds that this usage takes."""
+        reading_s = usage.prompt_tokens / self.read_tokens_per_s
+        writing_s = usage.completion_tokens / self.write_tokens_per_s
+        return usage.requests * self.latency_s + reading_s + writing_s
