@@ -1,6 +1,6 @@
 /** A recorded match that is open: what the server told of it, and the moment of it that the clock shows. */
 
-import { computed, effect, signal, type ReadonlySignal } from "@preact/signals";
+import { batch, computed, effect, signal, type ReadonlySignal } from "@preact/signals";
 import { get } from "./api";
 import { Recent, newest } from "./cache";
 import * as clock from "./clock";
@@ -58,11 +58,15 @@ export class Match {
     this.lag.value = progress.live ? progress.lag_s : null;
     const known = this.timeline.value;
     const ended = !progress.live && progress.indexed >= 1; // the last line that comes
-    if (ended || !this.line.value || this.run.value?.indexed !== progress.indexed) await this.take(this.run, `runs/${this.id}`);
-    if (!this.line.value) return;
-    if (known && !ended && progress.episode === this.episode && known.steps.length >= progress.steps) return;
-    await this.take(this.timeline, `${this.path}/timeline`).catch(() => undefined); // its first step is not read yet
-    if (!this.terrain.value) await this.takeTerrain();
+    const old = this.run.value;
+    const run = ended || !this.line.value || old?.indexed !== progress.indexed ? await get<RunView>(`runs/${this.id}`) : old;
+    const enough = known && !ended && progress.episode === this.episode && known.steps.length >= progress.steps;
+    const timeline = enough || !this.lineIn(run) ? null : await this.newTimeline();
+    batch(() => {
+      this.run.value = run; // not before its last steps: a link to one of them waits while there are more to come
+      if (timeline) this.timeline.value = timeline;
+    });
+    if (timeline && !this.terrain.value) await this.takeTerrain();
   }
 
   /** Return the long texts of what an agent was asked last up to a step. */
@@ -91,7 +95,7 @@ export class Match {
 
   readonly agents = computed<AgentLine[]>(() => this.run.value?.agents ?? []);
 
-  readonly line = computed<EpisodeLine | undefined>(() => this.run.value?.episodes.find((e) => e.episode === this.episode));
+  readonly line = computed<EpisodeLine | undefined>(() => this.lineIn(this.run.value));
 
   readonly decisions = computed(() => new Map<string, Decision>((this.moment.value?.decisions ?? []).map((d) => [keyOf(d), d])));
 
@@ -130,6 +134,11 @@ export class Match {
       }),
     );
   }
+
+  private lineIn = (run: RunView | null) => run?.episodes.find((e) => e.episode === this.episode);
+
+  /** Return the time line as it is now; null if its first step is not read yet. */
+  private newTimeline = () => get<Timeline>(`${this.path}/timeline`).catch(() => null);
 
   private async takeTerrain(): Promise<void> {
     await this.take(this.terrain, `${this.path}/terrain`).catch(() => undefined); // recordings of early versions have none

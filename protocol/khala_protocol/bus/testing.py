@@ -403,7 +403,7 @@ class BusConformance:
         host, first, second = await connect(), await connect(), await connect()
         watch = await host.watch("alive/*")
         tokens = [await session.announce("alive/a") for session in (first, second)]
-        await first.announce("alive/b")
+        await second.announce("alive/b")  # what it announced before is known then
         assert {report.key for report in await take(watch, 2)} == {"alive/a", "alive/b"}
         await tokens[0].close()
         await second.announce("alive/c")
