@@ -1,7 +1,7 @@
 """The messages, as frozen pydantic models with a literal `kind` each.
 
-A module has what goes the same way: `to_agents`, `from_agents`, `to_all`, and `whole_map` to those who watch. `view` and
-`usage` have parts of several messages, `base` what all have in common.
+A module has what goes the same way: `to_agents`, `from_agents`, `to_all`, and `whole_map` to those who watch. `view`
+and `usage` have parts of several messages, `base` what all have in common.
 
 They stand alone: no game, no bus, no model provider is imported here. Positions are in one of two frames,
 x right and y down in both: *screen*, `[0, 24)` cells of one world unit around the centre of a team's
