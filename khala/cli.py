@@ -313,6 +313,18 @@ app.add_typer(khala_simulator.cli.app, name="sc2")
 app.add_typer(knowledge, name="knowledge")
 
 
+_OLD_STUBS = "Descriptors cannot be created directly"
+"""What protobuf says of stubs that were made for it before 2022. pip does not know that two packages share a name."""
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error that the user can fix is one sentence on stderr and an exit code other than 0."""
-    run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
+    try:
+        run_command("khala", lambda: app(arguments, prog_name="khala"), khala_simulator.process.install.InstallError)
+    except TypeError as error:
+        if _OLD_STUBS not in str(error):
+            raise
+        sys.exit(
+            "khala: s2clientprotocol, which PySC2 asks for, has overwritten pys2clientprotocol, which knows the "
+            "protobuf of today: pip install --force-reinstall --no-deps pys2clientprotocol"
+        )

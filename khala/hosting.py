@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala_bridge.game.env import Launched
+    from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match import Asks
     from khala_orchestrator.resume import Unfinished
@@ -44,7 +44,7 @@ async def hosted(
     *,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
-    launched: Launched | None = None,
+    processes: Processes | None = None,
     asks: Asks = lambda *_: None,
 ) -> list[Result]:
     """Play a match, and go on in a new game if the game dies or hangs and the task says so.
@@ -57,7 +57,7 @@ async def hosted(
         bus: a session on the bus that agents join.
         watch: is called with the run card, every new report and every result.
         past: what was played of this match before.
-        launched: a process of the game that is there already.
+        processes: where the process of the game comes from, and goes afterwards.
         asks: is called in each step with the agents that are asked.
 
     Raises:
@@ -67,7 +67,7 @@ async def hosted(
     while True:
         try:
             first = past.episode if past else 0
-            async with game_of(config, sc2path, first_episode=first, launched=launched) as game:
+            async with game_of(config, sc2path, first_episode=first, processes=processes) as game:
                 return await host(config, game, bus, watch=watch, past=past, asks=asks)
         except GameMissing:
             raise
@@ -81,8 +81,8 @@ async def hosted(
             )
 
 
-def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launched: Launched | None = None) -> Sides:
-    """Return the game of a match, not started yet; it takes a process that is launched already, if it can."""
+def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, processes: Processes | None = None) -> Sides:
+    """Return the game of a match, not started yet; its process is one of `processes`, if there are any."""
     task = config.task
     sides = task.per_side()
     invitation = Invitation(log=config.record and config.record.with_name("guest.log"))
@@ -97,7 +97,7 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, launc
         environment=environment.plain() | named_parent(),
     )
     thread = GameThread(
-        lambda: PySC2Game(started, launched, invitation),
+        lambda: PySC2Game(started, processes, invitation),
         patience=Patience().against(task.opponent),
         give_up=invitation.withdrawn.set,
     )

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.minds import Minds
-    from khala_bridge.game.env import Launched
+    from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
     from khala_protocol.bus.zenoh import ZenohBus
@@ -57,8 +57,8 @@ class Supplies:
     """How to join a router that is there."""
     spawn: Spawn = spawn
     """Where the processes of agents come from."""
-    launched: Launched | None = None
-    """A process of the game."""
+    processes: Processes | None = None
+    """Where the process of the game comes from, and goes afterwards."""
 
 
 async def play(
@@ -107,7 +107,7 @@ async def play(
                     children.start_again_with(share.process, *share.arguments)
             watch(message)
 
-        match = hosted(config, sc2path, bus, watch=see, past=past, launched=supplies.launched)
+        match = hosted(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
         return await _unless_one_dies(match, children, begun)
 
 

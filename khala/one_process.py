@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from khala.minds import Minds
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
-    from khala_bridge.game.env import Launched
+    from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match import Asks
     from khala_orchestrator.resume import Unfinished
@@ -40,7 +40,7 @@ async def play(
     game: str,
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
-    launched: Launched | None = None,
+    processes: Processes | None = None,
     gates: Gates = own_turns,
     callers: Mapping[Seat, Policy] = MappingProxyType({}),
     asks: Asks = lambda *_: None,
@@ -54,7 +54,7 @@ async def play(
         game: `simulator`, `starcraft2`, or a directory.
         watch: is called with the run card, every report and every result.
         past: what was played of this match before.
-        launched: a process of the game.
+        processes: where the process of the game comes from, and goes afterwards.
         gates: where requests to models wait for their turn.
         callers: by seat, policies of the caller, in place of its minds.
         asks: is called in each step with the agents that are asked.
@@ -75,7 +75,7 @@ async def play(
             for side, policies in by_side.items()
         ]
         try:
-            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, launched=launched, asks=asks)
+            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, processes=processes, asks=asks)
             return await _unless_one_fails(asyncio.create_task(match), agents)
         finally:
             stop.set()

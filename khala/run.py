@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from khala_bridge.game.env import Launched
+    from khala_bridge.game.processes import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Result
 
@@ -73,7 +73,7 @@ async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
             named = named_sides(wanted.side_model, **wanted.sides)
             minds = minds_of([side.side for side in config.task.per_side()], Minds(**wanted.minds), named)
             known.append(config)
-            supplies = Supplies(spawn=stock, launched=launched)
+            supplies = Supplies(spawn=stock, processes=launched)
             with Progress(stderr_console(), config.task.max_steps) as progress:
                 return await play(
                     config, minds, wanted.out / config.run, game=wanted.game, watch=progress, past=past,
@@ -92,7 +92,7 @@ def _game_for(wanted: Wanted) -> Iterator[Launched | None]:
         yield None
         return
     from khala import environment, games  # noqa: PLC0415
-    from khala_bridge.game.env import Launched  # noqa: PLC0415
+    from khala_bridge.game.processes import Launched  # noqa: PLC0415
     from khala_protocol.parent_watch import named_parent  # noqa: PLC0415
 
     sc2path, _ = games.find(wanted.game)

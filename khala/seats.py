@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from khala.minds import Minds
     from khala_agents.policy import Context, Said
-    from khala_bridge.game.env import Launched
+    from khala_bridge.game.processes import Processes
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Briefing, ImageRef, Observation, Wire
@@ -117,7 +117,7 @@ class SeatedMatch:
         minds: Mapping[str, Minds] = MappingProxyType({}),
         *,
         game: str = "simulator",
-        launched: Launched | None = None,
+        processes: Processes | None = None,
     ) -> None:
         """Take a match.
 
@@ -126,7 +126,7 @@ class SeatedMatch:
             seats: those that the caller plays.
             minds: by side, how all other agents decide.
             game: `simulator`, `starcraft2`, or a directory.
-            launched: a process of the game.
+            processes: where the process of the game comes from, and goes afterwards.
 
         Raises:
             ConfigError: there is no such seat, or nobody decides for an agent.
@@ -134,7 +134,7 @@ class SeatedMatch:
         self.seats = tuple(seats)
         self.broker = MemoryBroker()
         _check(config.task, self.seats, minds)
-        self._config, self._minds, self._game, self._launched = config, minds, game, launched
+        self._config, self._minds, self._game, self._processes = config, minds, game, processes
         self._sides = {seat.side for seat in self.seats}
         self._questions = _OpenQuestions()
         self._reports: list[Report] = []
@@ -212,7 +212,7 @@ class SeatedMatch:
             self._minds,
             game=self._game,
             watch=self._watch,
-            launched=self._launched,
+            processes=self._processes,
             callers=callers,
             asks=self._asks,
             broker=self.broker,

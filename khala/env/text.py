@@ -18,6 +18,7 @@ from khala.loop_thread import LoopThread
 from khala.minds import Minds, minds_of
 from khala.rewards import battle
 from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala_bridge.game.processes import IdleGames
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError, KhalaError
 
@@ -86,6 +87,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         self.observation_spaces = dict.fromkeys(self.possible_agents, text)
         self.action_spaces = {agent: spaces.Text(_LONGEST_REPLY, min_length=0) for agent in self.possible_agents}
         self._thread: LoopThread | None = None
+        self._games = IdleGames()
         self._match: SeatedMatch | None = None
         self._onlooker: Onlooker | None = None
         self._turn = Turn()
@@ -101,6 +103,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[dict[str, str], Infos]:
         """Begin an episode: in a new match with a seed, or if the one before is not over; else in that which goes on.
+
+        A new match is played in the game's process of the one before.
 
         Raises:
             KhalaError: the game cannot be played; the text says what to do.
@@ -153,6 +157,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
     def close(self) -> None:
         """End the match and its game."""
         self._leave()
+        self._games.close()
         if self._thread is not None:
             self._thread.close()
             self._thread = None
@@ -161,9 +166,9 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _enter(self, seed: int) -> None:
         if self._thread is None:
-            self._thread = LoopThread()
+            self._thread, self._games = LoopThread(), IdleGames()
         config = MatchConfig(task=self._task, run=self._task.name, seed=seed, episodes=EPISODES)
-        self._match = SeatedMatch(config, self._seats.values(), self._minds, game=self._game)
+        self._match = SeatedMatch(config, self._seats.values(), self._minds, game=self._game, processes=self._games)
         if self.render_mode is not None:
             self._onlooker = Onlooker()
             self._thread.run(self._onlooker.look(self._match.broker, config.run))

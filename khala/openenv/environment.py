@@ -21,6 +21,7 @@ from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, Rese
 from khala.openenv.settings import Settings
 from khala.openenv.views import outcome_of, view_of
 from khala.seats import Turn
+from khala_bridge.game.processes import IdleGames
 from khala_protocol.configfile import loads
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import LOOPS_PER_S
@@ -44,9 +45,11 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
-    def __init__(self, settings: Settings | None = None) -> None:
-        """Take what the server decides."""
+    def __init__(self, settings: Settings | None = None, games: IdleGames | None = None) -> None:
+        """Take what the server decides, and the processes that its sessions share; without, it keeps one for itself."""
         self._settings = settings or Settings()
+        self._own_games = IdleGames() if games is None else None
+        self._games = games or self._own_games
         super().__init__(rubric=self._settings.rubric())
         self._choice = ResetOptions()
         self._match: SeatedMatch | None = None
@@ -84,7 +87,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         goes_on = self._match is not None and self._turn.results and not self._turn.over
         if wanted.seed is not None or wanted.choice() != self._choice or not goes_on:
             await self._leave()
-            await self._enter(await asyncio.to_thread(self._settings.match, wanted))
+            await self._enter(await asyncio.to_thread(self._settings.match, wanted, self._games))
             self._choice = wanted.choice()
         else:
             assert self._state.seed is not None
@@ -160,12 +163,12 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         """End the match and its game, for good."""
         self._closed = True
         loop = self._loop
-        if self._match is None or loop is None:
+        if loop is None:
             pass
         elif _is_running_here(loop):
-            self._leaving = loop.create_task(self._leave())
+            self._leaving = loop.create_task(self._end())
         else:
-            asyncio.run_coroutine_threadsafe(self._leave(), loop).result(CLOSE_S)
+            asyncio.run_coroutine_threadsafe(self._end(), loop).result(CLOSE_S)
         if self._thread is not None:
             self._thread.close()
             self._thread = None
@@ -191,6 +194,11 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         if match is not None:
             with contextlib.suppress(KhalaError):  # it was raised where the match was waited for
                 await match.__aexit__(None, None, None)
+
+    async def _end(self) -> None:
+        await self._leave()
+        if self._own_games is not None:
+            await asyncio.to_thread(self._own_games.close)
 
     async def _advance(self) -> None:
         assert self._match is not None

@@ -7,6 +7,7 @@ may leave it out while there is one. These sessions count as those over websocke
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,10 +30,11 @@ from khala import __version__
 from khala.openenv.environment import KhalaEnvironment, NoEpisode
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState
 from khala.openenv.settings import Settings
+from khala_bridge.game.processes import IdleGames
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import AsyncIterator, Iterator
 
     from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -46,16 +48,24 @@ def app_of(settings: Settings | None = None, *, sessions: int = SESSIONS, idle_s
 
     Args:
         settings: what the server decides.
-        sessions: most at a time; each has a process of the game.
+        sessions: most at a time; each has a process of the game, which waits for the next one when it ends.
         idle_s: seconds after which a session ends that does nothing.
     """
+    games = IdleGames(sessions)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        await asyncio.to_thread(games.close)
+
     app = FastAPI(
+        lifespan=lifespan,
         title="Khala",
         version="1.0.0",  # of OpenEnv's API: its clients and `openenv validate` read it
         description=f"StarCraft II for teams of LLM agents, by OpenEnv. Khala {__version__}.",
     )
     limits = ConcurrencyConfig(max_concurrent_envs=sessions, session_timeout=idle_s)
-    _Server(settings or Settings(), limits).register_routes(app)
+    _Server(settings or Settings(), games, limits).register_routes(app)
     app.add_middleware(_Parting)
     return app
 
@@ -87,9 +97,9 @@ class Named(BaseModel):
 class _Server(HTTPEnvServer):
     """OpenEnv's server, with sessions over HTTP."""
 
-    def __init__(self, settings: Settings, limits: ConcurrencyConfig) -> None:
+    def __init__(self, settings: Settings, games: IdleGames, limits: ConcurrencyConfig) -> None:
         def environment() -> KhalaEnvironment:
-            return KhalaEnvironment(settings)
+            return KhalaEnvironment(settings, games)
 
         super().__init__(environment, KhalaAction, KhalaObservation, concurrency_config=limits)
         self._by_name: dict[str, str] = {}

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from openenv.core.rubrics import Rubric
 
     from khala.openenv.models import ResetOptions
+    from khala_bridge.game.processes import Processes
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
 
@@ -61,8 +62,12 @@ class Settings:
     game: str = "simulator"
     out: Path | None = None
 
-    def match(self, options: ResetOptions) -> Chosen:
+    def match(self, options: ResetOptions, processes: Processes | None = None) -> Chosen:
         """Return the match that a client chose.
+
+        Args:
+            options: what it chose.
+            processes: where the process of the game comes from, and goes afterwards.
 
         Raises:
             ConfigError: it may not, or there is no such task, agent or picture.
@@ -77,7 +82,7 @@ class Settings:
                 source="others",
             )
         minds = minds_of([side.side for side in config.task.per_side()], Minds().named(others), {})
-        return Chosen(SeatedMatch(config, seats, minds, game=self.game), config)
+        return Chosen(SeatedMatch(config, seats, minds, game=self.game, processes=processes), config)
 
     def _config(self, options: ResetOptions) -> MatchConfig:
         name = options.task or self.task

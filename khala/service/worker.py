@@ -21,7 +21,7 @@ from khala.matches import resumed
 from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala.service import logs
 from khala.spare import Spares
-from khala_bridge.game.env import Launched
+from khala_bridge.game.processes import Launched
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_protocol.bus.config import BusConfig  # noqa: TC001  # pydantic evaluates it
@@ -101,7 +101,7 @@ async def _work(game: str, spares: int) -> dict[str, Any]:
 async def _play(job: Job, game: str, stock: Spares, launched: Launched) -> dict[str, Any]:
     config, past = job.match()
     logs.here["run"] = config.run
-    supplies = Supplies(bus=job.bus, spawn=stock, launched=launched)
+    supplies = Supplies(bus=job.bus, spawn=stock, processes=launched)
     results = await play(config, job.minds, job.directory, game=game, watch=_remark, past=past, supplies=supplies)
     invalid = dict.fromkeys(result.invalid_because for result in results if not result.valid)
     return {"done": "; ".join(invalid)}

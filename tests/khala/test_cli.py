@@ -357,6 +357,19 @@ def tell(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]
     return int(ended.value.code or 0), capsys.readouterr().out
 
 
+def test_stubs_that_pip_has_overwritten_are_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def old_stubs(*_: object, **__: object) -> None:
+        raise TypeError("Descriptors cannot be created directly.\nIf this call came from a _pb2.py file, ...")
+
+    monkeypatch.setattr("khala.cli.app", old_stubs)
+    with pytest.raises(SystemExit) as ended:
+        main(["tasks"])
+    assert str(ended.value).endswith("pip install --force-reinstall --no-deps pys2clientprotocol")
+    assert not capsys.readouterr().out
+
+
 def test_the_doctor_says_what_it_finds_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     _, out = tell(capsys, "doctor", "--json")
     found = {finding["name"]: finding["state"] for finding in json.loads(out)["findings"]}

@@ -1,7 +1,7 @@
 """A process of the game and its raw API, without the environment of PySC2 around it.
 
-Above: `khala_bridge.calibrate.lab` and `khala_bridge.calibrate.survey`. Below: `khala_bridge.game.env`, which starts a
-process of any install on any system.
+Above: `khala_bridge.calibrate.lab` and `khala_bridge.calibrate.survey`. Below: `khala_bridge.game.processes`, which
+starts a process of any install on any system.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_bridge.errors import GameError
-from khala_bridge.game.env import Launched, explained
+from khala_bridge.game.processes import Launched, explained
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,7 +53,7 @@ def started(sc2path: Path, environment: dict[str, str] | None = None) -> Iterato
         GameError: it could not be started.
     """
     with explained("the game could not be started"):
-        process = Launched(sc2path, environment).take()
+        process = Launched(sc2path, environment).take(sc2path)
     if process is None:
         raise GameError("the game could not be started: it ended before it listened")
     try:

@@ -1,71 +1,25 @@
-"""How PySC2's environment is started: which install, which process of the game, which map and players.
+"""How PySC2's environment is started: which process of the game, which map and players.
 
 Above: `khala_bridge.game.pysc2_game`, which plays in it, and `khala_bridge.game.meeting`, whose environments share the
-game with a player that is not Khala's.
+game with a player that is not Khala's. Below: `khala_bridge.game.processes`.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
-import threading
-import time
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from absl import flags
 
-from khala_bridge.compat import maps, remote_controller, run_configs, sc2_env
+from khala_bridge.compat import maps, sc2_env
 from khala_bridge.errors import GameError
-from khala_bridge.game.game import GameConfig, check_install
+from khala_bridge.game.processes import Launched, environment_of, explained, pointed_to, settle_flags
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
+    from khala_bridge.game.game import GameConfig
+    from khala_bridge.game.processes import Processes
     from khala_bridge.state import Forfeit
     from khala_bridge.task.maps import MapSpec
-
-_environment = threading.RLock()
-_LISTENS_AFTER_S = 0.2
-"""The simulator listens 0.05 s after its start, 0.15 s on a busy machine. Who comes later waits for a second more."""
-
-
-class Launched:
-    """A process of the game that has no map yet: it takes any, and so can be started before the match is known.
-
-    PySC2 tries to connect as soon as it has started a process, is refused, and sleeps for a second. Here it connects
-    when the process is taken, which most often listens by then.
-    """
-
-    def __init__(self, sc2path: Path, environment: dict[str, str] | None = None) -> None:
-        """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
-        check_install(sc2path)
-        _settle_flags()
-        with _sc2path(sc2path), explained("the game could not be started"):
-            run_config = run_configs.get()
-            run_config.env = environment_of(run_config, environment)
-            self._process: Any = run_config.start(want_rgb=False, connect=False)
-        self._started_s = time.monotonic()
-
-    def take(self) -> Any:
-        """Return the process, connected, once, and only if it still runs; the taker ends it."""
-        process, self._process = self._process, None
-        if process is None or not process.running:
-            return None
-        time.sleep(max(0.0, self._started_s + _LISTENS_AFTER_S - time.monotonic()))
-        try:  # as `StarcraftProcess` does
-            process._controller = remote_controller.RemoteController(process.host, process.port, process)  # noqa: SLF001
-        except BaseException:
-            process.close()
-            raise
-        return process
-
-    def close(self) -> None:
-        """End the process, if nobody took it."""
-        process, self._process = self._process, None
-        if process is not None:
-            process.close()
 
 
 class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
@@ -75,11 +29,14 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
     """Who the opponent says it is; "" if the task knows it."""
     forfeit: Forfeit | None = None
     """How the opponent went away."""
+    _is_alone = False
+    """Whether its process is one that any game for one player can use."""
+    _processes: Processes | None = None
 
-    def __init__(self, config: GameConfig, launched: Launched | None = None) -> None:
+    def __init__(self, config: GameConfig, processes: Processes | None = None) -> None:
         """Start the game; arguments as in `PySC2Game`."""
         self._config = config
-        self._launched = launched
+        self._processes = processes
         super().__init__(
             map_name=Map(config.map),
             players=_players(config),
@@ -91,18 +48,26 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
 
     def _launch_game(self) -> None:
         draws = any(interface.HasField("render") for interface in self._interface_options)
-        alone = self._num_agents == 1 and not draws  # several players have ports in their command lines
-        if not alone:
+        if self._num_agents > 1 or draws:  # several players have ports in their command lines
             self._run_config.env = environment_of(self._run_config, self._config.environment)
             super()._launch_game()
             return
-        process = self._launched and self._launched.take()
-        process = process or Launched(self._config.sc2path, self._config.environment).take()
+        process = self._processes and self._processes.take(self._config.sc2path)
+        process = process or Launched(self._config.sc2path, self._config.environment).take(self._config.sc2path)
         if process is None:
             raise GameError("the game could not be started: it ended before it listened")
+        self._is_alone = True
         self._ports: list[int] = []
         self._sc2_procs = [process]
         self._controllers = [process.controller]
+
+    def close(self) -> None:
+        """End the game, and its process, unless that is kept for the next game."""
+        if self._is_alone and self._sc2_procs and self._processes:
+            (process,) = self._sc2_procs
+            if self._processes.keep(process, self._config.sc2path):
+                self._sc2_procs, self._controllers = [], []
+        super().close()
 
 
 class Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
@@ -121,19 +86,6 @@ class Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
         return self._name
 
 
-def environment_of(run_config: Any, environment: dict[str, str] | None) -> dict[str, str] | None:
-    """Return the environment of a process of the game, in which it finds its libraries."""
-    ours: dict[str, str] | None = run_config.env  # on Linux, with the libraries of the game
-    if environment is None:
-        return ours
-    return environment | {name: (ours or {})[name] for name in ("LD_LIBRARY_PATH",) if name in (ours or {})}
-
-
-def _settle_flags() -> None:
-    if not flags.FLAGS.is_parsed():  # PySC2 reads absl flags; it needs their defaults, not our command line
-        flags.FLAGS.mark_as_parsed()
-
-
 def started(env: Env, config: GameConfig, *given: Any) -> Any:
     """Return an environment that is ready to be reset.
 
@@ -142,10 +94,10 @@ def started(env: Env, config: GameConfig, *given: Any) -> Any:
         config: which game, and how.
         given: what its kind takes in addition.
     """
-    _settle_flags()
+    settle_flags()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
     try:
-        with _sc2path(config.sc2path), explained("the game could not be started"):
+        with pointed_to(config.sc2path), explained("the game could not be started"):
             env.__init__(config, *given)  # type: ignore[misc]  # see above
     except BaseException:
         env.close()
@@ -178,30 +130,3 @@ def _players(config: GameConfig) -> list[Any]:
         return [*players, sc2_env.Agent(race, "Khala")]
     # PySC2 would draw the build `random` from Python's own generator
     return [*players, sc2_env.Bot(race, sc2_env.Difficulty[spec.difficulty], sc2_env.BotBuild.macro)]
-
-
-@contextlib.contextmanager
-def _sc2path(directory: Path) -> Iterator[None]:
-    """Point SC2PATH to this install; PySC2 reads it once, while it starts."""
-    with _environment:
-        before = os.environ.get("SC2PATH")
-        os.environ["SC2PATH"] = str(directory)
-        try:
-            yield
-        finally:
-            if before is None:
-                del os.environ["SC2PATH"]
-            else:
-                os.environ["SC2PATH"] = before
-
-
-@contextlib.contextmanager
-def explained(what: str) -> Iterator[None]:
-    """Turn any exception of PySC2 into an error for the user; they have no common base class."""
-    try:
-        yield
-    except GameError:
-        raise
-    except Exception as error:
-        detail = " ".join(str(error).split()) or type(error).__name__
-        raise GameError(f"{what}: {detail}") from error

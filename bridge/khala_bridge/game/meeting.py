@@ -15,28 +15,29 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.compat import features, portspicker, run_configs, sc2_env
 from khala_bridge.errors import GameError
-from khala_bridge.game.env import Env, environment_of, started
+from khala_bridge.game.env import Env, started
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.lan import LanGame
 from khala_bridge.game.manners import LanPorts
+from khala_bridge.game.processes import environment_of
 
 if TYPE_CHECKING:
-    from khala_bridge.game.env import Launched
     from khala_bridge.game.game import GameConfig
     from khala_bridge.game.guest import Guest
+    from khala_bridge.game.processes import Processes
     from khala_bridge.state import Forfeit
 
 
-def env_of(config: GameConfig, launched: Launched | None, invitation: Invitation | None) -> Any:
+def env_of(config: GameConfig, processes: Processes | None, invitation: Invitation | None) -> Any:
     """Return the environment of a game, started; arguments and errors as in `PySC2Game`."""
     kinds: dict[str, type[Env]] = {"guest": GuestEnv, "lan": LanEnv}
     try:
         if (kind := kinds.get(config.opponent.kind)) is None:
-            return started(object.__new__(Env), config, launched)
+            return started(object.__new__(Env), config, processes)
         return started(object.__new__(kind), config, invitation or Invitation())
     finally:
-        if launched is not None:
-            launched.close()
+        if processes is not None:
+            processes.began()
 
 
 class _MeetingEnv(Env):

@@ -19,9 +19,9 @@ from khala_bridge.act.plan import PlanStep, Played
 from khala_bridge.catalogue.functions import check_against_pysc2
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError, GameMissing
-from khala_bridge.game.env import explained
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.game.meeting import env_of
+from khala_bridge.game.processes import explained
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_bridge.state.grid import NO_GRID
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala_bridge.act.plan import GameAction, Plan
-    from khala_bridge.game.env import Launched
     from khala_bridge.game.invitation import Invitation
+    from khala_bridge.game.processes import Processes
     from khala_bridge.state import EpisodeInfo, Snapshot
     from khala_bridge.state.grid import Grid
 
@@ -53,13 +53,13 @@ class PySC2Game:
     """
 
     def __init__(
-        self, config: GameConfig, launched: Launched | None = None, invitation: Invitation | None = None
+        self, config: GameConfig, processes: Processes | None = None, invitation: Invitation | None = None
     ) -> None:
         """Start the game.
 
         Args:
             config: which game, and how.
-            launched: a process of this install that is there already; used if it fits, ended if not.
+            processes: where the process of a game for one player that draws nothing comes from, and goes afterwards.
             invitation: how an opponent who joins is asked in.
 
         Raises:
@@ -78,7 +78,7 @@ class PySC2Game:
         check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
-        self._env = env_of(config, launched, invitation)
+        self._env = env_of(config, processes, invitation)
         with explained("the game could not be asked for its version"):
             ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
         self._info = GameIdentity(

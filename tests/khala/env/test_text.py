@@ -7,6 +7,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
+import psutil
 import pytest
 
 from khala import env as words
@@ -80,6 +81,23 @@ def test_an_episode_follows_in_the_same_match_and_a_picture_shows_it(pair: TextP
     assert pair.step({}) == ({}, {}, {}, {}, {})
     _, infos = pair.reset()
     assert {info["observation"].episode for info in infos.values()} == {1}
+
+
+@game
+def test_new_matches_share_a_process_and_are_those_of_new_processes() -> None:
+    env, read = words.parallel_env("2s3z", max_cycles=3), list[list[str]]()
+    before, used = set(psutil.Process().children()), set()
+    for seed in (1, 2, 1):
+        seen, _ = env.reset(seed=seed)
+        read.append(list(seen.values()))
+        while env.agents:
+            seen, *_ = env.step({agent: PLAYERS["skilled"](text, random.Random(0)) for agent, text in seen.items()})
+            read[-1] += seen.values()
+        used |= set(psutil.Process().children()) - before
+    env.close()
+    assert read[0] == read[2] != read[1]
+    assert len(used) == 1
+    assert not any(process.is_running() for process in used)
 
 
 @game

@@ -98,16 +98,22 @@ async def test_one_agent_plays_and_others_decide_for_the_rest(serving: Serving) 
 
 async def test_sessions_are_apart_seeded_and_no_more_than_the_server_has(serving: Serving) -> None:
     options = {"seed": 5, "task": "2s3z", "max_steps": 3}
-    async with serving(sessions=2) as address:
-        async with KhalaEnv(address) as one, KhalaEnv(address) as other, KhalaEnv(address) as third:
-            first, second = await asyncio.gather(played(one, **options), played(other, **options))
-            assert untimed(first) == untimed(second)
-            with RAISES(RuntimeError, match=r"at capacity: 2/2"):
-                await third.reset()
-            games = psutil.Process().children(recursive=True)
-            assert len(games) == 2
-        _, alive = await asyncio.to_thread(psutil.wait_procs, games, 10)
-        assert not alive
+    async with (
+        serving(sessions=2) as address,
+        KhalaEnv(address) as one,
+        KhalaEnv(address) as other,
+        KhalaEnv(address) as third,
+    ):
+        first, second = await asyncio.gather(played(one, **options), played(other, **options))
+        assert untimed(first) == untimed(second)
+        with RAISES(RuntimeError, match=r"at capacity: 2/2"):
+            await third.reset()
+        games = psutil.Process().children(recursive=True)
+        assert len(games) == 2
+        assert untimed(await played(one, **options)) == untimed(first)
+        assert psutil.Process().children(recursive=True) == games, "a seed is played in a process that is there"
+    _, alive = await asyncio.to_thread(psutil.wait_procs, games, 10)
+    assert not alive
 
 
 async def test_an_episode_over_http_has_a_name(serving: Serving) -> None:
