@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING
 
 from khala import one_process
 from khala.experiment.job import Done, Job
+from khala.local import Supplies
 from khala.local import play as play_with_processes
 from khala_agents.llm.limits import own_turns
+from khala_bridge.game.processes import IdleGames
 from khala_orchestrator.resume import unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
@@ -24,6 +26,7 @@ from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
     from khala_agents.llm.limits import Gates
+    from khala_bridge.game.processes import Processes
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -44,21 +47,34 @@ def log_quietly() -> None:
 
 async def _work(game: str) -> None:
     lines = await _stdin()
-    while line := await lines.readline():
-        done = await played(Job.model_validate_json(line), game)
-        sys.stdout.write(done.model_dump_json() + "\n")
-        sys.stdout.flush()
+    with IdleGames() as games:
+        while line := await lines.readline():
+            done = await played(Job.model_validate_json(line), game, processes=games)
+            sys.stdout.write(done.model_dump_json() + "\n")
+            sys.stdout.flush()
 
 
-async def played(job: Job, game: str, gates: Gates = own_turns) -> Done:
-    """Play a match, and return how it ended; requests to models wait for their turn at the gates."""
+async def played(job: Job, game: str, gates: Gates = own_turns, processes: Processes | None = None) -> Done:
+    """Play a match, and return how it ended.
+
+    Args:
+        job: the match.
+        game: `simulator`, `starcraft2`, or a directory.
+        gates: where requests to models wait for their turn.
+        processes: where the process of the game comes from, and goes afterwards.
+    """
     try:
         async with asyncio.timeout(job.timeout_s):
             past = unfinished(Recording.open(job.beginning)) if job.beginning else None
             if job.processes:
-                results = await play_with_processes(job.config, job.minds, job.directory, game=game, past=past)
+                supplies = Supplies(processes=processes)
+                results = await play_with_processes(
+                    job.config, job.minds, job.directory, game=game, past=past, supplies=supplies
+                )
             else:
-                results = await one_process.play(job.config, job.minds, game=game, past=past, gates=gates)
+                results = await one_process.play(
+                    job.config, job.minds, game=game, past=past, gates=gates, processes=processes
+                )
     except TimeoutError:
         return Done(state="timeout", words=f"it took longer than {job.timeout_s / 3600:g} hours")
     except (KhalaError, ExceptionGroup) as error:
