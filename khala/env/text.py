@@ -7,6 +7,8 @@ The match is played by the host of every other match (`khala.seats`); a step las
 from __future__ import annotations
 
 import secrets
+import sys
+import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
@@ -161,6 +163,16 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         if self._thread is not None:
             self._thread.close()
             self._thread = None
+
+    def __del__(self) -> None:
+        """Close an environment that was dropped: its match waits for nobody else."""
+        thread = getattr(self, "_thread", None)
+        if thread is None or sys.is_finalizing():
+            return
+        if thread.is_current:  # it cannot wait for what it has to do itself
+            threading.Thread(target=self.close).start()
+        else:
+            self.close()
 
     # the match ----------------------------------------------------------------------------------------------------
 

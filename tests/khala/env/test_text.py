@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import random
 import warnings
 from typing import TYPE_CHECKING
@@ -98,6 +99,17 @@ def test_new_matches_share_a_process_and_are_those_of_new_processes() -> None:
     assert read[0] == read[2] != read[1]
     assert len(used) == 1
     assert not any(process.is_running() for process in used)
+
+
+@game
+def test_an_environment_that_is_dropped_ends_its_match_and_its_game() -> None:
+    env = words.parallel_env("2s3z", max_cycles=3)
+    before = set(psutil.Process().children())
+    env.reset(seed=1)
+    (process,) = set(psutil.Process().children()) - before
+    del env
+    gc.collect()  # what is left of it would be an unraisable error now
+    process.wait(10)
 
 
 @game
