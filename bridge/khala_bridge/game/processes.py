@@ -95,7 +95,8 @@ class Launched:
 class IdleGames:
     """Keeps processes of the game from one match to the next; a context manager that ends them.
 
-    A new game in a process that is there takes a fifth of the time, and is the same one. Threads may share it.
+    A new match of 2s3z sees its first observation after 0.06 s in a process that is there, and after 0.6 s in a new
+    one; the game is the same (`tests/khala/test_one_process.py`). Threads may share it.
     """
 
     def __init__(self, most: int = 1) -> None:
