@@ -73,6 +73,19 @@ def test_matches_that_start_at_once_install_at_once(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.new"))
 
 
+def test_a_launcher_that_is_half_written_is_none_of_a_real_game(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half_way(path: Path, data: bytes) -> int:
+        monkeypatch.undo()
+        path.touch()
+        install(tmp_path)
+        return path.write_bytes(data)
+
+    monkeypatch.setattr(Path, "write_bytes", half_way)
+    install(tmp_path)
+
+
 def test_what_is_there_already_is_not_written_again(tmp_path: Path) -> None:
     files = [path for path in install(tmp_path).rglob("*") if path.is_file()]
     numbers = [path.stat().st_ino for path in files]

@@ -138,7 +138,7 @@ def _put(path: Path, data: bytes, *, mode: int = 0o644) -> None:
     """Write a file, unless it is there already; in one step, as others may be installing, or starting the game."""
     if path.exists() and path.read_bytes() == data and path.stat().st_mode & 0o777 == mode:
         return
-    fresh = path.with_name(f"{path.name}.{secrets.token_hex(4)}.new")
+    fresh = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")  # with the dot, no executable of a real game
     try:
         fresh.write_bytes(data)
         fresh.chmod(mode)
