@@ -244,7 +244,7 @@ def _made_hostile(message: object, payload: bytes) -> bytes:
 # --- for everybody ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", [pytest.param("light", marks=pytest.mark.slow), "dark"])
 @pytest.mark.parametrize(
     "width", [1280, pytest.param(820, marks=pytest.mark.slow), pytest.param(390, marks=pytest.mark.slow)]
 )

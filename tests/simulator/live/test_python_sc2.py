@@ -43,6 +43,7 @@ def test_a_bot_settles_on_a_melee_map(tmp_path: Path) -> None:
     assert 15 < walked < 45  # 60 steps of 4 loops at 2.8 a second
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_bots_know_their_ramps_and_expand_on_either_start_of_a_map_without_fog(tmp_path: Path) -> None:
     seen = play("two bases", tmp_path)
