@@ -89,8 +89,9 @@ def asked_hosts(page: Page) -> set[str]:
 
 
 def test_a_stranger_sees_who_plays_and_who_wins(context: BrowserContext, golden: Viewer) -> None:
-    page = opened(context, golden.address)
-    page.get_by_text(re.compile(r"^(Blue|Opponent) wins: ")).wait_for()
+    page = opened(context, golden.address, "canvas[data-step]")  # when the map is drawn
+    for text in (re.compile(r"^(Blue|Opponent) wins: "), re.compile("Army value")):
+        page.get_by_text(text).first.wait_for()
     assert {"Blue", "Opponent", "Army value"} <= set(re.split(r"\s*\n\s*|(?<=\d) | (?=\d)", page.inner_text("main")))
     assert page.get_by_role("img", name=re.compile("^Map of")).is_visible()
     colours = page.evaluate(
