@@ -1,5 +1,6 @@
 """An install of the simulator, and PySC2 pointed at it."""
 
+import os
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -80,12 +81,18 @@ def _command_line(process: Path) -> str:
 
 @pytest.fixture
 def launch(sc2: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
-    """Yield a function that starts the game as clients do; end it when the test is over."""
+    """Yield a function that starts the game as clients do; end it when the test is over.
+
+    It is not covered: coverage writes what it has from within the handler of a signal. If the signal came while it was
+    at work, it waits for itself, and the process does not end.
+    """
     started = []
+    environ = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")}
 
     def start(port: int, *arguments: str) -> subprocess.Popen[bytes]:
         command = [str(sc2 / "Versions/Base75689/SC2_x64"), "-listen", "127.0.0.1", "-port", str(port)]
-        process = subprocess.Popen([*command, "-dataDir", f"{sc2}/", "-tempDir", "/nonexistent/", *arguments])
+        command += ["-dataDir", f"{sc2}/", "-tempDir", "/nonexistent/", *arguments]
+        process = subprocess.Popen(command, env=environ)
         started.append(process)
         return process
 
