@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import logging
 import sys
 from typing import TYPE_CHECKING
@@ -47,33 +48,33 @@ def log_quietly() -> None:
 
 async def _work(game: str) -> None:
     lines = await _stdin()
-    with IdleGames() as games:
+    with contextlib.closing(IdleGames()) as games:
         while line := await lines.readline():
-            done = await played(Job.model_validate_json(line), game, processes=games)
+            done = await played(Job.model_validate_json(line), game, games=games)
             sys.stdout.write(done.model_dump_json() + "\n")
             sys.stdout.flush()
 
 
-async def played(job: Job, game: str, gates: Gates = own_turns, processes: Processes | None = None) -> Done:
+async def played(job: Job, game: str, gates: Gates = own_turns, games: Processes | None = None) -> Done:
     """Play a match, and return how it ended.
 
     Args:
         job: the match.
         game: `simulator`, `starcraft2`, or a directory.
         gates: where requests to models wait for their turn.
-        processes: where the process of the game comes from, and goes afterwards.
+        games: where the process of the game comes from, and goes afterwards.
     """
     try:
         async with asyncio.timeout(job.timeout_s):
             past = unfinished(Recording.open(job.beginning)) if job.beginning else None
             if job.processes:
-                supplies = Supplies(processes=processes)
+                supplies = Supplies(processes=games)
                 results = await play_with_processes(
                     job.config, job.minds, job.directory, game=game, past=past, supplies=supplies
                 )
             else:
                 results = await one_process.play(
-                    job.config, job.minds, game=game, past=past, gates=gates, processes=processes
+                    job.config, job.minds, game=game, past=past, gates=gates, processes=games
                 )
     except TimeoutError:
         return Done(state="timeout", words=f"it took longer than {job.timeout_s / 3600:g} hours")

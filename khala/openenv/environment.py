@@ -48,8 +48,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     def __init__(self, settings: Settings | None = None, games: IdleGames | None = None) -> None:
         """Take what the server decides, and the processes that its sessions share; without, it keeps one for itself."""
         self._settings = settings or Settings()
-        self._own_games = IdleGames() if games is None else None
-        self._games = games or self._own_games
+        self._games, self._owns_games = games or IdleGames(), games is None
         super().__init__(rubric=self._settings.rubric())
         self._choice = ResetOptions()
         self._match: SeatedMatch | None = None
@@ -197,8 +196,8 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     async def _end(self) -> None:
         await self._leave()
-        if self._own_games is not None:
-            await asyncio.to_thread(self._own_games.close)
+        if self._owns_games:
+            await asyncio.to_thread(self._games.close)
 
     async def _advance(self) -> None:
         assert self._match is not None

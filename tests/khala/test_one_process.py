@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import TYPE_CHECKING
 
 import pytest
@@ -37,7 +38,7 @@ async def test_a_match_in_a_process_that_has_played_is_that_of_a_new_process(
         return list(Recording.open(config.record).of(Observation))
 
     new = await observed("new", 7)
-    with IdleGames() as games:
+    with closing(IdleGames()) as games:
         other = await observed("other", 8, games)
         again = await observed("again", 7, games)
     assert new == again

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.errors import GameError
-from khala_bridge.game.processes import Launched, explained
+from khala_bridge.game.processes import explained, new_process
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,9 +52,7 @@ def started(sc2path: Path, environment: dict[str, str] | None = None) -> Iterato
         GameError: it could not be started.
     """
     with explained("the game could not be started"):
-        process = Launched(sc2path, environment).take(sc2path)
-    if process is None:
-        raise GameError("the game could not be started: it ended before it listened")
+        process = new_process(sc2path, environment)
     try:
         yield ProcessConnection(process.controller._client)  # noqa: SLF001  # its own methods check a status of their own
     finally:

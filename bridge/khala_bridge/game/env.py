@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from absl import flags
 
 from khala_bridge.compat import maps, sc2_env
-from khala_bridge.errors import GameError
-from khala_bridge.game.processes import Launched, environment_of, explained, pointed_to, settle_flags
+from khala_bridge.game.processes import environment_of, explained, new_process, pointed_to, settle_flags
 
 if TYPE_CHECKING:
     from khala_bridge.game.game import GameConfig
@@ -53,9 +52,7 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
             super()._launch_game()
             return
         process = self._processes and self._processes.take(self._config.sc2path)
-        process = process or Launched(self._config.sc2path, self._config.environment).take(self._config.sc2path)
-        if process is None:
-            raise GameError("the game could not be started: it ended before it listened")
+        process = process or new_process(self._config.sc2path, self._config.environment)
         self._is_alone = True
         self._ports: list[int] = []
         self._sc2_procs = [process]

@@ -10,7 +10,7 @@ import contextlib
 import os
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol
 
 from absl import flags
 
@@ -21,7 +21,6 @@ from khala_bridge.game.game import check_install
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-    from types import TracebackType
 
 _environment = threading.RLock()
 _LISTENS_AFTER_S = 0.2
@@ -93,7 +92,7 @@ class Launched:
 
 
 class IdleGames:
-    """Keeps processes of the game from one match to the next; a context manager that ends them.
+    """Keeps processes of the game from one match to the next.
 
     A new match of 2s3z sees its first observation after 0.06 s in a process that is there, and after 0.6 s in a new
     one; the game is the same (`tests/khala/test_one_process.py`). Threads may share it.
@@ -105,14 +104,6 @@ class IdleGames:
         self._idle: list[tuple[Path, Any]] = []
         self._lock = threading.Lock()
         self._closed = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def take(self, sc2path: Path) -> Any:
         """See `Processes`; the one that has waited least."""
@@ -139,10 +130,6 @@ class IdleGames:
                 self._idle.append((sc2path, process))
             return has_room
 
-    @property
-    def _has_room(self) -> bool:
-        return not self._closed and len(self._idle) < self._most
-
     def began(self) -> None:
         """Do nothing: what was not taken waits for another match."""
 
@@ -152,6 +139,23 @@ class IdleGames:
             idle, self._idle, self._closed = self._idle, [], True
         for _, process in idle:
             process.close()
+
+    @property
+    def _has_room(self) -> bool:
+        return not self._closed and len(self._idle) < self._most
+
+
+def new_process(sc2path: Path, environment: dict[str, str] | None = None) -> Any:
+    """Return a process of an install that was started just now, connected; its taker ends it.
+
+    Raises:
+        GameMissing: there is no game.
+        GameError: it could not be started.
+    """
+    process = Launched(sc2path, environment).take(sc2path)
+    if process is None:
+        raise GameError("the game could not be started: it ended before it listened")
+    return process
 
 
 def environment_of(run_config: Any, environment: dict[str, str] | None) -> dict[str, str] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -45,7 +46,7 @@ def test_what_cannot_be_played_on_is_left_to_its_taker(process: Process) -> None
 
 def test_no_more_wait_than_there_is_room_for_and_none_after_the_end() -> None:
     waits = Process()
-    with IdleGames(most=1) as games:
+    with closing(IdleGames(most=1)) as games:
         assert games.keep(waits, SC2)
         assert not games.keep(Process(), SC2)
     assert waits.closed
