@@ -31,6 +31,7 @@ class InspectClient:
         self.model = str(model)
         self.endpoint = "inspect_ai"
         self.params: Mapping[str, Scalar] = {}
+        self.answer_tokens: int | None = None
 
     async def complete(self, request: Request) -> Completion:
         """Return the model's words. Errors are inspect_ai's, and end the sample."""

@@ -182,6 +182,7 @@ class ListedModel:
 
     model, endpoint = "listed", "http://listed/v1"
     params: Mapping[str, str | int | float | bool | None] = {}
+    answer_tokens: int | None = None
 
     def __init__(self, *entries: str | LLMError | float) -> None:
         self.entries = list(entries)

@@ -38,6 +38,7 @@ class Unsteady:
 
     model, endpoint = "unsteady", "http://unsteady/v1"
     params: Mapping[str, str | int | float | bool | None] = {}
+    answer_tokens: int | None = None
 
     def __init__(self) -> None:
         self.state = "up"

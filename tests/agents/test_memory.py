@@ -105,6 +105,7 @@ class Model:
 
     model, endpoint = "listed", "http://listed/v1"
     params: Mapping[str, str | int | float | bool | None] = {}
+    answer_tokens: int | None = None
 
     def __init__(self, summary_s: float = 0.0, fails: LLMError | None = None) -> None:
         self._summary_s, self._fails = summary_s, fails

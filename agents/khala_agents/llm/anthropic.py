@@ -54,6 +54,7 @@ class Anthropic:
             asked["temperature"] = temperature
         asked.update(extra or {})
         self.model = model
+        self.answer_tokens: int | None = max_tokens
         self.params: Mapping[str, Scalar] = {k: v for k, v in asked.items() if not isinstance(v, dict | list)}
         self._http = HttpEndpoint(
             base_url, headers={"anthropic-version": API_VERSION}, key_header=("x-api-key", ""), key=key

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, TypeAlias
 
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import ChatMessage, Usage
@@ -32,6 +32,14 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Purpose
 
 Scalar = str | int | float | bool | None
+
+Verdict: TypeAlias = Literal["ok", "empty", "cut", "refused", "filtered"]
+"""Whether a completion has words to play. If not: the model said nothing, it reached its limit of tokens before it said
+anything, it declined, or a filter of the endpoint took the answer away."""
+
+UNBILLED = frozenset({"http 409", "http 429", "http 529"})
+"""Statuses of an endpoint that turned a request away before a model read it. Any other 5xx may come from a gateway, and
+the model behind it goes on writing."""
 
 LONGEST_NAME = 100
 """Characters that are kept of the name by which an endpoint calls its model."""
@@ -77,12 +85,16 @@ class Completion:
         usage: tokens and price; `unknown_requests=1` if the endpoint did not say.
         finish: why it stopped, in the endpoint's words: `stop`, `length`, …
         model: which model answered, in the endpoint's words; "" if it did not say.
+        verdict: whether it has words to play.
+        reason: why it has none, in one line for people; "" if it has.
     """
 
     text: str
     usage: Usage = field(default_factory=lambda: Usage(requests=1, unknown_requests=1))
     finish: str = "stop"
     model: str = ""
+    verdict: Verdict = "ok"
+    reason: str = ""
 
 
 def model_name(said: object) -> str:
@@ -97,11 +109,13 @@ class LLMClient(Protocol):
         model: its name, as the endpoint calls it.
         endpoint: base URL without credentials or query.
         params: other parameters of the request, as recorded.
+        answer_tokens: the limit of generated tokens that the next request carries; None for no limit.
     """
 
     model: str
     endpoint: str
     params: Mapping[str, Scalar]
+    answer_tokens: int | None
 
     async def complete(self, request: Request) -> Completion:
         """Make one try.
@@ -134,11 +148,11 @@ class LLMError(KhalaError):
     Attributes:
         status: as in `ModelCall.status`: `http 429`, `timeout`, `connection`, …
         retryable: whether the same request may succeed a little later.
-        may_be_billed: whether an answer may have been generated; False if the endpoint refused the request.
+        may_be_billed: whether an answer may have been generated; False if it is known that none was.
     """
 
     retryable: ClassVar[bool] = False
-    may_be_billed: ClassVar[bool] = True
+    may_be_billed: bool = True
 
     def __init__(self, message: str, *, status: str) -> None:
         self.status = status
@@ -169,19 +183,25 @@ class EndpointUnavailable(LLMError):
     """
 
     retryable = True
-    may_be_billed = False
 
     def __init__(self, message: str, *, status: str, retry_after_s: float | None = None) -> None:
         self.retry_after_s = retry_after_s
+        self.may_be_billed = status not in UNBILLED
         super().__init__(message, status=status)
 
 
 class Unreachable(LLMError):
-    """There is no connection, or it broke before the answer was complete."""
+    """There is no connection, or it broke before the answer was complete.
+
+    Args:
+        message: what happened.
+        sent: whether the request may have arrived, and an answer may have been generated.
+    """
 
     retryable = True
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, *, sent: bool = True) -> None:
+        self.may_be_billed = sent
         super().__init__(message, status="connection")
 
 

@@ -66,6 +66,7 @@ class OpenAICompatible:
         fields: dict[str, JsonValue] = {name: value for name, value in asked.items() if value is not None}
         fields.update(extra or {})
         self.model = model
+        self.answer_tokens = max_tokens
         self.params: Mapping[str, Scalar] = {k: v for k, v in fields.items() if not isinstance(v, dict | list)}
         self._http = HttpEndpoint(base_url, key=key)
         self.endpoint = self._http.address

@@ -7,7 +7,7 @@ request that was cut off by the deadline fails at once, so that the agent falls 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from khala_agents.llm.client import (
     Completion,
@@ -32,7 +32,7 @@ Key = tuple[str, int, int, str, int]
 class NotRecorded(LLMError):
     """The recording has no such request, or one with another prompt."""
 
-    may_be_billed: ClassVar[bool] = False
+    may_be_billed = False
 
     def __init__(self, message: str) -> None:
         super().__init__(message, status="replay")
@@ -49,6 +49,7 @@ class ReplayClient:
         self.model = first.model if first else "replay"
         self.endpoint = first.endpoint if first else "recording"
         self.params: Mapping[str, Scalar] = dict(first.params) if first else {}
+        self.answer_tokens: int | None = None
 
     async def complete(self, request: Request) -> Completion:
         """Return the recorded completion, or raise the recorded failure.
@@ -98,7 +99,7 @@ class _Final(LLMError):
 
 
 class _FinalUnbilled(_Final):
-    may_be_billed: ClassVar[bool] = False
+    may_be_billed = False
 
 
 def _passing(exchange: ModelCall) -> LLMError:

@@ -28,6 +28,7 @@ from khala_protocol.messages.from_agents import (
     ModelCall,
     Purpose,
     Reply,
+    ReplyStatus,
 )
 from khala_protocol.messages.to_agents import (
     AgentKind,
@@ -171,6 +172,7 @@ __all__ = [
     "Rejection",
     "RejectionReason",
     "Reply",
+    "ReplyStatus",
     "Report",
     "ResourceMark",
     "Resources",

@@ -11,13 +11,26 @@ from khala_protocol.messages.to_agents import ImageRef
 from khala_protocol.messages.usage import Pace, Usage
 
 MAX_DETAIL_CHARACTERS = 200
-"""Longest reason for a fallback."""
+"""Longest reason why an agent did not decide."""
 
 MAX_REPLY_CHARACTERS = 65_536
 """The part of a reply that is read. Ordinary ones have at most some 10 000; a model that repeats itself goes on."""
 
 MAX_ADVICE_CHARACTERS = 500
 """Longest message of an adviser."""
+
+ReplyStatus = Literal[
+    "ok",  # the agent decided
+    "empty",  # its model answered without a word
+    "cut",  # its model reached the limit of tokens before it said anything
+    "refused",  # its model declined to answer
+    "filtered",  # a filter of the endpoint took the answer away
+    "malformed",  # its endpoint answered with no completion
+    "failed",  # its endpoint or its policy failed
+    "late",  # it did not decide in time
+    "fallback",  # another policy decided in its place
+]
+"""Who decided; with any status but `ok` and `fallback`, nobody did, and the default reply of the task is played."""
 
 Purpose = Literal["decision", "summary"]
 """What a model is asked for: a reply to an observation, or a summary of the steps so far (`MemoryRule.summary`)."""
@@ -47,9 +60,11 @@ class Reply(Wire):
     step: Count
     text: str
     """The reply as the model gave it. The host reads from it the agent's orders, messages and subscriptions."""
-    status: Literal["ok", "fallback"] = "ok"
+    status: ReplyStatus = "ok"
     detail: str = Field(default="", max_length=MAX_DETAIL_CHARACTERS)
-    """Reason for a fallback: `timeout`, `http 500`, `budget`, …"""
+    """Why the agent did not decide: `timeout`, `http 500`, `budget`, …, and the endpoint's own words."""
+    hopeless: bool = False
+    """Whether the agent's endpoint refuses it for good: its key or its model is wrong."""
     latency_s: float = 0.0
     """From the arrival of the observation to this reply."""
     attempts: Count = 0

@@ -15,11 +15,16 @@ Ending = Literal["win", "draw", "loss", "aborted"]
 """How an episode ended for one side; `aborted` if the host ended it, because it could not be played as it should be."""
 
 AgentStatus = Literal[
-    "ok",  # a reply of the policy, in time
-    "fallback",  # the policy failed (see `Reply.detail`) and said nothing: the task's default reply counts
+    "ok",  # the agent decided, in time
+    "empty",  # its model answered without a word
+    "cut",  # its model reached the limit of tokens before it said anything
+    "refused",  # its model declined to answer
+    "filtered",  # a filter of the endpoint took the answer away
+    "malformed",  # its endpoint answered with no completion, or the agent sent no valid reply
+    "failed",  # its endpoint or its policy failed
     "late",  # nothing arrived before the deadline
+    "fallback",  # another policy decided in its place
     "gone",  # its liveliness token went away while the host was waiting
-    "malformed",  # something arrived that is not a valid reply
 ]
 
 Fate = Literal[

@@ -1,0 +1,10 @@
+"""All rows, in the order in which they are played."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from bench.doors.rows import Row
+
+ROWS: Final[tuple[Row, ...]] = (*(),)
