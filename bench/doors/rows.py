@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Callable, Coroutine
     from pathlib import Path
 
 Kind: TypeAlias = Literal["attack", "quirk", "fault"]
@@ -26,5 +26,5 @@ class Row:
 
     door: str
     what: str
-    play: Callable[[Path], Awaitable[str]]
+    play: Callable[[Path], Coroutine[Any, Any, str]]
     kind: Kind = "attack"
