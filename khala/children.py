@@ -54,6 +54,7 @@ async def spawn(arguments: Sequence[str], environ: Mapping[str, str], log: Path)
     with log.open("ab") as stderr:
         return await asyncio.create_subprocess_exec(
             sys.executable,
+            "-P",  # with no module of the current directory on its path
             "-m",
             "khala",
             *arguments,
@@ -90,10 +91,6 @@ class Children:
             environ: its environment; None for one without keys.
         """
         await self._add(name, arguments, environ).start()
-
-    def start_again_with(self, name: str, *arguments: str) -> None:
-        """Have a child that fails started again with other arguments, such as what is left of a budget."""
-        self._children[name].arguments = arguments
 
     async def keep(self, begun: asyncio.Event) -> None:
         """Start a child again that fails once `begun` is set; return when all have ended without an error.

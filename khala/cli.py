@@ -61,6 +61,7 @@ from khala.options import (
 )
 from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
 from khala.view.cli import VIEW_EPILOG, view
+from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_protocol.commandline import run_command
 from khala_protocol.keys import check_name
@@ -117,6 +118,7 @@ def run(
     budget_usd: BudgetUsd = None,
     latency: Latency = 0.2,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     opponent: Opponent = None,
     seed: Seed = None,
     episodes: Episodes = None,
@@ -171,6 +173,7 @@ def host(
     tls: Tls = None,
     insecure: Insecure = False,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     opponent: Opponent = None,
     seed: Seed = None,
     episodes: Episodes = None,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import signal
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -23,6 +24,7 @@ from khala_orchestrator.console import Progress, stderr_console
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import cancelled_by_signal
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator, Sequence
@@ -64,9 +66,24 @@ def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json:
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    if reasons := list(why_not_valid(results)):
-        screen.print(Text.assemble(("not valid:", "bold red"), f" {'; '.join(reasons)}"), soft_wrap=True)
+    reasons, idle = list(why_not_valid(results)), without_orders(results)
+    said = f"no order of {', '.join(idle)} was carried out" if idle else ""
+    if reasons:
+        words = visible_line("; ".join([*reasons, *filter(None, [said])]))
+        screen.print(Text.assemble(("not valid:", "bold red"), f" {words}"), soft_wrap=True)
         raise typer.Exit(NOT_VALID)
+    if said:
+        screen.print(Text(said, "yellow"), soft_wrap=True)
+
+
+def without_orders(results: Sequence[Result]) -> list[str]:
+    """Return the agents that were asked, and none of whose orders was carried out in any whole episode."""
+    sides = {result.side for result in results}
+    orders: Counter[str] = Counter()
+    for result in results:
+        for name in result.statuses if result.outcome != "aborted" else ():
+            orders[name if len(sides) == 1 else f"{result.side}/{name}"] += result.accepted_of.get(name, 0)
+    return [name for name, count in orders.items() if not count]
 
 
 def why_not_valid(results: Sequence[Result]) -> Iterator[str]:

@@ -19,8 +19,8 @@ from khala import games
 from khala.children import Children, Spawn, spawn
 from khala.hosting import hosted
 from khala.local_bus import local_endpoint
-from khala.minds import groups_of, scripted_endpoint, spent_usd
-from khala_orchestrator.roster import Seat
+from khala.minds import groups_of, scripted_endpoint
+from khala.spending import ledger_of
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.minds import Minds
+    from khala_agents.llm.money import Ledger
     from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.resume import Unfinished
-    from khala_protocol.bus.zenoh import ZenohBus
     from khala_protocol.messages import Result, Wire
 
 log = logging.getLogger(__name__)
@@ -94,17 +94,18 @@ async def play(
         bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
         base_url = await scripted_endpoint(stack, groups_of(config.task, minds))
+        ledger = stack.enter_context(ledger_of(config.record or directory / "recording", past))
+        if past is not None and (before := spent_before(ledger, minds)):
+            log.warning("%s", before)
+        common = ["--run", config.run, "--connect", bus.endpoints[0], "--ledger", str(ledger.path)]
         children = await stack.enter_async_context(Children(directory, supplies.spawn))
-        spent = spent_usd(past.recording) if past else {}
-        started = await _start_agents(children, config, minds, bus, spent, base_url)
+        for share in _shares_of(list(groups_of(config.task, minds)), common, base_url):
+            await children.start(share.process, *share.arguments, environ=share.environ)
         begun = asyncio.Event()
 
         def see(message: Wire) -> None:
             if isinstance(message, Report):
                 begun.set()
-                for share in started:
-                    share.spend(message)
-                    children.start_again_with(share.process, *share.arguments)
             watch(message)
 
         match = hosted(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
@@ -133,64 +134,43 @@ def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[s
     return [list(agents[first::processes]) for first in range(min(processes, len(agents)))]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Share:
-    """The agents of one process, and what they may still spend, also after the process was started again."""
+    """The agents of one process."""
 
     process: str
     side: str
     names: list[str]
     options: list[str]
     environ: dict[str, str]
-    left_usd: float | None
+    budget_usd: float | None
+    """What all agents of the side may spend."""
 
     @property
     def arguments(self) -> list[str]:
         """The command line of the process."""
-        budget = [] if self.left_usd is None else ["--budget-usd", str(max(self.left_usd, 0.0))]
+        budget = [] if self.budget_usd is None else ["--budget-usd", str(self.budget_usd)]
         return ["agent", *self.names, "--side", self.side, *self.options, *budget]
 
-    def spend(self, report: Report) -> None:
-        """Take off what a step has cost."""
-        if self.left_usd is not None and report.side == self.side:
-            self.left_usd -= sum(a.usage.cost_usd or 0.0 for a in report.agents if a.agent in self.names)
 
-
-async def _start_agents(
-    children: Children,
-    config: MatchConfig,
-    minds: Mapping[str, Minds],
-    bus: ZenohBus,
-    spent: Mapping[Seat, float],
-    base_url: str | None,
-) -> list[_Share]:
-    groups = list(groups_of(config.task, minds))
-    joined = ["--run", config.run, "--connect", bus.endpoints[0]]
-    started = list(_shares_of(groups, joined, base_url))
-    if any(spent.values()):
-        log.warning("%s", _taken_off(started, spent))
-    for share in started:
-        await children.start(share.process, *share.arguments, environ=share.environ)
-    return started
-
-
-def _taken_off(started: Sequence[_Share], spent: Mapping[Seat, float]) -> str:
-    """Take off what the agents had spent before the match was resumed, and return a sentence that says so."""
-    before, poor = f"{sum(spent.values()):.4f} USD were spent before", []
-    for share in started:
-        if share.left_usd is None:
-            return f"{before}, and nothing limits what is spent from here: --budget-usd does"
-        share.left_usd -= sum(spent.get(Seat(share.side, name), 0.0) for name in share.names)
-        if share.left_usd <= 0:
-            poor += share.names
-    left = f"{before}, {sum(max(share.left_usd or 0.0, 0.0) for share in started):.4f} of the budget are left"
-    return f"{left}; nothing for {', '.join(poor)}, so each of their steps is a fallback" if poor else left
+def spent_before(ledger: Ledger, minds: Mapping[str, Minds]) -> str:
+    """Return a sentence on what a match that is resumed has spent, and may still spend; "" if it has spent nothing."""
+    if not (before_usd := ledger.booked_usd()):
+        return ""
+    said = f"{before_usd:.4f} USD were spent before"
+    limits = {side: mind.budget_usd for side, mind in minds.items() if mind.budget_usd is not None}
+    if not limits:
+        return f"{said}, and nothing limits what is spent from here: --budget-usd does"
+    left = {side: max(limit - ledger.booked_usd(side), 0.0) for side, limit in limits.items()}
+    said += f", {sum(left.values()):.4f} of the budget are left"
+    poor = [side for side, usd in left.items() if not usd]
+    return f"{said}; nothing for side {', '.join(poor)}, so that its models are not asked" if poor else said
 
 
 def _shares_of(
     groups: Sequence[tuple[str, Minds, list[str]]], joined: list[str], base_url: str | None
 ) -> Iterator[_Share]:
-    """Yield the processes: agents that decide alike share some, and all of a side may spend the same part."""
+    """Yield the processes: agents that decide alike share some, and all of a side spend from one budget."""
     sides = Counter(side for side, _, _ in groups)
     for side, count in sides.items():
         each = max(1, MAX_PROCESSES // len(sides) // count)
@@ -202,8 +182,7 @@ def _shares_of(
         ]
         for number, (mind, names) in enumerate(parts):
             process = f"agents-{number}" if len(sides) == 1 else f"agents-{side}-{number}"
-            each_usd = None if mind.budget_usd is None else mind.budget_usd / len(parts)
-            yield _Share(process, side, names, [*joined, *mind.options(base_url)], mind.environ, each_usd)
+            yield _Share(process, side, names, [*joined, *mind.options(base_url)], mind.environ, mind.budget_usd)
 
 
 async def _unless_one_dies(

@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import itertools
 import os
+import shlex
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from khala_bridge.observe import Observer
+from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
 from khala_orchestrator.resume import unfinished
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
 from khala_protocol.recording import Recording
+from khala_protocol.trust import check_trusted, trust
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -101,6 +104,9 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
     """Return the match that the options describe; its recording is in its own directory below `out`."""
     match = {name: value for name in ("seed", "episodes", "assemble_s") if (value := given.pop(name)) is not None}
     loaded = change(load_task(task), **given)
+    if given.get("opponent"):
+        trust(shlex.join(loaded.opponent.command))  # the user has named it
+    check_trusted(code_of(loaded), source=task)
     Observer(loaded)  # report an unknown section before a game is started
     name = check_name(run or new_run_name(loaded.name), "run")
     try:

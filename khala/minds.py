@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import os
-from collections import defaultdict
 from collections.abc import Mapping  # noqa: TC003  # pydantic evaluates it, in `khala.service`
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -14,11 +13,12 @@ from typing import TYPE_CHECKING
 from khala import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model
-from khala_agents.llm.limits import Budget, own_turns
+from khala_agents.llm.limits import own_turns
+from khala_agents.llm.money import Budget
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
-from khala_protocol.messages import ModelCall, Report
+from khala_protocol.trust import module_of, trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.recording import Recording
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -77,6 +76,10 @@ class Minds:
             return replace(self, model=text, model_name=None, base_url=None, policy=None)
         model, _, name = text.partition("/")
         return replace(self, model=model, model_name=name or None, base_url=None, policy=None)
+
+    def code(self) -> Iterator[str]:
+        """Yield the modules of policies that it names; those of single agents are in groups of their own."""
+        yield from filter(None, (module_of(name) for name in (self.policy, self.fallback) if name))
 
     def check(self) -> None:
         """Check that an agent could decide this way, before anything is started.
@@ -175,6 +178,11 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     return {side: fair.named(named[side]) if side in named else fair for side in sides}
 
 
+def trust_options(common: Minds, sides: Mapping[str, str]) -> None:
+    """Trust the code that the user has named in options: of all sides, and of single ones or of single agents."""
+    trust_named(common.policy, common.fallback, *common.agents.values(), *sides.values())
+
+
 def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
     """Return by side what `NAME=MODEL` says of it, and what `others` say of sides that they name.
 
@@ -188,21 +196,3 @@ def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
                 f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
             )
     return {name: text for name, _, text in split} | {name: text for name, text in others.items() if text}
-
-
-def spent_usd(recording: Recording) -> dict[Seat, float]:
-    """Return what each agent has paid for its model in a recorded match; in a fork, since it was forked.
-
-    A call whose answer came too late is in no report, and one that the recording left out is in no exchange: the larger
-    of the two sums counts.
-    """
-    first = recording.run.forked.step if recording.run and recording.run.forked else 0
-    calls, reports = defaultdict[Seat, float](float), defaultdict[Seat, float](float)
-    for call in recording.of(ModelCall):
-        if call.step >= first:
-            calls[Seat(call.side, call.agent)] += call.usage.cost_usd or 0.0
-    for report in recording.of(Report):
-        for agent in report.agents:
-            if (report.step if agent.asked_step is None else agent.asked_step) >= first:
-                reports[Seat(agent.side, agent.agent)] += agent.usage.cost_usd or 0.0
-    return {seat: max(calls[seat], reports[seat]) for seat in {**calls, **reports}}

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 from khala import games
 from khala.hosting import hosted
 from khala.minds import groups_of, scripted_endpoint
-from khala_agents.llm.limits import Budget, own_turns
+from khala.spending import ledger_of
+from khala_agents.llm.limits import own_turns
+from khala_agents.llm.money import Budget, Ledger
 from khala_agents.worker import run_workers
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus.memory import MemoryBroker
@@ -67,7 +69,8 @@ async def play(
     config = config.model_copy(update={"game": name})
     broker, stop = broker or MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
-        by_side = await _policies(config, minds, stack, gates, callers)
+        ledger = stack.enter_context(ledger_of(config.record, past) if config.record else Ledger())
+        by_side = await _policies(config, minds, ledger, stack, gates, callers)
         if past is not None:
             _remind(by_side, past)
         agents = [
@@ -85,6 +88,7 @@ async def play(
 async def _policies(
     config: MatchConfig,
     minds: Mapping[str, Minds],
+    ledger: Ledger,
     stack: contextlib.AsyncExitStack,
     gates: Gates,
     callers: Mapping[Seat, Policy],
@@ -92,7 +96,10 @@ async def _policies(
     """Return the policies of all agents, by side; start the scripted endpoint if one asks it."""
     groups = list(groups_of(config.task, minds, taken=callers))
     base_url = await scripted_endpoint(stack, groups)
-    budgets = {side: Budget(mind.budget_usd, source="the budget of the match") for side, mind in minds.items()}
+    budgets = {
+        side: Budget(mind.budget_usd, ledger=ledger, account=side, source=f"the budget of side {side}")
+        for side, mind in minds.items()
+    }
     made: dict[str, dict[str, Policy]] = {side.side: {} for side in config.task.per_side()}
     for seat, policy in callers.items():
         made[seat.side][seat.agent] = policy

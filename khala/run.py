@@ -66,17 +66,20 @@ async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
         with _game_for(wanted) as launched:
             from khala.local import Supplies, play  # noqa: PLC0415  # a second, in which the others import as well
             from khala.matches import new_or_resumed  # noqa: PLC0415
-            from khala.minds import Minds, minds_of, named_sides  # noqa: PLC0415
+            from khala.minds import Minds, minds_of, named_sides, trust_options  # noqa: PLC0415
             from khala_orchestrator.console import Progress, stderr_console  # noqa: PLC0415
 
             config, past = new_or_resumed(wanted.task, wanted.resume, wanted.run, wanted.out, **wanted.match)
             named = named_sides(wanted.side_model, **wanted.sides)
-            minds = minds_of([side.side for side in config.task.per_side()], Minds(**wanted.minds), named)
+            common = Minds(**wanted.minds)
+            trust_options(common, named)
+            minds = minds_of([side.side for side in config.task.per_side()], common, named)
             known.append(config)
             supplies = Supplies(spawn=stock, processes=launched)
-            with Progress(stderr_console(), config.task.max_steps) as progress:
+            logs = wanted.out / config.run
+            with Progress(stderr_console(), config.task.max_steps, logs) as progress:
                 return await play(
-                    config, minds, wanted.out / config.run, game=wanted.game, watch=progress, past=past,
+                    config, minds, logs, game=wanted.game, watch=progress, past=past,
                     supplies=supplies,
                 )  # fmt: skip
 

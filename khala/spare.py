@@ -79,6 +79,7 @@ class Spares:
 async def _started() -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable,
+        "-P",  # with no module of the current directory on its path
         "-m",
         "khala.spare",
         stdin=subprocess.PIPE,

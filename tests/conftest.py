@@ -46,6 +46,12 @@ def _freeze() -> None:
     gc.freeze()
 
 
+@pytest.fixture(autouse=True)
+def nothing_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trust no code, and forget what a test trusts."""
+    monkeypatch.setenv("KHALA_TRUST", "")
+
+
 @pytest.fixture
 def own_sections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forget the sections of observations that a test registers."""

@@ -6,12 +6,9 @@ agents share the budget. Each agent has its own client, and so its own connectio
 
 from __future__ import annotations
 
-import importlib
 import logging
 import os
-import sys
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -21,8 +18,10 @@ from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
-from khala_agents.llm.limits import Budget, Limits, own_turns
+from khala_agents.llm.limits import LONGEST_ANSWER, Limits, own_turns
+from khala_agents.llm.money import Budget
 from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import Prices, check_priced, price_of
 from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.replay import ReplayClient
 from khala_agents.llm.retry import RetryRule
@@ -33,6 +32,7 @@ from khala_agents.scripted.players import PLAYERS
 from khala_agents.scripted.policies import Player, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import import_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -90,8 +90,7 @@ class Workshop:
     """The maker of the policies of one process.
 
     Args:
-        budget_usd: what all agents of the process may spend together.
-        budget: shared with other workshops, instead of one for `budget_usd`.
+        budget: what all agents of the process may spend together.
         overrides: fields given on the command line; they replace those of every model file.
         gates: where requests wait for their turn, if not with those of this process alone.
     """
@@ -99,12 +98,11 @@ class Workshop:
     def __init__(
         self,
         *,
-        budget_usd: float | None = None,
-        overrides: Mapping[str, str | float | None] | None = None,
         budget: Budget | None = None,
+        overrides: Mapping[str, str | float | None] | None = None,
         gates: Gates = own_turns,
     ) -> None:
-        self._budget = budget or Budget(budget_usd, source="the budget of this process")
+        self._budget = budget or Budget(None)
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._gates = gates
         self._models: dict[str, tuple[ModelConfig, Limits]] = {}
@@ -134,14 +132,16 @@ class Workshop:
 
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
         if name not in self._models:
-            config = _changed(_located(load_model(name)), self._overrides, source="command line")
-            if self._budget.limit_usd is not None and not config.prices.known:
-                raise ConfigError("a budget needs the prices of the model, and there are none", source=name)
+            file = load_model(name)
+            config = _changed(_located(file), self._overrides, source="command line")
+            config = config.model_copy(update={"prices": _prices(config, file)})
+            if self._budget.limit_usd is not None:
+                check_priced(config.prices, config.model, config.base_url)
+                config = config.model_copy(update={"max_tokens": config.max_tokens or LONGEST_ANSWER})
             limits = Limits(
                 gate=self._gates(f"{config.model} at {config.base_url}", config.limits, f"model file {name}"),
                 prices=config.prices,
                 budget=self._budget,
-                max_tokens=config.max_tokens,
             )
             self._models[name] = config, limits
         return self._models[name]
@@ -152,6 +152,12 @@ def _located(config: ModelConfig) -> ModelConfig:
     variable = config.base_url_env
     address = os.environ.get(variable) if variable else None
     return _changed(config, {"base_url": address}, source=variable) if address else config
+
+
+def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
+    """Return the prices of a model: those of its file if it is the model of the file, or else the list price."""
+    is_of_the_file = config.model == file.model or config.profile == "scripted"  # all of whose players are free
+    return config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
 
 
 def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
@@ -192,7 +198,7 @@ def load_policy(name: str) -> Policy:
     Modules are also looked for in the current directory.
 
     Raises:
-        ConfigError: there is no such policy, or importing it failed.
+        ConfigError: there is no such policy, its module is not trusted, or importing it failed.
     """
     if name == "silent":
         return Silent()
@@ -217,16 +223,9 @@ def load_attribute(module_name: str, attribute: str, *, source: str) -> Any:
         source: for errors, what wants it.
 
     Raises:
-        ConfigError: there is no such module or name, or importing it failed.
+        ConfigError: there is no such module or name, it is not trusted, or importing it failed.
     """
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        raise ConfigError(f"there is no module '{error.name}'", source=source) from None
-    except Exception as error:  # an import runs the user's code, which may raise anything
-        raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=source) from error
+    module = import_trusted(module_name, source=source)
     found = getattr(module, attribute, None)
     if found is None:
         raise ConfigError(f"the module {module_name} has no '{attribute}'", source=source)

@@ -13,8 +13,17 @@ from typing import Annotated
 import typer
 
 from khala_protocol.commandline import run_command
+from khala_protocol.trust import trust_files
 
 DEFAULT_LLM_PORT = 8765
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        callback=trust_files,
+        help="Let files name code that runs here: policies, sections of observations, commands of guests.",
+    ),
+]
 
 AGENT_EPILOG = """
 Examples:\n
@@ -83,7 +92,16 @@ def agent(
     ] = None,
     budget_usd: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Limit of this process in US dollars; beyond it, its agents do nothing."),
+        typer.Option(min=0.0, help="Limit of these agents in US dollars; no request is made that could exceed it."),
+    ] = None,
+    ledger: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="KHALA_LEDGER",
+            help="File of what was spent, for processes that share a budget, or are started again.",
+            show_default="in memory",
+            metavar="FILE",
+        ),
     ] = None,
     fallback: Annotated[
         str | None,
@@ -92,6 +110,7 @@ def agent(
             metavar="NAME",
         ),
     ] = None,
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
     """Play one or more agents of a run.
@@ -109,6 +128,7 @@ def agent(
         side,
         commands.Place(connect or [], tls, insecure=insecure),
         budget_usd=budget_usd,
+        ledger=ledger,
         overrides={"base_url": base_url, "model": model_name},
         as_json=as_json,
     )

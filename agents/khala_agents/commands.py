@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 from khala_agents.build import Workshop
 from khala_agents.config import AgentsFile, WorkerSpec, load_agents
+from khala_agents.llm.money import Budget, Ledger
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.scripted.faults import Faults, parse_faults
 from khala_agents.scripted.players import PLAYERS
@@ -31,6 +32,7 @@ from khala_protocol.garbage import tidy_memory
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, check_name
 from khala_protocol.signals import stop_on_signal
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
@@ -87,14 +89,16 @@ def play(
     place: Place,
     *,
     budget_usd: float | None,
+    ledger: Path | None,
     overrides: Mapping[str, str | float | None],
     as_json: bool,
 ) -> None:
     """Play the agents of a file until the run is over or a signal arrives, and print what they did."""
-    budget = budget_usd if budget_usd is not None else file.budget_usd
-    workshop = Workshop(budget_usd=budget, overrides=overrides)
     check_name(run, "run")
     check_name(side, "side")
+    limit_usd = budget_usd if budget_usd is not None else file.budget_usd
+    budget = Budget(limit_usd, ledger=Ledger(ledger), account=side, source=f"the budget of side {side}")
+    workshop = Workshop(budget=budget, overrides=overrides)
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     links = place.links(side, policies)
     tallies = _until_signal(lambda stop: _play(links, run, side, policies, stop))
@@ -150,6 +154,7 @@ def specs(
         raise ConfigError("an agent decides with a model or with a policy: give --model or --policy, not both")
     if policy and fallback:
         raise ConfigError("--fallback is for agents with a model: leave it out, or --policy")
+    trust_named(policy, fallback)
     default = _with_model(model or "scripted", memory, fallback)
     spec = WorkerSpec(policy=policy) if policy else default
     return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
@@ -229,9 +234,9 @@ async def _check(policies: Iterable[Policy]) -> None:
 
 
 def _sentence(name: str, tally: WorkerTally) -> str:
-    fallbacks = ", ".join(f"{count} {why}" for why, count in tally.fallbacks.most_common())
-    text = f"{name}: {tally.replies['ok']} replies, {tally.replies['fallback']} fallbacks"
-    text += f" ({fallbacks})" if fallbacks else ""
+    causes = ", ".join(f"{count} {why}" for why, count in tally.undecided.most_common())
+    text = f"{name}: {tally.replies['ok']} decisions"
+    text += f", {tally.undecided.total()} not its own ({causes})" if causes else ""
     if tally.usage.requests:
         text += f", {tally.usage.prompt_tokens} + {tally.usage.completion_tokens} tokens, {_price(tally.usage)}"
     return f"{text}; ended: {tally.ended}"
@@ -244,7 +249,7 @@ def _price(usage: Usage) -> str:
 def _plain(tally: WorkerTally) -> dict[str, Any]:
     return {
         "replies": dict(tally.replies),
-        "fallbacks": dict(tally.fallbacks),
+        "undecided": dict(tally.undecided),
         "superseded": tally.superseded,
         "usage": tally.usage.model_dump(),
         "ended": tally.ended,

@@ -1,7 +1,8 @@
 """A policy that decides where a model cannot: its endpoint is away, its money is used up, its answer is late.
 
 The reply is marked `fallback`, with the reason and the name of the policy (`endpoint away: skilled`), so that a result
-says for how many steps no model played. Above it is `khala_agents.build`; below it are two policies of any kind.
+says in how many steps the model did not decide. Above it is `khala_agents.build`; below it are two policies of any
+kind.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import dataclasses
 import logging
 from typing import TYPE_CHECKING
 
+from khala_agents.guard import without_model
 from khala_agents.llm.client import LLMError, OutOfMoney
 from khala_agents.policy import Decision, Policy
 
@@ -63,15 +65,26 @@ class Fallback(Policy):
         hurried = dataclasses.replace(context, reserve_s=_reserve_s(context.time_s))
         try:
             async with asyncio.timeout_at(hurried.deadline):
-                return await self.model.decide(hurried)
+                said = await self.model.decide(hurried)
+            failure = said if isinstance(said, Decision) else Decision(said)
+            if failure.status == "ok":
+                return said
         except TimeoutError:
-            why = "timeout"
+            failure = Decision("", "late", "timeout")
         except LLMError as error:
-            why = "budget" if isinstance(error, OutOfMoney) else error.status
-            self._complain(why, error, context.observation.agent)
+            failure = without_model(error)
+            if isinstance(error, OutOfMoney):
+                failure = dataclasses.replace(failure, detail="budget")
+        self._complain(failure, context.observation.agent)
         said = await self._other.decide(context)
         decision = said if isinstance(said, Decision) else Decision(said)
-        return dataclasses.replace(decision, status="fallback", detail=f"{why}: {self._name}")
+        return dataclasses.replace(
+            decision,
+            status="fallback",
+            detail=f"{failure.detail or failure.status}: {self._name}",
+            reason=failure.reason,
+            hopeless=failure.hopeless,
+        )
 
     async def reflect(self, context: Context) -> None:
         """Have both think on."""
@@ -85,10 +98,11 @@ class Fallback(Policy):
         finally:
             await self._other.close()
 
-    def _complain(self, why: str, error: LLMError, agent: str) -> None:
+    def _complain(self, failure: Decision, agent: str) -> None:
+        why = failure.detail or failure.status
         if why not in self._complaints:
             self._complaints.add(why)
-            log.error("agent %s: no reply of the model, %s decides: %s", agent, self._name, error)
+            log.error("agent %s: no reply of the model, %s decides: %s", agent, self._name, failure.reason or why)
 
 
 def _reserve_s(time_s: float | None) -> float:

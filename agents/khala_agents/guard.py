@@ -1,26 +1,29 @@
 """Ask a policy, and return a reply in time whatever the policy does.
 
 A policy is the user's code: it may raise, return nonsense, take too long, or ignore its cancellation.
-Each of these becomes a `Decision` with status `fallback` and no text; the host then takes the default reply of the
-task. Above it: `khala_agents.worker`.
+Each of these becomes a `Decision` without a text, whose status says what happened; the host then takes the default
+reply of the task. Above it: `khala_agents.worker`.
 """
 
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
 import traceback
 from typing import TYPE_CHECKING, ParamSpec
 
-from khala_agents.llm.client import LLMError
+from khala_agents.llm.client import LLMError, MalformedCompletion, TryTimeout
 from khala_agents.policy import Decision, Said
 from khala_agents.secret import scrub
 from khala_protocol.messages import MAX_DETAIL_CHARACTERS, MAX_REPLY_CHARACTERS
-from khala_protocol.visible import visible
+from khala_protocol.visible import visible, visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Coroutine
     from typing import Any
+
+    from khala_protocol.messages import ReplyStatus
 
 P = ParamSpec("P")
 log = logging.getLogger(__name__)
@@ -42,14 +45,14 @@ class Guard:
         self._abandoned: set[asyncio.Task[Said]] = set()
 
     async def within(self, time_s: float | None, deciding: Coroutine[Any, Any, Said]) -> Decision:
-        """Return the decision, or a fallback after `time_s` seconds. Raise only if cancelled or if the process ends."""
+        """Return the decision, or `late` after `time_s` seconds. Raise only if cancelled or if the process ends."""
         task = asyncio.create_task(deciding, name=f"decide {self._agent}")
         try:
             done, _ = await asyncio.wait({task}, timeout=time_s)
             if not done:
                 task.cancel()
                 await asyncio.wait({task}, timeout=UNWIND_S)
-                return _fallback("timeout")
+                return Decision("", "late", "timeout")
         finally:
             self._let_go(task)
         return self._outcome(task)
@@ -72,14 +75,14 @@ class Guard:
 
     def _outcome(self, task: asyncio.Task[Said]) -> Decision:
         if task.cancelled():
-            return _fallback("cancelled")
+            return Decision("", "failed", "cancelled")
         error = task.exception()
         if isinstance(error, LLMError):
             self._complain_of_model(error)
-            return _fallback(error.status)
+            return self._checked(without_model(error))
         if isinstance(error, Exception):
             self._complain("the policy failed", error)
-            return _fallback(type(error).__name__)
+            return self._checked(Decision("", "failed", type(error).__name__, scrub(str(error))))
         return self._checked(task.result())
 
     def _checked(self, answer: object) -> Decision:
@@ -88,11 +91,10 @@ class Guard:
         if not isinstance(answer, Decision):
             kind = type(answer).__name__
             self._once(f"the policy returned {kind}, a reply is a str or an khala_agents.policy.Decision")
-            return _fallback(f"returned {kind}")
+            return Decision("", "failed", f"returned {kind}")
         text = answer.text[: MAX_REPLY_CHARACTERS + 1]  # by the last one the host sees that the reply was longer
-        if not text.isascii():  # lone surrogates cannot be sent
-            text = text.encode("utf-8", "replace").decode("utf-8")
-        return Decision(text, answer.status, answer.detail[:MAX_DETAIL_CHARACTERS], answer.attempts, answer.usage)
+        detail, reason = (_short(words) for words in (answer.detail, answer.reason))
+        return dataclasses.replace(answer, text=_sendable(text), detail=detail, reason=reason)
 
     def _let_go(self, task: asyncio.Task[Said]) -> None:
         if not task.done():
@@ -119,5 +121,23 @@ class Guard:
             log.error("agent %s: %s", self._agent, visible(text))
 
 
-def _fallback(detail: str) -> Decision:
-    return Decision("", "fallback", detail)
+def without_model(error: LLMError) -> Decision:
+    """Return the decision of an agent whose model has no answer."""
+    status: ReplyStatus
+    match error:
+        case TryTimeout():
+            status = "late"
+        case MalformedCompletion():
+            status = "malformed"
+        case _:
+            status = "failed"
+    return Decision("", status, error.status, scrub(str(error)), hopeless=error.hopeless)
+
+
+def _short(words: str) -> str:
+    return _sendable(visible_line(words))[:MAX_DETAIL_CHARACTERS]
+
+
+def _sendable(text: str) -> str:
+    """Return a text without lone surrogates, which cannot be sent."""
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")

@@ -11,7 +11,7 @@ import asyncio
 import dataclasses
 import logging
 import random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.client import (
@@ -20,7 +20,9 @@ from khala_agents.llm.client import (
     LLMError,
     Origin,
     Request,
+    RequestRefused,
     TryTimeout,
+    Unauthorized,
     estimated_image_tokens,
     estimated_tokens,
 )
@@ -28,16 +30,18 @@ from khala_agents.llm.limits import Limits
 from khala_agents.llm.retry import RetryRule, retried
 from khala_agents.memory import Memory, NoMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
-from khala_agents.policy import Policy
+from khala_agents.policy import Decision, Policy
 from khala_agents.prompt import Prompt
+from khala_agents.secret import excerpt
 from khala_agents.summary import Summary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision
-    from khala_agents.policy import Context
+    from khala_agents.policy import Context, Said
     from khala_protocol.messages import Briefing, ChatMessage, Observation, Pace, Purpose
 
 log = logging.getLogger(__name__)
@@ -83,6 +87,7 @@ class LLMPolicy(Policy):
         self.pace = pace
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
+        self._answered = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
         self._memory: Memory = self._own_memory or NoMemory()
@@ -104,8 +109,8 @@ class LLMPolicy(Policy):
         self._remember_for(briefing)
         await self.client.refresh()
 
-    async def decide(self, context: Context) -> str:
-        """Return the model's words.
+    async def decide(self, context: Context) -> Said:
+        """Return the model's words, or why there are none.
 
         Raises:
             LLMError: the last try failed; its error.
@@ -123,9 +128,11 @@ class LLMPolicy(Policy):
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        text = await self._completed(_Tries(self, context, messages, pictures))
-        self._note(observation, text)
-        return text
+        completion = await self._completed(_Tries(self, context, messages, pictures))
+        if completion.verdict != "ok":
+            return Decision("", completion.verdict, reason=completion.reason)
+        self._note(observation, completion.text)
+        return completion.text
 
     def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:
         """Have memory and summary begin with these steps, in the episode that they are of."""
@@ -152,13 +159,19 @@ class LLMPolicy(Policy):
         except LLMError as error:
             log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
 
-    async def _completed(self, tries: _Tries) -> str:
-        """Return the model's words.
+    async def _completed(self, tries: _Tries) -> Completion:
+        """Return the model's answer.
 
         Raises:
             LLMError: the last try failed; its error.
         """
-        return (await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)).text
+        try:
+            completion = await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+        except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
+            error.hopeless = isinstance(error, Unauthorized) or not self._answered
+            raise
+        self._answered = True
+        return completion
 
     async def close(self) -> None:
         """Close the client."""
@@ -201,6 +214,15 @@ class LLMPolicy(Policy):
                 self._note(observation, reply)
 
 
+class _Outcome(NamedTuple):
+    """What became of one try."""
+
+    status: str
+    completion: Completion | None = None
+    reason: str = ""
+    usage: Usage = UNKNOWN
+
+
 class _Tries:
     """The tries of one decision or summary, counted and traced."""
 
@@ -231,23 +253,28 @@ class _Tries:
 
     async def once(self) -> Completion:
         """Make one try, as soon as the limits allow it and unless the endpoint is away."""
-        self._policy.breaker.check()
-        async with self._policy.limits.admit(tokens=self._tokens, deadline=self._context.deadline) as ticket:
+        policy = self._policy
+        policy.breaker.check()
+        answer_tokens = policy.client.answer_tokens
+        async with policy.limits.admit(
+            tokens=self._tokens, answer_tokens=answer_tokens, deadline=self._context.deadline
+        ) as ticket:
             self._made += 1
             began = self._clock()
-            status, completion, usage = "cancelled", None, UNKNOWN + self._images
+            outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
             try:
                 completion = await self._completed(began)
-                status, usage = "ok", self._with_images(completion.usage)
-                ticket.settle(usage)
+                outcome = _Outcome(
+                    completion.verdict, completion, completion.reason, self._with_images(completion.usage)
+                )
+                ticket.settle(outcome.usage)
             except LLMError as error:
-                status = error.status
-                if not error.may_be_billed:
-                    usage = Usage(requests=1)
-                    ticket.settle(usage)
+                usage = outcome.usage if error.may_be_billed else Usage(requests=1)
+                outcome = _Outcome(error.status, None, excerpt(str(error)), usage)
+                ticket.settle(usage)
                 raise
             finally:
-                self._trace(began, ticket.waited_s, status, completion, usage)
+                self._trace(began, ticket, outcome)
             return completion
 
     async def _completed(self, began: float) -> Completion:
@@ -281,8 +308,10 @@ class _Tries:
             stable=Prompt.STABLE,
         )
 
-    def _trace(self, began: float, waited_s: float, status: str, completion: Completion | None, usage: Usage) -> None:
-        seen = self._context.observation
+    def _trace(self, began: float, ticket: Ticket, outcome: _Outcome) -> None:
+        seen, completion, usage = self._context.observation, outcome.completion, outcome.usage
+        if usage.unknown_requests:
+            usage = usage.model_copy(update={"unknown_usd": ticket.most_usd})
         exchange = ModelCall(
             run=seen.run,
             agent=seen.agent,
@@ -297,10 +326,11 @@ class _Tries:
             params=dict(self._policy.client.params),
             answered_by=completion.model if completion else "",
             completion=completion.text if completion else None,
-            status=status,
+            status=outcome.status,
+            reason=outcome.reason,
             started_s=began - self._context.arrived,
             latency_s=self._clock() - began,
-            waited_s=waited_s,
+            waited_s=ticket.waited_s,
             usage=usage,
         )
         self._context.trace(exchange)

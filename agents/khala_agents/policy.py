@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 from khala_agents.deadline import time_to_decide_s
 from khala_agents.pictures import PictureStore
@@ -28,7 +28,7 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala_protocol.messages import Briefing, ModelCall, Observation, Pace
+    from khala_protocol.messages import Briefing, ModelCall, Observation, Pace, ReplyStatus
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -40,14 +40,18 @@ class Decision:
 
     Attributes:
         text: the reply.
-        status: `fallback` if the policy knows that it failed.
-        detail: why it is a fallback, in a few words.
+        status: `ok` if the agent decided; what kept it from deciding if not.
+        detail: why it did not decide, in a few words that are the same each time: decisions are counted by them.
+        reason: the same in the words of whoever failed, such as an endpoint.
+        hopeless: whether it will never decide, because its endpoint refuses its key or its model.
         attempts, usage: its cost; the worker counts requests that a policy traces (`Context.trace`).
     """
 
     text: str
-    status: Literal["ok", "fallback"] = "ok"
+    status: ReplyStatus = "ok"
     detail: str = ""
+    reason: str = ""
+    hopeless: bool = False
     attempts: int = 0
     usage: Usage = field(default_factory=Usage)
 

@@ -54,14 +54,14 @@ class WorkerTally:
 
     Attributes:
         replies: replies sent, by status.
-        fallbacks: the fallbacks among them, by detail.
+        undecided: those that were not the agent's own, by their cause.
         superseded: observations that were not answered, because a newer one arrived.
         usage: the usage of all requests.
         ended: why the worker ended.
     """
 
     replies: Counter[str] = field(default_factory=Counter)
-    fallbacks: Counter[str] = field(default_factory=Counter)
+    undecided: Counter[str] = field(default_factory=Counter)
     superseded: int = 0
     usage: Usage = field(default_factory=Usage)
     ended: Ending = "stopped"
@@ -254,6 +254,8 @@ class Worker:
             text=decision.text,
             status=decision.status,
             detail=decision.detail,
+            reason=decision.reason,
+            hopeless=decision.hopeless,
             latency_s=latency_s,
             attempts=attempts or decision.attempts,
             usage=usage if attempts or usage.requests else decision.usage,
@@ -277,8 +279,8 @@ class Worker:
 
     def _count(self, reply: Reply) -> None:
         self.tally.replies[reply.status] += 1
-        if reply.status == "fallback":
-            self.tally.fallbacks[reply.detail] += 1
+        if reply.status != "ok":
+            self.tally.undecided[reply.detail or reply.status] += 1
 
     # --- ending -------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@
 
 A reply is looked up by run, side, agent, episode and step. Without a run, and in OpenAI's form, which does not say of
 which run a chat is, it is looked up by the prompt: that of the same briefing and observation, word for word. A decision
-that the data set does not have is a fallback.
+that the data set does not have is not made.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class FromDataset(Policy):
         prompt = digest((message.role, message.content) for message in self._prompter.messages(context.briefing, seen))
         found = self._look_up(seen, prompt)
         if found is None:
-            return Decision("", "fallback", "not in the data set")
+            return Decision("", "failed", "not in the data set")
         if found.prompt != prompt and not self._warned:
             self._warned = True
             log.warning(

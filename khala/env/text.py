@@ -23,6 +23,7 @@ from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_bridge.game.processes import IdleGames
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError, KhalaError
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,6 +81,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         self._task = unhurried(change(task, max_steps=max_cycles, scenes=scenes))
         self._seats = _named(self._task, agents)
         sides = [side.side for side in self._task.per_side()]
+        trust_named(others)
         self._minds = {} if others is None else minds_of(sides, Minds().named(others), {})
         self._reward, self._game = reward, game
         self.render_mode = render_mode

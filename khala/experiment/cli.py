@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from khala.options import Game
+from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 
 app = typer.Typer(
@@ -85,6 +86,7 @@ def run(
     yes: Yes = False,
     processes: Processes = False,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Out = OUT,
     address: Address = None,
     recordings: Url = None,
@@ -111,6 +113,7 @@ def resume(
     budget_usd: BudgetUsd = None,
     processes: Processes = False,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Out = OUT,
     address: Address = None,
     recordings: Url = None,

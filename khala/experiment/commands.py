@@ -18,7 +18,7 @@ import typer
 from rich.table import Table
 
 from khala.exit_codes import FAILED, NOT_VALID, SIGNALLED
-from khala.experiment.plan import plan
+from khala.experiment.plan import check_playable, plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store
 from khala_configs import CONFIGS
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
     from khala.experiment.runner import Estimate, Runner
+    from khala.experiment.spec import Budget
 
 SHIPPED = "experiments"
 
@@ -109,6 +110,7 @@ def _opened(directory: Path, out: Path) -> Store:
 
 def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any) -> None:
     matches = plan(experiment, game=given["game"])
+    check_playable(matches, _budget(experiment, given["budget_usd"]).usd)
     if file is not None:
         store.begin(file)
     with store.locked():
@@ -127,8 +129,7 @@ async def _until_done(
     from khala.experiment.progress import Watcher  # noqa: PLC0415
     from khala.experiment.runner import Runner, pilot_of  # noqa: PLC0415
 
-    changes = {} if given["budget_usd"] is None else {"usd": given["budget_usd"]}
-    budget = experiment.budget.model_copy(update=changes)
+    budget = _budget(experiment, given["budget_usd"])
     async with engine:
         runner = Runner(experiment, store, engine, budget, processes=given["processes"])
         if given["pilot"]:
@@ -142,6 +143,10 @@ async def _until_done(
             runner.see = watcher
             await runner.play(matches)
     return runner
+
+
+def _budget(experiment: Experiment, usd: float | None) -> Budget:
+    return experiment.budget if usd is None else experiment.budget.model_copy(update={"usd": usd})
 
 
 def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:

@@ -110,7 +110,7 @@ class _Process:
     async def start(cls, game: str, log: Path) -> Self:
         with log.open("ab") as stderr:
             process = await asyncio.create_subprocess_exec(
-                sys.executable, "-m", "khala.experiment.worker", "--game", game,
+                sys.executable, "-P", "-m", "khala.experiment.worker", "--game", game,
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr,
                 env={**os.environ, **named_parent()}, start_new_session=True, limit=2**24,
             )  # fmt: skip

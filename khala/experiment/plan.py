@@ -19,8 +19,10 @@ from khala.minds import Minds, groups_of, minds_of
 from khala_agents.config import load_model
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.observe import Observer
+from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import check_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -80,6 +82,30 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
         for one in prepared
     ]
     return list({match.key: match for match in planned}.values())
+
+
+def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) -> None:
+    """Check that matches can be played and a budget be kept, before anything is: who only looks needs no key.
+
+    Raises:
+        ConfigError: code is not trusted, or a section, a model file, a key, a policy or a price is missing or wrong;
+            the text says in which cell.
+    """
+    checked: set[str] = set()
+    for match in matches:
+        task = match.config.task
+        try:
+            if (known := task.model_dump_json()) not in checked:
+                checked.add(known)
+                check_trusted(code_of(task))
+                for side in task.per_side():
+                    Observer(side)
+            for _, mind, _ in groups_of(task, match.minds):
+                if (known := repr(mind)) not in checked:
+                    checked.add(known)
+                    replace(mind, budget_usd=budget_usd).check()
+        except ConfigError as error:
+            raise ConfigError(f"{_words(match.cell)}: {error}") from None
 
 
 def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
@@ -144,17 +170,15 @@ def _prepared(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
     try:
         task = task_of(settings)
         minds = minds_for(task, settings)
-        Observer(task)
-        for _, mind, _ in groups_of(task, minds):
-            mind.check()
+        list(groups_of(task, minds))  # do minds name agents that are there?
+        played = {
+            "task": task.model_dump(mode="json"),
+            "game": game,
+            "actions": catalogue_sha256(),
+            "minds": {side: _identity(mind) for side, mind in minds.items()},
+        }
     except ConfigError as error:
         raise ConfigError(f"{_words(cell)}: {error}") from None
-    played = {
-        "task": task.model_dump(mode="json"),
-        "game": game,
-        "actions": catalogue_sha256(),
-        "minds": {side: _identity(mind) for side, mind in minds.items()},
-    }
     return _Prepared(cell, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
 
 

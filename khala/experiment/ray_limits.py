@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Any
 import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from khala_agents.llm.limits import LimitExceeded, LimitRules, Turns, own_turns
+from khala_agents.llm.client import LimitExceeded
+from khala_agents.llm.limits import LimitRules, Turns, own_turns
 
 if TYPE_CHECKING:
-    from khala_agents.llm.limits import Gate, Gates, LimitType
+    from khala_agents.llm.client import LimitType
+    from khala_agents.llm.limits import Gate, Gates
 
 LEASE_S = 600.0
 """Then a request has lost its place: the node that made it is dead, as no try takes so long."""

@@ -1,8 +1,10 @@
 """Plays the matches of an experiment that are missing: pilot, budget, retries.
 
 Each match may spend at most a part of what is left, so that all together never spend more than the budget: what a
-match that runs may still spend is held back from the others. A match that ends because its part is used up counts as
-invalid, with the cause `budget`. Below it an engine plays, and the store keeps what was played.
+match that runs may still spend is held back from the others. What it has spent stands in its ledger, whatever became of
+it and of its recording. A match that ends because its part is used up counts as invalid, with the cause `budget`.
+Matches of models whose endpoint refuses them for good are not begun any more. Below it an engine plays, and the store
+keeps what was played.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
 from khala.experiment.store import unread
+from khala_orchestrator.tally import REFUSED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -83,6 +86,10 @@ class Runner:
     _played: dict[str, Played] = field(default_factory=dict)
     _waiting: deque[PlannedMatch] = field(default_factory=deque)
     _tries: Counter[str] = field(default_factory=Counter)
+    _unread_usd: dict[str, float] = field(default_factory=dict)
+    """By match, what is in its ledgers and not in the index: its recording could not be read."""
+    _refused: dict[str, str] = field(default_factory=dict)
+    """By the models of a match, why an endpoint will answer none of its agents."""
     _short_usd: dict[str, float] = field(default_factory=dict)
     """By cell, the most that was not enough for one of its matches."""
 
@@ -90,8 +97,12 @@ class Runner:
         """Count what was spent before, also by a runner that was killed."""
         self.store.adopt()
         self._played = self.store.played()
+        self._unread_usd = self.store.booked_usd()
         for played in self._played.values():
             self._count(played)
+            self._unread_usd[played.key] = max(self._unread_usd.get(played.key, 0.0) - (played.cost_usd or 0.0), 0.0)
+        self.spent.usd += sum(self._unread_usd.values())
+        for played in self._played.values():
             if played.cause == "budget":
                 self._was_short(played.cell, played.cost_usd or 0.0)
 
@@ -106,10 +117,13 @@ class Runner:
     async def _slot(self) -> None:
         while self._waiting:
             match = self._waiting.popleft()
-            if why := self._too_much(match):
+            if why := self._refused.get(_minds_of(match)):
+                self.stopped = why
+            elif why := self._too_much(match):
                 self.stopped = why
                 return
-            await self._one(match)
+            else:
+                await self._one(match)
 
     async def _one(self, match: PlannedMatch) -> None:
         part_usd = self._part_usd(match)
@@ -132,15 +146,18 @@ class Runner:
         tries, crash = self._tries[match.key], _CRASHES.get(done.state, "")
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
-            found = unread(match, tries, crash or "crash"), []
-            self.spent.usd += part_usd or 0.0  # nobody knows what it has cost: a node that died took the recording
+            cost_usd = (await asyncio.to_thread(self.store.booked_usd)).get(match.key)
+            found = unread(match, tries, crash or "crash", cost_usd), []
         self.store.add(*found)
+        if any(row.cause == REFUSED for row, _ in found[1]):
+            self._refused[_minds_of(match)] = found[0].cause
         self.spent.held_usd -= part_usd or 0.0
         if found[0].cause == "budget" and part_usd is not None:
             self._was_short(match.cell, part_usd)
         self._end(match, done, found[0])
 
     def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:
+        self.spent.usd -= self._unread_usd.pop(match.key, 0.0)
         if before := self._played.get(match.key):
             self._count(before, -1)  # what its tries have cost together is in the new account
         self._count(played)
@@ -210,6 +227,10 @@ class Runner:
         priced = any(played.cost_usd is not None for played in self._played.values())
         hours = sums["wall_s"] / 3600 / max(1, min(self.engine.slots, len(left)))
         return Estimate(len(left), sums["cost_usd"] if priced else None, sums["tokens"], hours)
+
+
+def _minds_of(match: PlannedMatch) -> str:
+    return repr(match.minds)
 
 
 def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> list[float]:

@@ -16,6 +16,7 @@ import json
 import shutil
 import sqlite3
 import weakref
+from collections import defaultdict
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,7 +25,8 @@ from khala.experiment.measures import CallCount, Measures, measure_with_calls
 from khala.experiment.plan import FACTOR
 from khala.experiment.spec import Experiment
 from khala.matches import free_recording
-from khala.minds import spent_usd
+from khala.spending import paid_usd
+from khala_agents.llm.money import SUFFIX, Ledger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording
@@ -66,7 +68,7 @@ class Played:
     repetition: int
     state: State
     cause: str
-    """Why it is not `done`: `budget`, `model away`, `agents gone`, `crash`, `timeout`, or the host's own words."""
+    """Why it is not `done`: `budget`, `crash`, `timeout`, `interrupted`, or the host's own words."""
     attempts: int
     recording: str
     """Relative to the directory of the experiment; empty if there is none."""
@@ -214,12 +216,18 @@ class Store:
         if (card := recording.run) is None:
             return None
         rows = measure_with_calls(recording)
-        costs = [_cost_usd(other) for other in path.parent.glob("recording*.mcap") if other != path]
-        costs += [row.paid_usd for row, _ in rows]
         played = _judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
-        known = [cost for cost in costs if cost is not None]
-        played = replace(played, cost_usd=sum(known) if known else None)
-        return played, rows
+        is_priced = any(row.paid_usd is not None for row, _ in rows)
+        cost_usd = sum(_paid_usd(one) for one in path.parent.glob("recording*.mcap"))
+        return replace(played, cost_usd=cost_usd if cost_usd or is_priced else None), rows
+
+    def booked_usd(self) -> dict[str, float]:
+        """Return by match the most that its tries have cost as far as they have ledgers, also if they were not read."""
+        sums = defaultdict[str, float](float)
+        for path in (self.directory / MATCHES).glob(f"*/recording*{SUFFIX}"):
+            with Ledger(path) as ledger:
+                sums[path.parent.name] += ledger.booked_usd()
+        return sums
 
     def adopt(self) -> None:
         """Take in recordings of a runner that was killed: what its matches have cost counts."""
@@ -230,11 +238,11 @@ class Store:
                 self.take(tries[-1], attempts=len(tries))
 
 
-def unread(match: PlannedMatch, attempts: int, cause: str) -> Played:
+def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | None) -> Played:
     """Return what became of a match of which there is no recording that can be read."""
     return Played(
         key=match.key, cell=match.cell, seed=match.seed, repetition=match.repetition, state="crashed", cause=cause,
-        attempts=attempts, recording="", wall_s=None, cost_usd=None, tokens=None, card={},
+        attempts=attempts, recording="", wall_s=None, cost_usd=cost_usd, tokens=None, card={},
     )  # fmt: skip
 
 
@@ -262,12 +270,12 @@ def _tries(directory: Path) -> list[Path]:
     return sorted(directory.glob("recording*.mcap"), key=lambda path: path.stat().st_mtime)
 
 
-def _cost_usd(path: Path) -> float | None:
-    """Return what a match has cost of which there may be half a recording."""
+def _paid_usd(path: Path) -> float:
+    """Return what a try has cost of which there may be half a recording."""
     try:
-        return sum(spent_usd(Recording.open(path)).values()) or None
+        return paid_usd(path)
     except RecordingError:
-        return None
+        return 0.0
 
 
 def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
@@ -292,11 +300,9 @@ def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, cras
 def _state(rows: list[Measures], crash: str) -> tuple[State, str]:
     if crash or not rows or any(row.outcome == "unfinished" for row in rows):
         return "crashed", crash or "interrupted"
-    if any("budget: " in row.fallback_reasons for row in rows):
+    if any("budget: " in row.undecided_because for row in rows):
         return "invalid", "budget"
-    if invalid := next((row.invalid_because for row in rows if not row.valid), ""):
-        return "invalid", "model away" if invalid.startswith("no model ever answered") else invalid
-    return "done", ""
+    return "invalid" if (why := next((row.invalid_because for row in rows if not row.valid), "")) else "done", why
 
 
 _OTHERWISE = frozenset({"clock", "executor", "opponent", "map", "scenes"})

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from khala.options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
+from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 from khala_protocol.errors import ConfigError
 
@@ -77,6 +78,7 @@ def fork(
     ] = None,
     latency: Latency = 0.0,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Forks at once.", show_default="by cores and memory", metavar="N")
     ] = None,
@@ -102,6 +104,7 @@ def fork(
     """
     from khala.fork import commands  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
     from khala.minds import Minds, named_sides  # noqa: PLC0415
+    from khala_protocol.trust import trust_named  # noqa: PLC0415
 
     if (at is None) != scan:
         raise ConfigError("say where to fork: --at STEP, or --scan for many steps")
@@ -123,6 +126,7 @@ def fork(
         common = Minds(model or "scripted", model_name, base_url, policy, budget_usd, latency, fallback)
     elif about_a_model := [option for option in ("--model-name", "--base-url", "--fallback") if option in changed]:
         raise ConfigError(f"{about_a_model[0]} is about a model: name it with --model")
+    trust_named(policy, fallback, *sides.values(), *(said.partition("=")[2] for said in agent or ()))
     plan = commands.planned(trunk, out, common, sides, agent or (), advise or (), memory)
     if at is not None:
         commands.fork_at(plan, at, times or TIMES, jobs=jobs, budget_usd=budget_usd, game=game, as_json=as_json)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from khala.experiment.job import Job
-from khala.minds import groups_of, spent_usd
+from khala.minds import groups_of
+from khala.spending import paid_usd
 from khala_orchestrator.fork import advice_of, write_beginning
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
@@ -156,7 +157,7 @@ async def play_all(
         async with room:
             part_usd = purse.take()
             future = await _played(fork, engine, part_usd)
-            if part_usd and not future.error:  # of one that broke off, what it owes its model is not known
+            if part_usd:
                 purse.give_back(part_usd - future.spent_usd)
             done(future)
             return future
@@ -175,20 +176,20 @@ async def _played(fork: Fork, engine: Engine, budget_usd: float | None) -> Futur
         job = Job(config=fork.config, minds=minds, timeout_s=3600 * HOURS, beginning=beginning)
         ended = await engine.play(job)
         if ended.state != "done":
-            return Future(fork, error=ended.words, spent_usd=_spent_usd(fork.record))
+            return Future(fork, error=ended.words, spent_usd=_paid_usd(fork.record))
         return await asyncio.to_thread(_future, fork)
     finally:
         beginning.unlink(missing_ok=True)
 
 
-def _spent_usd(record: Path) -> float:
-    return sum(spent_usd(Recording.open(record)).values()) if record.exists() else 0.0
+def _paid_usd(record: Path) -> float:
+    return paid_usd(record) if record.exists() else 0.0
 
 
 def _future(fork: Fork) -> Future:
     recording = Recording.open(fork.record)
     ok = [agent.status == "ok" for agent in _own_decisions(recording, fork.step)]
-    return Future(fork, recording.results, _spent_usd(fork.record), len(ok), ok.count(False))
+    return Future(fork, recording.results, _paid_usd(fork.record), len(ok), ok.count(False))
 
 
 def _own_decisions(recording: Recording, first: int) -> Iterator[AgentReport]:

@@ -61,9 +61,16 @@ async def repeated(trunk: Trunk, directory: Path, *, game: str) -> Repeated:
     sc2path, _ = games.find(game)
     async with game_of(recorded_config(copy), sc2path) as sides:
         differences = await replay(copy, sides, observer=results)
-    ends = [[_essence(result) for result in of] for of in (trunk.results, results.taken)]
-    return Repeated(results.taken, differences, same=not differences and (not ends[0] or ends[0] == ends[1]))
+    same = not differences and (not trunk.results or _same(trunk.results, results.taken))
+    return Repeated(results.taken, differences, same=same)
 
 
-def _essence(result: Result) -> dict[str, object]:
-    return result.model_dump(exclude=OF_THIS_TIME)
+def _same(recorded: Sequence[Result], taken: Sequence[Result]) -> bool:
+    """Return whether the results are the recorded ones, in all that recordings of that version say."""
+    if len(recorded) != len(taken):
+        return False
+    said = [before.model_fields_set - OF_THIS_TIME for before in recorded]
+    return all(
+        before.model_dump(include=fields) == now.model_dump(include=fields)
+        for before, now, fields in zip(recorded, taken, said, strict=True)
+    )

@@ -7,6 +7,7 @@ the prompts, so that a model reads here what it reads in any other match.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -108,10 +109,11 @@ class _Player:
             await store.put(picture)
         context = Context(seen.briefing, seen.observation, store, calls.append)
         async with span(seat.agent, type="agent"):
-            text = await self._policy.decide(context)
+            said = await self._policy.decide(context)
             await self._policy.reflect(context)
-        self._show(seat, seen, text, await store.get(seen.observation.images, 0))
-        return Decision(text, attempts=len(calls), usage=sum((call.usage for call in calls), Usage()))
+        decision = said if isinstance(said, Decision) else Decision(said)
+        self._show(seat, seen, decision.text, await store.get(seen.observation.images, 0))
+        return replace(decision, attempts=len(calls), usage=sum((call.usage for call in calls), Usage()))
 
     def _show(self, seat: Seat, seen: Seen, text: str, pictures: Mapping[str, bytes]) -> None:
         images = tuple(image for image in seen.observation.images if image.sha256 in pictures)

@@ -20,6 +20,7 @@ from khala.options import (
     StepLoops,
     Task,
 )
+from khala_agents.cli import Trust
 
 MCP_EPILOG = """
 Examples:\n
@@ -60,6 +61,7 @@ def mcp(
     ] = "scripted",
     budget_usd: BudgetUsd = None,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     opponent: Opponent = None,
     seed: Seed = None,
     episodes: Episodes = None,

@@ -11,6 +11,7 @@ from khala.mcp.table import Table
 from khala.minds import Minds, minds_of
 from khala.seats import seat_named, seats_of, unhurried
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,5 +66,6 @@ def table_of(wanted: Wanted) -> Table:
             raise ConfigError("over stdio one client plays one agent: give one seat, or --port", source="--seat")
         seats = seats or there_are[:1]
     sides = [side.side for side in config.task.per_side()]
+    trust_named(wanted.others)
     minds = minds_of(sides, Minds(budget_usd=wanted.budget_usd).named(wanted.others), {})
     return Table(config, seats or there_are, minds, game=wanted.game)

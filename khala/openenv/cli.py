@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from khala.options import Game
+from khala_agents.cli import Trust
 
 OPENENV_EPILOG = """
 Examples:\n
@@ -51,6 +52,7 @@ def openenv(
         ),
     ] = None,
     game: Game = "simulator",
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Annotated[
         Path | None,
         typer.Option(help="Directory for recordings of all sessions.", metavar="DIR", show_default="none is made"),

@@ -12,6 +12,7 @@ from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -69,6 +70,7 @@ def settings_of(wanted: Wanted) -> Settings:
     from khala.openenv.settings import Settings  # noqa: PLC0415
 
     load_task(wanted.task)
+    trust_named(wanted.others, *wanted.allow)
     for name in {wanted.others, *wanted.allow}:
         Minds().named(name).check()
     rubric = Battle if wanted.rubric is None else rubric_of(wanted.rubric)
@@ -87,6 +89,7 @@ def rubric_of(name: str) -> Callable[[], Rubric]:
     module, _, attribute = name.partition(":")
     if not module or not attribute:
         raise ConfigError("write module:name, such as my_rewards:Mine", source=source)
+    trust_named(name)
     made = load_attribute(module, attribute, source=source)
     if not callable(made) or isinstance(made, Rubric):
         raise ConfigError("give a class or a function that makes a rubric: each session has its own", source=source)

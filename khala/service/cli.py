@@ -35,6 +35,7 @@ from khala.options import (
     Task,
     ThinkingLoops,
 )
+from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_protocol.errors import ConfigError
 
@@ -142,6 +143,7 @@ def submit(
     images: Images = None,
     run: RunName = None,
     assemble: Assemble = 60.0,
+    trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Json = False,
 ) -> None:
     """Have a service play a task, see `khala serve`, and print the name of the match.

@@ -29,6 +29,7 @@ from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import NoRouter
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import stop_on_signal
+from khala_protocol.trust import trust_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
@@ -66,6 +67,7 @@ def serve(
     """Play matches on order until a signal arrives."""
     logs.set_up(as_json=log_json)
     memory_mb = int(memory_gb * 1024) if memory_gb else memory.machine_mb() * 8 // 10
+    trust_files(trust)  # and its workers
     limits = Limits(matches or os.cpu_count() or 1, memory_mb, queue, trusts=trust)
     config = router_config(listen, tls=tls, insecure=insecure, rules=service_settings() if tls else None)
     arguments = ["--game", game, "--spares", str(spares), *(["--log-json"] if log_json else [])]

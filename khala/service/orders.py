@@ -14,11 +14,12 @@ from pydantic import TypeAdapter, ValidationError
 from khala.matches import free_recording, resumed
 from khala.minds import Minds, groups_of, minds_of
 from khala_bridge.observe import Observer
+from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig
-from khala_orchestrator.replay import modules_of
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
+from khala_protocol.trust import check_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,7 +52,9 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     needs = (what for mind in alike for what in _needs_trust(config, mind))
     if not trusts and (asked := next(needs, None)):
         raise ConfigError(f"{asked} is for a service that was started with --trust: this machine would run or call it")
-    Observer(config.task)
+    check_trusted(code_of(config.task))
+    for side in config.task.per_side():
+        Observer(side)
     for mind in alike:
         mind.check()
     return config.model_copy(update={"record": free_recording(out / order.run)}), minds
@@ -75,13 +78,7 @@ def _needs_trust(config: MatchConfig, minds: Minds) -> Iterator[str]:
     """Yield what this machine would run or call for the match."""
     if minds.base_url is not None:
         yield "--base-url"
-    if minds.policy is not None and ":" in minds.policy:
-        yield "--policy MODULE:NAME"
-    if minds.fallback is not None and ":" in minds.fallback:
-        yield "--fallback MODULE:NAME"
     if minds.model.endswith((".yaml", ".yml")):
         yield "a model file"
-    if modules := sorted(modules_of(config.task)):
-        yield f"the section of {modules[0]} in the task"
-    if config.task.opponent.command:
-        yield "the command of an opponent"
+    for code in (*minds.code(), *code_of(config.task)):
+        yield f"the code {code!r}"

@@ -68,6 +68,7 @@ class Worker:
         return cls(
             await asyncio.create_subprocess_exec(
                 sys.executable,
+                "-P",  # with no module of the current directory on its path
                 "-m",
                 "khala.service.worker",
                 *arguments,

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 Json = dict[str, Any]
 OPPONENT = "opponent"
 """The side of an opponent that Khala does not play."""
-LATE = {"late": "late", "gone": "late", "malformed": "late", "fallback": "fallback"}
-"""The kind of mark of an agent's status."""
 
 
 @dataclass(slots=True)
@@ -132,7 +130,8 @@ class Digest:
         name, asked = agent["agent"], agent.get("asked_step")
         asked = said["step"] if asked is None else asked
         self.decisions.append((said["episode"], side, name, asked, said["step"]))
-        if kind := LATE.get(agent["status"]):
+        if (status := agent["status"]) != "ok":
+            kind = "fallback" if status == "fallback" else "late"
             self.mark(said, kind, agent.get("detail") or agent["status"], side=side, agent=name)
         elif agent.get("fate") == "refused":
             why = next((refused["message"] for refused in agent["rejections"]), "")

@@ -21,11 +21,11 @@ from khala_protocol.visible import visible, visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
     from types import TracebackType
 
-    from khala_protocol.messages import AgentReport, Clock
+    from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
-STATUS = {"ok": "green", "fallback": "yellow", "late": "red", "gone": "red", "malformed": "red"}
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
 SIDE = {"blue": "bold blue", "red": "bold red"}
 """Sides of other names are all of one colour."""
@@ -46,8 +46,12 @@ def stdout_console() -> Console:
 class Progress:
     """Shows a match while it runs. A context manager; call it with each message of the host."""
 
-    def __init__(self, screen: Console, max_steps: int | None = None) -> None:
+    def __init__(self, screen: Console, max_steps: int | None = None, logs: Path | None = None) -> None:
+        """Take a screen, the steps of an episode, and the directory of the agents' logs."""
         self._screen = screen
+        self._logs = logs
+        self._failures: set[str] = set()
+        """Causes that were shown."""
         self._max_steps = max_steps
         self._run: Run | None = None
         self._reports: dict[str, Report] = {}
@@ -90,7 +94,20 @@ class Progress:
             counts[agent.status] += 1
             counts["accepted"] += len(agent.accepted)
             counts["rejected"] += len(agent.rejections)
+            self._show_failure(agent, report.step)
             self._usage[seat] = self._usage.get(seat, Usage()) + agent.usage
+
+    def _show_failure(self, agent: AgentReport, step: int) -> None:
+        """Print why an agent did not decide when it happens for the first time."""
+        cause = f"{agent.status} {agent.detail}"
+        if agent.status == "ok" or cause in self._failures:
+            return
+        self._failures.add(cause)
+        why = agent.reason or agent.detail or agent.status
+        what = "another policy decided for it" if agent.status == "fallback" else "it did not decide"
+        log = f"; its log is in {self._logs}" if self._logs else ""
+        line = f"step {step}: {agent.agent}: {agent.status}, {what}: {why}{log}"
+        self._screen.print(Text(visible_line(line), "yellow"), soft_wrap=True)
 
     def _picture(self) -> Panel:
         rows = Table(box=None, expand=True, pad_edge=False)
@@ -115,13 +132,18 @@ class Progress:
         counts, usage = self._counts[seat], self._usage[seat]
         return (
             speaker(seat, named=two_sides(self._run)),
-            Text(agent.status, STATUS[agent.status]),
+            Text(agent.status, style_of(agent.status)),
             "" if agent.latency_s is None else f"{agent.latency_s:.2f} s",
             str(counts["accepted"]),
             str(counts["rejected"]),
             f"{usage.prompt_tokens + usage.completion_tokens:,}",
             Text(visible_line(agent.accepted[-1] if agent.accepted else agent.detail), overflow="ellipsis"),
         )
+
+
+def style_of(status: AgentStatus) -> str:
+    """Return the colour of a status: red where nobody decided."""
+    return {"ok": "green", "fallback": "yellow"}.get(status, "red")
 
 
 def two_sides(run: Run | None) -> bool:

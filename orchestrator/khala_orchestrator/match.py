@@ -21,7 +21,7 @@ from khala_orchestrator.tally import Tally, valid_together
 from khala_protocol.messages import Timings
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Collection, Iterator, Sequence
+    from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 
     from khala_bridge.game.game import Sides, StepResult
     from khala_bridge.state import Snapshot
@@ -76,11 +76,11 @@ class SilentObserver:
 
 
 class StepOutcome(NamedTuple):
-    """The outcome of a step: a report and a snapshot for each side, and the agents that went away for good."""
+    """The outcome of a step: a report and a snapshot for each side, and the agents that are lost for good, with why."""
 
     reports: Sequence[Report]
     snapshots: Sequence[Snapshot]
-    lost: Collection[Seat]
+    lost: Mapping[Seat, str]
 
 
 @dataclass
@@ -126,7 +126,7 @@ class Match:
         self.pacing.begin()
         both = zip(self.sides, snapshots, strict=True)
         tallies, at = [self._tally(side, snapshot) for side, snapshot in both], StepId(episode, 0)
-        lost: Collection[Seat] = ()
+        lost: Mapping[Seat, str] = {}
         while not (lost or any(snapshot.ended for snapshot in snapshots) or at.step == self.config.task.max_steps):
             reports, snapshots, lost = await self._step(at, snapshots)
             for tally, report, snapshot in zip(tallies, reports, snapshots, strict=True):
@@ -134,7 +134,7 @@ class Match:
                 await self.match_observer.report(report)
             at = StepId(episode, at.step + 1)
         wall_s = time.perf_counter() - began
-        results = valid_together([t.result(self.config.run, episode, wall_s=wall_s, gone=lost) for t in tallies])
+        results = valid_together([t.result(self.config.run, episode, wall_s=wall_s, agents_lost=lost) for t in tallies])
         for result in results:
             await self.match_observer.result(result)
         return results
@@ -189,7 +189,8 @@ class Match:
     def _tally(self, side: Side, snapshot: Snapshot) -> Tally:
         others = [f"side {other.name}" for other in self.sides if other is not side]
         opponent = self.game.info.opponent or self.config.task.against or ", ".join(others)
-        return Tally(snapshot, side.name, side.required, opponent=opponent)
+        undecided = self.config.task.faults.undecided
+        return Tally(snapshot, side.name, side.required, opponent=opponent, undecided=undecided)
 
     def _side(self, seat: Seat) -> Side:
         return next(side for side in self.sides if side.name == seat.side)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from khala_bridge.task.code import code_of
 from khala_bridge.task.config import TaskConfig
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.match import Match, SilentObserver
@@ -21,6 +22,7 @@ from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Advice, Message, Observation, Reply, Report
 from khala_protocol.recording.difference import Difference
+from khala_protocol.trust import check_trusted, trust
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -37,12 +39,12 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
 
     Args:
         recording: of a match.
-        modules: Python modules of sections that it may name. A recording may be anyone's, and to import a module is to
-            run it.
+        modules: Python modules of sections that the caller trusts. A recording may be anyone's, and to import a module
+            is to run it.
 
     Raises:
-        RecordingError: it has no run card, its run card is wrong, it names another module, or it cannot be played
-            again.
+        RecordingError: it has no run card, its run card is wrong, or it cannot be played again.
+        Untrusted: it names code that is not trusted.
     """
     run = recording.run
     if run is None:
@@ -61,11 +63,8 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
             f"{recording.path}: its run card is not one of this version: {place}: {fault['msg']}"
         ) from None
     check_repeatable(recording, task)
-    if foreign := sorted(modules_of(task) - set(modules)):
-        raise RecordingError(
-            f"{recording.path} names the module {foreign[0]!r} for a section of its text, and a recording imports "
-            f"nothing by itself: if you trust it, allow modules=[{foreign[0]!r}]"
-        )
+    trust(*modules)
+    check_trusted(code_of(task), source=str(recording.path))
     return config
 
 
@@ -81,12 +80,6 @@ def check_repeatable(recording: Recording, task: TaskConfig) -> None:
             f"{recording.path} was played against a {run.opponent if run else task.against}, whose decisions are not "
             "recorded: it cannot be played again"
         )
-
-
-def modules_of(task: TaskConfig) -> set[str]:
-    """Return the Python modules that a task names for sections of its text."""
-    names = (name.rpartition(":") for agent in task.agents for name in agent.sections)
-    return {module for module, colon, _ in names if colon}
 
 
 async def replay(
@@ -168,7 +161,7 @@ class RecordedTurn:
         return Answer(reply.status, reply, reply.detail, reply.latency_s)
 
     def _answer(self, episode: int, asked: int, seat: Seat, agent: AgentReport) -> Answer:
-        reply = self._replies[episode, asked, seat] if agent.status in {"ok", "fallback"} else None
+        reply = self._replies[episode, asked, seat] if agent.latency_s is not None else None
         return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:

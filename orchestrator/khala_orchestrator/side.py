@@ -322,6 +322,7 @@ def _reported(
         side=decision.seat.side,
         status=answer.status,
         detail=answer.detail,
+        reason=answer.reason,
         latency_s=answer.latency_s,
         accepted=accepted,
         rejections=rejections,

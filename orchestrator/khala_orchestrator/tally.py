@@ -7,15 +7,18 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
 from khala_bridge.state import Alliance
+from khala_orchestrator.validity import AWAY, Deeds, why_not_valid
 from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
-    from khala_bridge.state import Forfeit, Snapshot
+    from khala_bridge.state import Snapshot
     from khala_orchestrator.roster import Seat
     from khala_protocol.messages import Ending, Outcome
 
+REFUSED = "model refused"
+"""Why an episode was ended in which an endpoint refuses an agent for good."""
 MAX_INCIDENTS = 100
 """Incidents that a result lists; the reports have all of them."""
 
@@ -24,7 +27,13 @@ class Tally:
     """The running account of one episode."""
 
     def __init__(
-        self, snapshot: Snapshot, side: str = "blue", required: Collection[str] = (), *, opponent: str = ""
+        self,
+        snapshot: Snapshot,
+        side: str = "blue",
+        required: Collection[str] = (),
+        *,
+        opponent: str = "",
+        undecided: float = 0.0,
     ) -> None:
         """Begin with the first snapshot of a side.
 
@@ -33,23 +42,23 @@ class Tally:
             side: its name.
             required: the agents that it cannot do without.
             opponent: who it plays against, in words.
+            undecided: the part of its decisions that a required agent may leave to others or to nobody.
         """
         self._side, self._required, self._opponent = side, tuple(required), opponent
+        self._limit = undecided
+        self._deeds = Deeds()
         self._first = self._last = snapshot
         self._alliance: dict[int, Alliance] = {}
         self._dead: Counter[Alliance] = Counter()
         self._usage: dict[str, Usage] = defaultdict(Usage)
-        self._statuses: dict[str, Counter[str]] = defaultdict(Counter)
         self._unasked: dict[str, Counter[str]] = defaultdict(Counter)
         self._rejections: Counter[str] = Counter()
         self._fates: dict[str, Counter[str]] = defaultdict(Counter)
-        self._fallbacks: dict[str, Counter[str]] = defaultdict(Counter)
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
         self._incidents: list[str] = []
         self._advisers: Counter[str] = Counter()
         self._lag_s = 0.0
-        self._accepted = 0
         self._steps = self._env_steps = 0
         self._note(snapshot)
 
@@ -59,12 +68,9 @@ class Tally:
         self._env_steps += report.env_steps
         for agent in report.agents:
             name = agent.agent
+            self._deeds.add(agent)
             self._usage[name] += agent.usage
-            self._statuses[name][agent.status] += 1
             self._rejections.update(rejection.reason for rejection in agent.rejections)
-            self._accepted += len(agent.accepted)
-            if agent.status == "fallback":
-                self._fallbacks[name][agent.detail] += 1
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:
@@ -77,17 +83,20 @@ class Tally:
         self._lag_s = report.timings.lag_s
         self._note(after)
 
-    def result(self, run: str, episode: int, *, wall_s: float, gone: Collection[Seat] = ()) -> Result:
+    def result(self, run: str, episode: int, *, wall_s: float, agents_lost: Mapping[Seat, str] | None = None) -> Result:
         """Return the account at the end of the episode.
 
         Args:
             run: name of the run.
             episode: its number, from 0.
             wall_s: wall time of the episode.
-            gone: required agents, of any side, that went away for good and so ended it.
+            agents_lost: required agents, of any side, that will not decide any more and so ended it, and why.
         """
-        outcome, cause = self._ending(gone)
-        why_not = self._invalid_because(gone)
+        agents_lost = agents_lost or {}
+        outcome, cause = self._ending(agents_lost)
+        why_not = why_not_valid(
+            self._deeds, self._required, limit=self._limit, lost=agents_lost, forfeit=self._last.forfeit
+        )
         killed = Casualties(units=self._dead[Alliance.ENEMY], value=self._last.score.killed - self._first.score.killed)
         lost = Casualties(units=self._dead[Alliance.OWN], value=self._last.score.lost - self._first.score.lost)
         return Result(
@@ -109,38 +118,28 @@ class Tally:
             kd=killed.value / lost.value if lost.value else None,
             score=self._last.score.total,
             usage=dict(self._usage),
-            statuses={name: dict(count) for name, count in self._statuses.items()},
+            statuses={name: dict(count) for name, count in self._deeds.statuses.items()},
             unasked={name: dict(count) for name, count in self._unasked.items()},
             rejections=dict(self._rejections),
             fates={name: dict(count) for name, count in self._fates.items()},
-            fallbacks={name: dict(count) for name, count in self._fallbacks.items()},
+            accepted_of=dict(self._deeds.accepted),
+            fallbacks={name: dict(count) for name, count in self._deeds.causes.items()},
             incidents=tuple(self._incidents[:MAX_INCIDENTS]),
             advisers=dict(self._advisers),
             age_p50_loops=_quantile(self._ages_loops, 0.5),
             age_p95_loops=_quantile(self._ages_loops, 0.95),
             lag_s=self._lag_s,
-            accepted=self._accepted,
+            accepted=self._deeds.accepted.total(),
             latency_p50_s=statistics.median(self._latencies_s) if self._latencies_s else None,
             latency_p95_s=_quantile(self._latencies_s, 0.95),
         )
 
-    def _ending(self, gone: Collection[Seat]) -> tuple[Ending, str]:
+    def _ending(self, lost: Mapping[Seat, str]) -> tuple[Ending, str]:
         if self._last.outcome is not None:
             return self._last.outcome, self._last.forfeit or CAUSES[self._last.outcome]
-        return ("aborted", "agents gone") if gone else ("draw", "step limit")
-
-    def _invalid_because(self, gone: Collection[Seat]) -> str:
-        """Return why the episode says nothing about its agents; "" if it does."""
-        if gone:
-            return f"required agents went away: {', '.join(map(str, gone))}"
-        if (forfeit := self._last.forfeit) in NO_MERIT:
-            return NO_MERIT[forfeit]
-        silent = [agent for agent in self._required if self._failed_always(agent)]
-        return f"no model ever answered for {', '.join(silent)}" if silent else ""
-
-    def _failed_always(self, agent: str) -> bool:
-        statuses = self._statuses[agent]
-        return bool(statuses) and not statuses["ok"]
+        if not lost:
+            return "draw", "step limit"
+        return "aborted", "agents gone" if AWAY in lost.values() else REFUSED
 
     def _note(self, snapshot: Snapshot) -> None:
         self._dead.update(self._alliance[tag] for tag in snapshot.dead if tag in self._alliance)
@@ -150,13 +149,6 @@ class Tally:
 
 CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
 """What a result of the game means on maps that end by the death of one side or by a clock."""
-
-
-NO_MERIT: dict[Forfeit | None, str] = {
-    "guest gone": "the guest's connection or process ended, so that nobody was beaten",
-    "guest hung": "the guest did not go on, so that nobody was beaten",
-}
-"""Why a win over a guest that went away says nothing; one that gives up is beaten."""
 
 
 def valid_together(results: Sequence[Result]) -> Sequence[Result]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.text import Text
 
-from khala_orchestrator.console import STATUS, card, clock, side, speaker, table, two_sides, visible_message
+from khala_orchestrator.console import card, clock, side, speaker, style_of, table, two_sides, visible_message
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import (
@@ -147,8 +147,9 @@ def _report(report: Report, selection: StepSelection, *, named: bool) -> Iterato
 def _agent(agent: AgentReport, *, named: bool) -> Iterator[Text]:
     latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
     ignored = f", {agent.ignored} ignored" if agent.ignored else ""
-    detail = f" ({visible_line(agent.detail)})" if agent.detail else ""
-    status = (agent.status, STATUS[agent.status])
+    why = ": ".join(filter(None, (agent.detail, agent.reason)))
+    detail = f" ({visible_line(why)})" if why else ""
+    status = (agent.status, style_of(agent.status))
     yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:

@@ -14,10 +14,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.validity import AWAY
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, PeerError, WrongKey
@@ -25,7 +26,7 @@ from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
 from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from types import TracebackType
 
     from khala_orchestrator.roster import Roster
@@ -43,7 +44,7 @@ class Answer:
     """The outcome of asking one agent.
 
     Attributes:
-        status: `ok` and `fallback` have a reply, the others none.
+        status: who decided, or why nobody did; `late` and `gone` have no reply.
         latency_s: from the publication of the observation to the reply's arrival.
         ignored: replies of this agent that arrived since its answer before and were not accepted.
     """
@@ -60,6 +61,11 @@ class Answer:
         return self.reply.text if self.reply else None
 
     @property
+    def reason(self) -> str:
+        """Why the agent did not decide, in the words of its endpoint or its policy."""
+        return self.reply.reason if self.reply else ""
+
+    @property
     def usage(self) -> Usage:
         """The usage of the reply."""
         return self.reply.usage if self.reply else Usage()
@@ -74,8 +80,9 @@ class Answers:
     wait_s: float = 0.0
     held_s: float = 0.0
     """Of `wait_s`: until the last agent that was away was back, and had all its time again."""
-    lost: Collection[Seat] = ()
-    """Required agents that went away and did not come back within the grace."""
+    lost: Mapping[Seat, str] = field(default_factory=dict)
+    """Required agents that will not decide any more, and why: they went away and did not come back within the grace, or
+    their endpoint refuses them for good."""
     incidents: Sequence[str] = ()
     """What failed while the agents were asked, and was overcome or not; a sentence each."""
     advice: Sequence[Advice] = ()
@@ -297,12 +304,20 @@ class Turn:
         for seat in settled:
             del self._open[seat]
         answers = {seat: self._answer(seat, asked) for seat, asked in settled.items()}
-        lost = [seat for seat, asked in settled.items() if asked.held]
-        for seat in lost:
+        lost = {seat: why for seat, asked in settled.items() if (why := self._why_lost(seat, asked))}
+        for seat in (seat for seat, why in lost.items() if why == AWAY):
             self._note(f"required agent {seat} did not come back within {self._grace_s:g} s")
             self._held_until = asyncio.get_running_loop().time()
         incidents, self._incidents = self._incidents, []
         return Answers(answers, lost=lost, incidents=incidents, advice=self._advice())
+
+    def _why_lost(self, seat: Seat, asked: _Question) -> str:
+        """Return why an agent will not decide any more that the match needs; "" if it may."""
+        if asked.held:
+            return AWAY
+        if asked.reply is not None and asked.reply.hopeless and seat in self._required:
+            return asked.reply.reason or asked.reply.detail
+        return ""
 
     def _note(self, incident: str) -> None:
         log.warning("%s", incident)

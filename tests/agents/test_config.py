@@ -11,12 +11,14 @@ import pytest
 from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.money import Budget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import FunctionPolicy, ObjectPolicy
 from khala_agents.scripted.policies import Silent
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +45,7 @@ def test_every_shipped_model_file_is_tried() -> None:
 
 def test_the_shipped_agents_file_makes_policies() -> None:
     file = load_agents(ROOT / "configs" / "agents" / "mixed.yaml")
-    workshop = Workshop(budget_usd=file.budget_usd)
+    workshop = Workshop(budget=Budget(file.budget_usd))
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     assert {name: type(policy) for name, policy in policies.items()} == {
         "CombatGroupSmac": LLMPolicy,
@@ -186,6 +188,7 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_a_policy_is_found_by_its_module_in_the_current_directory(module: Path) -> None:
+    trust_named("my_agent:decide")
     assert isinstance(load_policy("my_agent:decide"), FunctionPolicy)
     made, mine = load_policy("my_agent:Mine"), load_policy("my_agent:mine")
     assert isinstance(made, ObjectPolicy)
@@ -221,6 +224,7 @@ BAD_POLICIES = [
 
 @pytest.mark.parametrize(("name", "text"), BAD_POLICIES)
 def test_a_policy_that_cannot_be_had_is_one_clear_sentence(module: Path, name: str, text: str) -> None:
+    trust_named(name)
     with pytest.raises(ConfigError) as caught:
         load_policy(name)
     assert str(caught.value) == text
@@ -229,7 +233,9 @@ def test_a_policy_that_cannot_be_had_is_one_clear_sentence(module: Path, name: s
 BAD_SPECS = [
     ("opnai", None, {}, "there is no model file 'opnai': did you mean openai?; a path to a .yaml file works too"),
     ("no.yaml", None, {}, "no.yaml: there is no such file"),
-    ("deepseek", 1.0, {}, "deepseek: a budget needs the prices of the model, and there are none"),
+    ("vllm", 1.0, {}, ("a budget needs the price of Qwen/Qwen2.5-7B-Instruct at 127.0.0.1:8000, and no price is known: "
+     "write `prices: {prompt: …, completion: …}` into its model file, in US dollars per million tokens; 0 for a model "
+     "of your own")),
     ("scripted", None, {"base_url": "localhost"}, ("command line (base_url): 'localhost' is no URL that begins with "
      "http:// or https://")),
 ]  # fmt: skip
@@ -241,5 +247,5 @@ def test_a_model_that_cannot_be_had_is_one_clear_sentence(
 ) -> None:
     monkeypatch.setenv("DEEPSEEK_API_KEY", "sk-0123456789")
     with pytest.raises(ConfigError) as caught:
-        Workshop(budget_usd=budget, overrides=overrides).policy(WorkerSpec(model=model))
+        Workshop(budget=Budget(budget), overrides=overrides).policy(WorkerSpec(model=model))
     assert str(caught.value) == text

@@ -13,7 +13,8 @@ from khala_agents.config import WorkerSpec
 from khala_agents.fallback import Fallback
 from khala_agents.llm.breaker import Breaker, BreakerRule
 from khala_agents.llm.client import Completion, LLMError, OutOfMoney, Request, Unreachable
-from khala_agents.llm.limits import Budget, Limits
+from khala_agents.llm.limits import Limits
+from khala_agents.llm.money import Budget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
@@ -105,7 +106,14 @@ async def test_an_endpoint_that_dies_in_a_match_costs_no_step_and_is_asked_again
     ]
     assert [round(s, 2) for s in taken_s] == [0, 0, 8.55, 0, 0, 0]  # of 10 s: 0.5 are for sending, 0.95 for the other
     assert client.asked == 4, "an endpoint that is away is not asked"
-    assert tally.fallbacks == {"connection: fixed": 1, "timeout: fixed": 1, "endpoint away: fixed": 2}
+    assert tally.undecided == {"connection: fixed": 1, "timeout: fixed": 1, "endpoint away: fixed": 2}
+
+
+async def decided(policy: Fallback, briefing: Briefing, observation: Observation) -> tuple[str, str, str]:
+    """Return text, status and detail of a decision."""
+    decision = await policy.decide(Context(briefing, observation))
+    assert isinstance(decision, Decision)
+    return decision.text, decision.status, decision.detail
 
 
 async def test_when_the_money_is_used_up_the_other_policy_decides(
@@ -114,10 +122,10 @@ async def test_when_the_money_is_used_up_the_other_policy_decides(
     limits = Limits(budget=Budget(1.0), prices=Prices(prompt=1.0, completion=1.0))
     policy = Fallback(LLMPolicy(client, limits=limits), Fixed(OTHER), name="fixed")
     assert await policy.decide(Context(briefing(), observation())) == "of the model"
-    assert await policy.decide(Context(briefing(), observation(1))) == Decision(OTHER, "fallback", "budget: fixed")
+    assert await decided(policy, briefing(), observation(1)) == (OTHER, "fallback", "budget: fixed")
     client.state, client.error = "down", OutOfMoney("no credit", status="http 402")
     empty = Fallback(LLMPolicy(client), Fixed(OTHER), name="fixed")
-    assert await empty.decide(Context(briefing(), observation())) == Decision(OTHER, "fallback", "budget: fixed")
+    assert await decided(empty, briefing(), observation()) == (OTHER, "fallback", "budget: fixed")
 
 
 async def test_agents_of_a_process_share_what_they_know_of_an_endpoint(

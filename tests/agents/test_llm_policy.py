@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.llm.client import EndpointUnavailable, LLMError, Unreachable
-from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits
+from khala_agents.llm.client import EndpointUnavailable, LimitExceeded, LLMError, Unreachable
+from khala_agents.llm.limits import LimitRules, Limits
+from khala_agents.llm.money import Budget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import WholeSteps
-from khala_agents.policy import Context
+from khala_agents.policy import Context, Said
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import ModelCall, Usage
 
@@ -38,7 +39,7 @@ class Asked:
     policy: LLMPolicy
     exchanges: list[ModelCall] = field(default_factory=list)
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+    async def decide(self, briefing: Briefing, observation: Observation) -> Said:
         return await self.policy.decide(Context(briefing, observation, trace=self.exchanges.append))
 
 

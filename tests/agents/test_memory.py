@@ -12,7 +12,7 @@ from khala_agents.config import WorkerSpec
 from khala_agents.llm.client import Completion, LLMError
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import NoMemory, ShortSteps, WholeSteps, first_sentence, memory_of
-from khala_agents.policy import Context
+from khala_agents.policy import Context, Said
 from khala_agents.prompt import system_text
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import MemoryRule, ModelCall, Received, Rejection, Usage, View
@@ -133,7 +133,7 @@ class Played:
         self.policy, self.briefing = policy, briefing
         self.exchanges: list[ModelCall] = []
 
-    async def play(self, observations: list[Observation]) -> list[str]:
+    async def play(self, observations: list[Observation]) -> list[Said]:
         """Return the replies to these observations, one a second; the policy thinks on meanwhile."""
         said, thinking = [], []
         for seen in observations:
@@ -183,7 +183,7 @@ async def test_who_goes_on_with_a_match_remembers_the_steps_before_as_its_own(
     whole = Played(LLMPolicy(Model()), briefing(memory=rule))
     said = await whole.play(game)
     late = Played(LLMPolicy(Model()), briefing(memory=rule))
-    late.policy.remember(list(zip(game[:4], said, strict=False)))
+    late.policy.remember(list(zip(game[:4], map(str, said), strict=False)))
     await late.policy.prepare(late.briefing)
     await late.play(game[4:])
     prompts, recorded = ([call.prompt for call in played.exchanges] for played in (late, whole))

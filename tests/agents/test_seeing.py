@@ -19,7 +19,7 @@ from khala_agents.llm.vision import ANTHROPIC, Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import WholeSteps
 from khala_agents.pictures import PictureStore
-from khala_agents.policy import Context, Policy
+from khala_agents.policy import Context, Policy, Said
 from khala_agents.worker import run_worker
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode_as, encode
@@ -111,7 +111,7 @@ class Asked:
     pictures: PictureStore = field(default_factory=PictureStore)
     exchanges: list[ModelCall] = field(default_factory=list)
 
-    async def decide(self, briefing: Briefing, observation: Observation) -> str:
+    async def decide(self, briefing: Briefing, observation: Observation) -> Said:
         return await self.policy.decide(Context(briefing, observation, self.pictures, self.exchanges.append))
 
 
@@ -145,9 +145,9 @@ class Counting(Limits):
         self.tokens: list[int] = []
 
     @asynccontextmanager
-    async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
+    async def admit(self, *, tokens: int, answer_tokens: int | None, deadline: float | None) -> AsyncIterator[Ticket]:
         self.tokens.append(tokens)
-        async with super().admit(tokens=tokens, deadline=deadline) as ticket:
+        async with super().admit(tokens=tokens, answer_tokens=answer_tokens, deadline=deadline) as ticket:
             yield ticket
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from khala_agents.guard import Guard
 from khala_agents.llm.client import LLMError, RequestRefused
-from khala_agents.llm.limits import Budget, Limits
+from khala_agents.llm.limits import Limits
+from khala_agents.llm.money import Budget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Decision, FunctionPolicy, Policy
@@ -222,7 +223,7 @@ async def test_what_is_no_observation_is_dropped_and_the_next_one_answered(
 # --- deadlines --------------------------------------------------------------------------------------------
 
 
-async def test_an_empty_fallback_is_sent_before_the_deadline_when_the_policy_is_late(
+async def test_an_empty_reply_is_sent_before_the_deadline_when_the_policy_is_late(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     policy = Slow(60.0)
@@ -230,12 +231,12 @@ async def test_an_empty_fallback_is_sent_before_the_deadline_when_the_policy_is_
     await host.say(briefing())
     await host.say(observation(within_s=10.0))
     (reply,) = await host.replies(1)
-    assert (reply.status, reply.detail, reply.text) == ("fallback", "timeout", "")
+    assert (reply.status, reply.detail, reply.text) == ("late", "timeout", "")
     assert 9.0 < reply.latency_s < 10.0
     assert policy.cancelled == [0]
 
 
-async def test_a_policy_that_will_not_be_cancelled_does_not_delay_the_fallback(
+async def test_a_policy_that_will_not_be_cancelled_does_not_delay_the_empty_reply(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     await players.start(Slow(60.0, 0.5, stubborn=True))
@@ -244,7 +245,7 @@ async def test_a_policy_that_will_not_be_cancelled_does_not_delay_the_fallback(
     await host.replies(1)
     await host.say(observation(step=1, within_s=20.0))
     first, second = await host.replies(2)
-    assert (first.status, first.latency_s < 1.0) == ("fallback", True)
+    assert (first.status, first.latency_s < 1.0) == ("late", True)
     assert second.text.startswith("step 1")
     await asyncio.sleep(10)
     assert len(host.of(Reply)) == 2, "the answer of the old request was taken for one"
@@ -261,13 +262,13 @@ async def test_without_a_deadline_a_policy_may_take_as_long_as_it_likes(
     assert reply.latency_s == pytest.approx(3600, abs=1)
 
 
-async def test_no_briefing_at_all_ends_in_a_fallback(
+async def test_no_briefing_at_all_ends_in_a_late_reply(
     host: Any, players: Players, observation: Callable[..., Observation]
 ) -> None:
     await players.start(Fixed(ATTACK))
     await host.say(observation(within_s=2.0))
     (reply,) = await host.replies(1)
-    assert (reply.status, reply.detail) == ("fallback", "timeout")
+    assert (reply.status, reply.detail) == ("late", "timeout")
 
 
 async def test_a_newer_observation_supersedes_the_one_that_is_being_decided(
@@ -332,7 +333,7 @@ FAILURES = [
 
 
 @pytest.mark.parametrize(("decide", "detail"), FAILURES, ids=[detail for _, detail in FAILURES])
-async def test_a_policy_that_fails_becomes_a_fallback_and_the_worker_lives_on(
+async def test_a_policy_that_fails_gives_a_failed_decision_and_the_worker_lives_on(
     host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation],
     decide: Callable[[Briefing, Observation], Awaitable[Said]], detail: str,
 ) -> None:  # fmt: skip
@@ -342,8 +343,8 @@ async def test_a_policy_that_fails_becomes_a_fallback_and_the_worker_lives_on(
         await host.say(observation(step=step))
         await host.replies(step + 1)
     assert [(r.step, r.status, r.detail, r.text) for r in host.of(Reply)] == [
-        (0, "fallback", detail, ""),
-        (1, "fallback", detail, ""),
+        (0, "failed", detail, ""),
+        (1, "failed", detail, ""),
     ]
     assert host.of(Reply)[1].latency_s < 1.0
 
@@ -382,7 +383,7 @@ async def test_a_function_that_blocks_holds_nobody_up(
     await host.say(observation(step=1, within_s=None))
     released.set()
     _, reply = await host.replies(2)
-    assert (late.status, late.detail) == ("fallback", "timeout")
+    assert (late.status, late.detail) == ("late", "timeout")
     assert (reply.step, reply.status) == (1, "ok")
 
 
@@ -426,7 +427,7 @@ async def test_exchanges_are_published_and_summed_up_in_the_reply(
         await host.say(observation(step=step))
         await host.replies(step + 1)
     failed, good = host.of(Reply)
-    assert (failed.status, failed.attempts, failed.usage) == ("fallback", 1, Usage(requests=1))
+    assert (failed.status, failed.attempts, failed.usage) == ("failed", 1, Usage(requests=1))
     assert (good.status, good.attempts) == ("ok", 1)
     assert good.usage == Usage(requests=1, prompt_tokens=100, completion_tokens=10, cost_usd=0.5)
     tally = await players.end()
@@ -463,14 +464,14 @@ async def test_a_request_that_the_deadline_cut_off_is_counted_as_unknown_and_not
     await host.say(briefing())
     await host.say(observation(within_s=5.0))
     (reply,) = await host.replies(1)
-    assert (reply.status, reply.detail, reply.attempts) == ("fallback", "timeout", 1)
+    assert (reply.status, reply.detail, reply.attempts) == ("late", "timeout", 1)
     assert reply.usage == Usage(requests=1, unknown_requests=1)
     await players.end()
     (exchange,) = host.of(ModelCall)
     assert (exchange.status, exchange.completion) == ("cancelled", None)
 
 
-async def test_an_agent_without_money_goes_on_with_fallbacks(
+async def test_an_agent_without_money_goes_on_without_decisions(
     host: Any, players: Players, listed_model: Any, briefing: Callable[..., Briefing],
     observation: Callable[..., Observation], caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
@@ -482,7 +483,7 @@ async def test_an_agent_without_money_goes_on_with_fallbacks(
         await host.say(observation(step))
         await host.replies(step + 1)
     said = [(r.text, r.status, r.detail, r.attempts) for r in host.of(Reply)]
-    assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("", "fallback", "budget", 0)] * 3]
+    assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("", "failed", "budget", 0)] * 3]
     assert len(model.requests) == 2
     (record,) = caplog.records
     assert "the limit budget_usd = 1 of --budget-usd is reached (1)" in record.getMessage()
@@ -624,5 +625,5 @@ async def test_several_agents_play_in_one_process_each_with_its_own_policy(
     assert {name: dict(tally.replies) for name, tally in tallies.items()} == {
         "A": {"ok": 1},
         "B": {"ok": 1},
-        "C": {"fallback": 1},
+        "C": {"failed": 1},
     }

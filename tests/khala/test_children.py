@@ -11,23 +11,19 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import pytest
 
 from khala import environment
 from khala.children import ChildDied, Children
-from khala.local import _Share
 from khala_agents.config import ModelConfig
 from khala_protocol import parent_watch
-from khala_protocol.messages import Usage
 from khala_simulator.process import parent_watch as simulator_watch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala_protocol.messages import Report
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 GONE_S = 2.0
@@ -165,15 +161,6 @@ async def test_a_child_that_fails_again_and_again_has_failed_for_good_in_its_las
     assert "started again" not in str(died.value)
     assert (tmp_path / "wrong.log").read_text().count("there is no module") == 2
     assert (tmp_path / "wrong.log").stat().st_mode & 0o777 == 0o600
-
-
-def test_a_process_that_is_started_again_may_spend_what_its_agents_left() -> None:
-    share = _Share("agents-0", "blue", ["A", "B"], ["--run", "r"], {}, 0.5)
-    usages = {"A": 0.125, "B": None, "C": 9.0}
-    agents = [SimpleNamespace(agent=name, usage=Usage(cost_usd=cost)) for name, cost in usages.items()]
-    for side in ("blue", "red"):  # an agent of the same name spends what its own side has
-        share.spend(cast("Report", SimpleNamespace(side=side, agents=agents)))
-    assert share.arguments == ["agent", "A", "B", "--side", "blue", "--run", "r", "--budget-usd", "0.375"]
 
 
 ENVIRON = {

@@ -248,7 +248,7 @@ BAD = [
     ("timed.mcap --at 3 --policy silent", "play it with --clock token, which counts tokens instead"),
     ("golden.mcap --at 3 --model nope", "there is no model file 'nope'"),
     ("golden.mcap --at 3 --model openai", "no key: set the environment variable OPENAI_API_KEY"),
-    ("golden.mcap --at 3 --policy silent --budget-usd 1 --agent Stalkers=vllm", "a budget needs the prices"),
+    ("golden.mcap --at 3 --policy silent --budget-usd 1 --agent Stalkers=vllm", "a budget needs the price of Qwen"),
     ("golden.mcap --at 3 --agent Stalkers=silent", "nobody decides for blue/Zealots after the step"),
     ("golden.mcap --at 3 --agent Stalkers", "--agent: 'Stalkers' names no agent and its model"),
     ("golden.mcap --at 3 --model silent --agent Who=silent", "there are blue/Stalkers, blue/Zealots"),

@@ -107,7 +107,7 @@ async def test_an_agent_that_stalls_is_late_and_the_game_goes_on(game: Sides) ->
     result = await table.play(stall)
     assert table.statuses("Zealots") == ["ok"] * 4
     # the worker gives up a moment before the host does, and reports it
-    assert table.statuses("Stalkers") == ["ok", "ok", "fallback", "fallback"]
+    assert table.statuses("Stalkers") == ["ok", "ok", "late", "late"]
     assert result.steps == 4
 
 
@@ -229,7 +229,7 @@ async def test_the_default_reply_of_the_task_counts_for_an_agent_that_says_nothi
 
     table = Table(game, steps=2, default_reply="<Move_Screen([13, 12])>\n<MessageTo(Zealots, 'I am late')>")
     await table.play(stall)
-    assert table.statuses("Stalkers") == ["ok", "fallback"]
+    assert table.statuses("Stalkers") == ["ok", "late"]
     assert [report.agents[0].accepted for report in table.reports] == [(), ("Stalker-1 <Move_Screen([13, 12])>",)]
     assert [[m.text for m in report.messages] for report in table.reports] == [[], ["I am late"]]
 

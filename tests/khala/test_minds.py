@@ -8,8 +8,10 @@ import pytest
 import typer
 
 from khala.commands import until_interrupted, why_not_valid
-from khala.local import _shares_of, _taken_off
-from khala.minds import Minds, minds_of, named_sides, spent_usd
+from khala.local import _shares_of, spent_before
+from khala.minds import Minds, minds_of, named_sides
+from khala.spending import spent_usd
+from khala_agents.llm.money import Ledger
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Seat
 from khala_protocol.codec import encode
@@ -54,7 +56,7 @@ def test_both_sides_may_spend_the_same() -> None:
     assert [mind.budget_usd for mind in minds.values()] == [1.5, 1.5]
     groups = [(side, mind, ["A", "B", "C"]) for side, mind in minds.items()]
     shares = [share for share in _shares_of(groups, [], None) if share.side == "red"]
-    assert [(share.process, share.names, share.left_usd) for share in shares] == [
+    assert [(share.process, share.names, share.budget_usd) for share in shares] == [
         ("agents-red-0", ["A", "B", "C"], 1.5),
     ]
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
@@ -110,17 +112,24 @@ def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(
     }
 
 
-def test_a_resumed_match_may_spend_what_is_left_and_says_how_much_that_is() -> None:
-    spent = {Seat("blue", "A"): 0.75, Seat("blue", "C"): 0.25, Seat("blue", "B"): 0.25, Seat("red", "B"): 1.5}
+def test_a_resumed_match_says_what_was_spent_and_what_is_left_for_each_side() -> None:
+    ledger = Ledger()
+    assert spent_before(ledger, {"blue": Minds(budget_usd=2.0)}) == ""
+    ledger.pay("blue", 1.25)
+    ledger.pay("red", 2.0)
     rich = Minds(policy="silent", budget_usd=2.0)
-    shares = list(_shares_of([(side, rich, ["A", "B", "C"]) for side in ("blue", "red")], [], None))
-    assert _taken_off(shares, spent) == (
-        "2.7500 USD were spent before, 1.7500 of the budget are left; nothing for A, C, B, "
-        "so each of their steps is a fallback"
+    assert spent_before(ledger, {"blue": rich, "red": rich}) == (
+        "3.2500 USD were spent before, 0.7500 of the budget are left; nothing for side red, so that its models are not "
+        "asked"
     )
-    assert [share.arguments[-1] for share in shares] == ["0.0", "0.75", "1.0", "0.0"]
+    assert "--budget-usd does" in spent_before(ledger, {"blue": Minds(policy="silent")})
+
+
+def test_all_processes_of_a_side_share_its_budget() -> None:
+    rich = Minds(policy="silent", budget_usd=2.0)
+    shares = list(_shares_of([("blue", rich, ["A", "B", "C"])], ["--ledger", "match.ledger"], None))
+    assert [share.arguments[-2:] for share in shares] == [["--budget-usd", "2.0"]] * 3
     (free,) = _shares_of([("blue", Minds(policy="silent"), ["A"])], [], None)
-    assert "--budget-usd does" in _taken_off([free], spent)
     assert "--budget-usd" not in free.arguments
 
 

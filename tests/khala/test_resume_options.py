@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 UNSAID: dict[str, Any] = dict.fromkeys(RECORDED.keys() - {"task", "run"})
 TAKEN = {
-    *("resume", "out", "as_json", "game", "assemble", "connect", "listen", "tls", "insecure"),
+    *("resume", "out", "as_json", "game", "assemble", "connect", "listen", "tls", "insecure", "trust"),
     *("model", "model_name", "base_url", "policy", "fallback", "blue", "red", "side_model", "budget_usd", "latency"),
 }
 

@@ -218,10 +218,19 @@ async def test_the_task_says_what_becomes_of_a_match_without_an_agent(
     assert (result.steps, result.outcome) == (steps, outcome)
 
 
-async def test_a_match_that_no_model_ever_answered_is_not_valid(hall: Hall, config: MakeConfig) -> None:
+async def test_a_match_in_which_a_model_never_answered_is_not_valid(hall: Hall, config: MakeConfig) -> None:
     hall.game.after = {2: {"outcome": "win"}}
-    fails = taking(0, ATTACK, status="fallback", detail="http 401")
+    fails = taking(0, ATTACK, status="failed", detail="http 500", reason="the endpoint is on fire")
     (result,) = await hall.play(config(), Stalkers=fails)
     assert (result.outcome, result.valid) == ("win", False)
-    assert result.invalid_because == "no model ever answered for Stalkers"
-    assert result.fallbacks == {"Stalkers": {"http 401": 3}}
+    assert result.invalid_because == "Stalkers never decided (3 http 500, first: the endpoint is on fire)"
+    assert result.fallbacks == {"Stalkers": {"http 500": 3}}
+
+
+async def test_an_endpoint_that_refuses_an_agent_for_good_ends_the_match_in_its_first_step(
+    hall: Hall, config: MakeConfig
+) -> None:
+    refused = taking(0, "", status="failed", detail="http 404", reason="there is no model 'x'", hopeless=True)
+    (result,) = await hall.play(config(max_steps=50), Stalkers=refused)
+    assert (result.steps, result.outcome, result.cause, result.valid) == (1, "aborted", "model refused", False)
+    assert result.invalid_because == "the endpoint of blue/Stalkers will not answer it: there is no model 'x'"

@@ -18,6 +18,7 @@ from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report, Run
 from khala_protocol.recording import Recorder, Recording
+from khala_protocol.trust import Untrusted
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection
@@ -119,9 +120,9 @@ def foreign(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 async def test_a_recording_imports_no_module_by_itself(foreign: Recording, again: Replay) -> None:
-    with pytest.raises(RecordingError, match=r"names the module 'foreign_sections' for a section of its text") as error:
+    with pytest.raises(Untrusted, match=r"foreign.mcap: this names the code 'foreign_sections'") as error:
         await again(foreign)
-    assert str(error.value).endswith("if you trust it, allow modules=['foreign_sections']")
+    assert str(error.value).endswith("if you trust it, say --trust, or set KHALA_TRUST=foreign_sections")
     assert "foreign_sections" not in sys.modules
 
 

@@ -543,7 +543,7 @@ async def test_a_required_agent_that_dies_is_waited_for_and_its_successor_loses_
         await asyncio.sleep(9)
         await again.reply("back")
         answers = await asked
-    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("back", [])
+    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("back", {})
     assert answers.incidents == ["required agent p1/Zealots was away for 29.0 s"]
     assert (answers.wait_s, answers.held_s) == (29 + 9, 29)
 
@@ -559,7 +559,7 @@ async def test_a_required_agent_that_does_not_come_back_is_lost(
     assert {seat.agent: answer.status for seat, answer in answers.by_seat.items()} == dict.fromkeys(
         ("Zealots", "Stalkers"), "gone"
     )
-    assert answers.lost == [ZEALOTS]
+    assert answers.lost == {ZEALOTS: "it went away"}
     assert answers.held_s == answers.wait_s == 30
     assert answers.incidents == ["required agent p1/Zealots did not come back within 30 s"]
 
@@ -575,7 +575,7 @@ async def test_one_that_is_back_and_silent_is_late_and_not_lost(
         await peer(ZEALOTS).arrive("2")
         answers = await asked
         assert asyncio.get_running_loop().time() == 5 + 20 + 10
-    assert (answers.by_seat[ZEALOTS].status, answers.lost) == ("late", [])
+    assert (answers.by_seat[ZEALOTS].status, answers.lost) == ("late", {})
     assert answers.wait_s - answers.held_s == 10
 
 
@@ -621,7 +621,7 @@ async def test_garbage_under_the_name_of_one_that_is_away_ends_no_wait(
         assert not asked.done()
         await zealots.reply("not of mine")
         answers = await asked
-    assert (answers.by_seat[ZEALOTS].text, answers.by_seat[ZEALOTS].ignored, answers.lost) == ("not of mine", 1, [])
+    assert (answers.by_seat[ZEALOTS].text, answers.by_seat[ZEALOTS].ignored, answers.lost) == ("not of mine", 1, {})
 
 
 async def test_one_whose_return_was_not_reported_is_found_by_its_answer(
@@ -654,7 +654,7 @@ async def test_while_our_own_link_is_down_the_clock_stands_still(
         await zealots.reply("I never left")
         answers = await asked
         assert asyncio.get_running_loop().time() == 20
-    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("I never left", [])
+    assert (answers.by_seat[ZEALOTS].text, answers.lost) == ("I never left", {})
 
 
 # --- without waiting ------------------------------------------------------------------------------------

@@ -94,7 +94,7 @@ def test_a_field_cannot_be_assigned() -> None:
         ({"v": 2}, "Input should be 1"),
         ({"kind": "message"}, "Input should be 'reply'"),
         ({"step": -1}, "Input should be greater than or equal to 0"),
-        ({"status": "late"}, "Input should be 'ok' or 'fallback'"),
+        ({"status": "gone"}, "Input should be 'ok', 'empty', 'cut'"),
         ({"latency_s": float("nan")}, "Input should be a finite number"),
         ({"latency_s": float("inf")}, "Input should be a finite number"),
         ({"text": b"\xff"}, "Input should be a valid string"),

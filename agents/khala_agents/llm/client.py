@@ -11,7 +11,7 @@ A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_age
     ├── Unreachable             the link's: refused, reset, broken in the middle
     ├── TryTimeout              the time of this one try is over
     ├── MalformedCompletion     the provider's: "200 OK" without a completion in it
-    └── limits.LimitExceeded    ours: a limit that this process was given
+    └── LimitExceeded           ours: a limit that the user has set
 
 No error text holds a key: texts of a server pass through `khala_agents.secret.excerpt`.
 """
@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import ChatMessage, Usage
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Purpose
 
 Scalar = str | int | float | bool | None
+
+LimitType: TypeAlias = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
 
 Verdict: TypeAlias = Literal["ok", "empty", "cut", "refused", "filtered"]
 """Whether a completion has words to play. If not: the model said nothing, it reached its limit of tokens before it said
@@ -149,10 +151,12 @@ class LLMError(KhalaError):
         status: as in `ModelCall.status`: `http 429`, `timeout`, `connection`, …
         retryable: whether the same request may succeed a little later.
         may_be_billed: whether an answer may have been generated; False if it is known that none was.
+        hopeless: whether no request of this agent will ever succeed; `khala_agents.llm_policy` knows.
     """
 
-    retryable: ClassVar[bool] = False
+    retryable: bool = False
     may_be_billed: bool = True
+    hopeless: bool = False
 
     def __init__(self, message: str, *, status: str) -> None:
         self.status = status
@@ -214,6 +218,24 @@ class TryTimeout(LLMError):
         super().__init__(message, status="timeout")
 
 
+class LimitExceeded(LLMError):
+    """A request would exceed a limit that the user has set.
+
+    Attributes:
+        type: which limit.
+        value: its value with this request.
+        limit: its maximum.
+        source: where it was set.
+    """
+
+    may_be_billed = False
+
+    def __init__(self, kind: LimitType, *, value: float, limit: float, source: str) -> None:
+        self.type, self.value, self.limit, self.source = kind, value, limit, source
+        text = f"the limit {kind} = {limit:g} of {source} is reached ({value:.4g})"
+        super().__init__(text, status="budget" if kind == "budget_usd" else "limit")
+
+
 class MalformedCompletion(LLMError):
     """The endpoint's answer is not a completion."""
 
@@ -236,12 +258,16 @@ def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
 
 
 def estimated_tokens(messages: Sequence[ChatMessage], vision: Vision | None = None) -> int:
-    """Return the tokens of a prompt: texts at about four characters a token, pictures by the model's rule."""
+    """Return the tokens of a prompt: texts at about four bytes a token, pictures by the model's rule."""
     texts = (text for message in messages for text in (message.content, *(image.title for image in message.images)))
-    words = sum(-(-len(text) // 4) for text in texts)
+    words = sum(-(-_bytes(text) // 4) for text in texts)
     return words + (estimated_image_tokens(messages, vision) if vision else 0)
 
 
 def estimated_image_tokens(messages: Iterable[ChatMessage], vision: Vision) -> int:
     """Return the tokens of the pictures of a prompt."""
     return sum(vision.image_tokens(image) for message in messages for image in message.images)
+
+
+def _bytes(text: str) -> int:
+    return len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))

@@ -1,12 +1,12 @@
 """Limits that agents share: requests in flight, requests and tokens a minute, money.
 
-    async with limits.admit(tokens=900, deadline=…) as ticket:
+    async with limits.admit(tokens=900, answer_tokens=1000, deadline=…) as ticket:
         completion = await client.complete(request)
         ticket.settle(completion.usage)
 
 `admit` waits for its turn, in the order of arrival, and raises `LimitExceeded` where waiting is useless: the
 money is used up, or the turn would come after the deadline. It knows no model and no HTTP. `khala_agents.llm.retry`
-handles a provider's own limits; these keep an experiment below them, and within its budget.
+handles a provider's own limits; these keep an experiment below them, and within its budget (`khala_agents.llm.money`).
 
 Requests wait at a `Gate`. That of a process is `Turns`; on a cluster, those of all processes wait at the same one.
 """
@@ -14,25 +14,30 @@ Requests wait at a `Gate`. That of a process is `Turns`; on a cluster, those of 
 from __future__ import annotations
 
 import asyncio
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from pydantic import Field
 
-from khala_agents.llm.client import LLMError
+from khala_agents.llm.client import LimitExceeded, LimitType
+from khala_agents.llm.money import Budget
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
+    from collections.abc import AsyncIterator, Callable
 
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import Usage
 
 LONGEST_ANSWER = 4_000
-"""Tokens of an answer that a budget holds money for where the model file has no `max_tokens`."""
+"""Tokens that an answer may have under a budget where the model file has no `max_tokens`: they can be paid."""
 
-LimitType = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
+MOST_PER_ESTIMATED = 2.0
+"""So many times as many tokens as estimated a prompt has at most, until an endpoint has counted one: digits, of which
+our prompts have many, are a token each in some vocabularies. Seen: 1.1 to 1.4."""
+MARGIN = 1.15
+"""From then on it is what was counted, and so much more."""
 
 
 class LimitRules(Frozen):
@@ -46,58 +51,6 @@ class LimitRules(Frozen):
     requests_per_minute: float | None = Field(default=None, gt=0)
     tokens_per_minute: float | None = Field(default=None, gt=0)
     """Prompt and completion together; the prompt's tokens are estimated before, and corrected after."""
-
-
-class LimitExceeded(LLMError):
-    """A request would exceed a limit of this process.
-
-    Attributes:
-        type: which limit.
-        value: its value with this request.
-        limit: its maximum.
-        source: where it was set.
-    """
-
-    def __init__(self, kind: LimitType, *, value: float, limit: float, source: str) -> None:
-        self.type, self.value, self.limit, self.source = kind, value, limit, source
-        text = f"the limit {kind} = {limit:g} of {source} is reached ({value:.4g})"
-        super().__init__(text, status="budget" if kind == "budget_usd" else "limit")
-
-
-class Budget:
-    """Money that may be spent, in US dollars. A request holds the most that it may cost until its cost is known."""
-
-    def __init__(self, limit_usd: float | None, *, source: str = "budget") -> None:
-        self.limit_usd = limit_usd
-        self.spent_usd = 0.0
-        self.held_usd = 0.0
-        self.source = source
-
-    def check(self, most_usd: float = 0.0) -> None:
-        """Raise `LimitExceeded` if nothing is left, or less than a request may cost."""
-        if self.limit_usd is None:
-            return
-        value = self.spent_usd + self.held_usd
-        if self.spent_usd >= self.limit_usd or value + most_usd > self.limit_usd:
-            raise LimitExceeded("budget_usd", value=value, limit=self.limit_usd, source=self.source)
-
-    @contextmanager
-    def holding(self, most_usd: float) -> Iterator[None]:
-        """Hold the most that a request may cost while it is made.
-
-        Raises:
-            LimitExceeded: there is not so much left.
-        """
-        self.check(most_usd)
-        self.held_usd += most_usd
-        try:
-            yield
-        finally:
-            self.held_usd -= most_usd
-
-    def spend(self, usd: float) -> None:
-        """Add the cost of a request."""
-        self.spent_usd += usd
 
 
 class Bucket:
@@ -223,10 +176,12 @@ class Ticket:
 
     Attributes:
         waited_s: how long the request waited for its turn.
+        most_usd: what it may cost at most; None if no price is known.
         usage: the usage of the request, once settled; None for one that failed or was cancelled.
     """
 
     waited_s: float
+    most_usd: float | None = None
     usage: Usage | None = None
 
     def settle(self, usage: Usage) -> None:
@@ -235,7 +190,14 @@ class Ticket:
 
 
 class Limits:
-    """The limits of one endpoint: its gate, and the money of this process."""
+    """The limits of one endpoint: its gate, and the money of those who ask it.
+
+    Args:
+        rules: of the endpoint.
+        prices: of its model.
+        budget: what may be spent; shared with the limits of other endpoints.
+        gate: in place of one by the rules.
+    """
 
     def __init__(
         self,
@@ -243,24 +205,25 @@ class Limits:
         *,
         prices: Prices | None = None,
         budget: Budget | None = None,
-        max_tokens: int | None = None,
         gate: Gate | None = None,
     ) -> None:
-        """Take the rules of the endpoint, or its gate, and what a request may cost.
-
-        `max_tokens` is the limit of an answer.
-        """
         self.budget = budget or Budget(None)
         self._prices = prices
-        self._longest = LONGEST_ANSWER if max_tokens is None else max_tokens
         self._gate = gate or Turns(rules)
+        self._counted = 0.0
+        """The most tokens that the endpoint has counted where one was estimated."""
 
     @asynccontextmanager
-    async def admit(self, *, tokens: int, deadline: float | None) -> AsyncIterator[Ticket]:
-        """Wait until one request with a prompt of about `tokens` may be made, and count it afterwards.
+    async def admit(self, *, tokens: int, answer_tokens: int | None, deadline: float | None) -> AsyncIterator[Ticket]:
+        """Wait until one request may be made, and book what it costs.
 
-        A request that is not settled (failed, cancelled) counts with its prompt: the provider may have generated and
-        billed an answer without reporting it.
+        A request that is not settled (failed, cancelled), or of unknown usage, counts with the most that it may cost:
+        an answer may have been generated and billed.
+
+        Args:
+            tokens: the estimated tokens of the prompt.
+            answer_tokens: the limit of generated tokens.
+            deadline: until when it is worth waiting, on the clock of the running loop; None for ever.
 
         Raises:
             LimitExceeded: it may not be made, or not before `deadline`.
@@ -269,25 +232,27 @@ class Limits:
         arrived = clock()
         self.budget.check()
         place = await self._gate.enter(tokens, None if deadline is None else deadline - arrived)
-        ticket = Ticket(waited_s=clock() - arrived)
+        ticket = Ticket(clock() - arrived, self._most_usd(tokens, answer_tokens))
         try:
-            with self.budget.holding(self._most_usd(tokens)):  # it may have been spent during the wait
+            with self.budget.holding(ticket.most_usd or 0.0) as bill:  # it may have been spent during the wait
                 try:
                     yield ticket
                 finally:
-                    self._pay(ticket.usage, tokens)
+                    if ticket.usage is not None and not ticket.usage.unknown_requests:
+                        bill.settle(ticket.usage.cost_usd or 0.0)
+                        self._learn(ticket.usage, tokens)
         finally:
             self._gate.leave(place, _more_tokens(ticket.usage, tokens))
 
-    def _most_usd(self, tokens: int) -> float:
-        """Return the price of a prompt of about `tokens` and of the longest answer; 0 if it is not known."""
-        return (self._prices and self._prices.cost_usd(prompt=tokens, completion=self._longest)) or 0.0
+    def _most_usd(self, tokens: int, answer_tokens: int | None) -> float | None:
+        """Return the price of the longest prompt of about `tokens` and of the longest answer; None if not known."""
+        most = tokens * (MARGIN * self._counted if self._counted else MOST_PER_ESTIMATED)
+        longest = LONGEST_ANSWER if answer_tokens is None else answer_tokens
+        return self._prices.most_usd(prompt=most, completion=longest) if self._prices else None
 
-    def _pay(self, usage: Usage | None, estimated: int) -> None:
-        if usage is not None and not usage.unknown_requests:
-            self.budget.spend(usage.cost_usd or 0.0)
-        elif self._prices:
-            self.budget.spend(self._prices.cost_usd(prompt=estimated, completion=0) or 0.0)
+    def _learn(self, usage: Usage, estimated: int) -> None:
+        if estimated and usage.prompt_tokens:
+            self._counted = max(self._counted, usage.prompt_tokens / estimated)
 
 
 def _more_tokens(usage: Usage | None, estimated: int) -> int:

@@ -7,7 +7,7 @@ request that was cut off by the deadline fails at once, so that the agent falls 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, cast, get_args
 
 from khala_agents.llm.client import (
     Completion,
@@ -15,11 +15,15 @@ from khala_agents.llm.client import (
     LLMError,
     MalformedCompletion,
     Request,
+    RequestRefused,
     Scalar,
     TryTimeout,
+    Unauthorized,
     Unreachable,
+    Verdict,
     prompt_sha256,
 )
+from khala_agents.llm.retry import is_retried
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -27,6 +31,7 @@ if TYPE_CHECKING:
     from khala_protocol.messages import ChatMessage, ModelCall
 
 Key = tuple[str, int, int, str, int]
+VERDICTS: Final[frozenset[str]] = frozenset(get_args(Verdict))
 
 
 class NotRecorded(LLMError):
@@ -60,10 +65,17 @@ class ReplayClient:
         """
         exchange = self._look_up(request)
         if exchange.completion is not None:
-            return Completion(exchange.completion, exchange.usage, model=exchange.answered_by)
+            return Completion(
+                exchange.completion,
+                exchange.usage,
+                model=exchange.answered_by,
+                verdict=cast("Verdict", exchange.status) if exchange.status in VERDICTS else "ok",
+                reason=exchange.reason,
+            )
         *origin, attempt = _key(request)
-        was_repeated = (*origin, attempt + 1) in self._recorded
-        raise _passing(exchange) if was_repeated else _Final.of(exchange)
+        error = _failure(exchange)
+        error.retryable = (*origin, attempt + 1) in self._recorded
+        raise error
 
     async def check(self) -> None:
         """Find nothing wrong."""
@@ -88,30 +100,21 @@ class ReplayClient:
         return exchange
 
 
-class _Final(LLMError):
-    """A failure that was not retried in the recording, and so is not retried now."""
-
-    @classmethod
-    def of(cls, exchange: ModelCall) -> LLMError:
-        status = "timeout" if exchange.status == "cancelled" else exchange.status
-        kind = _FinalUnbilled if status.startswith("http ") else cls
-        return kind(f"recorded: {exchange.status}", status=status)
-
-
-class _FinalUnbilled(_Final):
-    may_be_billed = False
-
-
-def _passing(exchange: ModelCall) -> LLMError:
-    text = f"recorded: {exchange.status}"
-    match exchange.status:
+def _failure(exchange: ModelCall) -> LLMError:
+    """Return the failure that was recorded; of a request that was cancelled, that its time was over."""
+    text, status = exchange.reason or f"recorded: {exchange.status}", exchange.status
+    match status:
         case "timeout" | "cancelled":
             return TryTimeout(text)
         case "connection":
             return Unreachable(text)
         case "malformed":
             return MalformedCompletion(text)
-    return EndpointUnavailable(text, status=exchange.status)
+        case "http 401" | "http 403":
+            return Unauthorized(text, status=status)
+    if status.startswith("http 4") and not is_retried(int(status.removeprefix("http "))):
+        return RequestRefused(text, status=status)
+    return EndpointUnavailable(text, status=status)
 
 
 def _key(request: Request) -> Key:

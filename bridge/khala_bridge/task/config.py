@@ -286,6 +286,9 @@ class FaultRules(Frozen):
     game_lost: Literal["restart", "end"] = "restart"
     """The game died or does not answer: start it again and play the recorded decisions into it, or end the match. Only
     the simulator can be restarted, and only with a recording."""
+    undecided: float = Field(default=0.1, ge=0, le=1)
+    """The part of its decisions that a required agent may leave to a fallback or to nobody: its model did not answer,
+    or too late, or without a word. With more, the episode is not valid; 1 for no limit but that it decides once."""
     recording_lost: Literal["end", "go_on"] = "end"
     """The recording cannot be written, because the disk is full for example."""
 

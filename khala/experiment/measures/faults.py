@@ -16,10 +16,12 @@ class Faults:
 
     advice: int
     """Messages from outside the match, by people or programs."""
+    undecided: int
+    """Decisions that agents did not make themselves."""
+    undecided_because: str
+    """Their causes and how many of each, `empty: 3; http 500: 2; timeout: 1`; empty without any."""
     fallbacks: int
-    """Decisions that the policy failed to make, so that the task's default reply stood in."""
-    fallback_reasons: str
-    """Their reasons and how many of each, `http 500: 2; timeout: 1`; empty without any."""
+    """Of these, decisions that another policy made in the agent's place."""
     late: int
     """Decisions that did not arrive before the deadline."""
     gone: int
@@ -39,7 +41,7 @@ class FaultTally:
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
-        self._reasons: Counter[str] = Counter()
+        self._causes: Counter[str] = Counter()
         self._lag_s = 0.0
 
     def add(self, step: Step) -> None:
@@ -50,15 +52,16 @@ class FaultTally:
         for agent in step.report.agents:
             self._counts[agent.status] += 1
             self._counts["ignored"] += agent.ignored
-            if agent.status == "fallback":
-                self._reasons[agent.detail or "unknown"] += 1
+            if agent.status != "ok":
+                self._causes[agent.detail or agent.status] += 1
 
     def total(self) -> Faults:
         """Return the group."""
         return Faults(
             advice=self._counts["advice"],
+            undecided=self._causes.total(),
+            undecided_because="; ".join(f"{cause}: {number}" for cause, number in sorted(self._causes.items())),
             fallbacks=self._counts["fallback"],
-            fallback_reasons="; ".join(f"{reason}: {number}" for reason, number in sorted(self._reasons.items())),
             late=self._counts["late"],
             gone=self._counts["gone"],
             malformed=self._counts["malformed"],

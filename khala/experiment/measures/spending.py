@@ -43,7 +43,8 @@ class Spending:
     cost_usd: float | None
     """US dollars of the requests whose price is known, as the result has them; None if no price is known."""
     paid_usd: float | None
-    """The same with requests whose answers came too late for any report: what the endpoints charged."""
+    """The most that the endpoints charged: the same with requests whose answers came too late for any report, and with
+    the most that those of unknown usage may have cost."""
 
 
 class SpendingTally:
@@ -64,8 +65,8 @@ class SpendingTally:
         self._answered_by.add(call.answered_by)
         self._endpoints.add(call.endpoint)
         self._params.add(", ".join(f"{name}={value}" for name, value in sorted(call.params.items())))
-        if call.usage.cost_usd is not None:
-            self._paid_usd[call.agent] += call.usage.cost_usd
+        if (most_usd := _most_usd(call.usage)) is not None:
+            self._paid_usd[call.agent] += most_usd
 
     def add(self, step: Step) -> None:
         """Take in a step."""
@@ -92,12 +93,17 @@ class SpendingTally:
         )
 
     def _paid(self) -> float | None:
-        """Return what was paid for all agents; the larger sum counts for each, as in `khala.minds.spent_usd`."""
+        """Return what was paid for all agents; the larger sum counts for each, as in `khala.spending.spent_usd`."""
         paid = dict(self._paid_usd)
         for agent, usage in self._reported.items():
-            if usage.cost_usd is not None:
-                paid[agent] = max(paid.get(agent, 0.0), usage.cost_usd)
+            if (most_usd := _most_usd(usage)) is not None:
+                paid[agent] = max(paid.get(agent, 0.0), most_usd)
         return sum(paid.values()) if paid else None
+
+
+def _most_usd(usage: Usage) -> float | None:
+    known = [usd for usd in (usage.cost_usd, usage.unknown_usd) if usd is not None]
+    return sum(known) if known else None
 
 
 def _joined(texts: Iterable[str]) -> str:

@@ -73,8 +73,8 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("hardware", _values((card.get("hardware") for card in cards), _listed)),
         ("seeds", _seeds(done)),
         ("human advice", _counted(rows, ("advice",))),
-        ("fallbacks", _counted(rows, ("fallbacks",))),
-        ("steps without a valid reply", _counted(rows, ("late", "gone", "malformed"))),
+        ("decisions not the agents' own", _counted(rows, ("undecided",))),
+        ("because of", _values(cause for row in rows for cause in row["undecided_because"].split("; "))),
     )  # fmt: skip
     return Table("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
 

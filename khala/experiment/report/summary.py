@@ -50,6 +50,8 @@ class Summary:
     won: Interval
     """Share of games won."""
     draws: int
+    decided: float | None
+    """Share of decisions that the agents made themselves."""
     kd: Interval
     """Value killed in all games / value lost in all games."""
     length_s: float | None
@@ -126,6 +128,11 @@ def _in_order(found: list[Cell], names: Sequence[str]) -> list[Cell]:
     return sorted(found, key=lambda cell: [seen[i].index(cell.where[name]) for i, name in enumerate(names)])
 
 
+def _decided(rows: Sequence[Row]) -> float | None:
+    asked = sum(row["decisions"] for row in rows)
+    return 1 - sum(row["undecided"] for row in rows) / asked if asked else None
+
+
 def summary(cell: Cell) -> Summary:
     """Return the numbers of a cell."""
     rows, games = cell.rows, len(cell.rows)
@@ -137,6 +144,7 @@ def summary(cell: Cell) -> Summary:
         games=games,
         won=statistics.wilson(wins, games),
         draws=sum(row["outcome"] == "draw" for row in rows),
+        decided=_decided(rows),
         kd=statistics.ratio_of_sums([row["killed_value"] for row in rows], [row["lost_value"] for row in rows]),
         length_s=_median(rows, "game_s"),
         accepted=_mean(rows, "accepted"),

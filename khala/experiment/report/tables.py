@@ -43,12 +43,14 @@ KINDS = (
             Column("games", lambda one: str(one.games), always=True),
             Column("won", lambda one: share_with(one.won), always=True),
             Column("draws", lambda one: str(one.draws or NONE)),
+            Column("decided", lambda one: _some_share(one.decided), always=True),
             Column("K/D", lambda one: ratio_with(one.kd), always=True),
             Column("length", lambda one: _clock(one.length_s)),
             Column("not counted", lambda one: str(sum(one.not_counted.values()) or NONE)),
         ),
-        "Won: share of games with its Wilson interval of 95 %; a draw is not won. K/D: value killed in all games / "
-        "value lost in all games, with its bootstrap interval of 95 %. Length: median, in minutes of the game.",
+        "Won: share of games with its Wilson interval of 95 %; a draw is not won. Decided: share of decisions that "
+        "agents made themselves, without fallbacks, failures, late, empty or refused answers. K/D: value killed in all "
+        "games / value lost in all games, with its bootstrap interval of 95 %. Length: median, in minutes of the game.",
     ),
     Kind(
         "Actions",

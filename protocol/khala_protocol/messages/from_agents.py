@@ -62,7 +62,9 @@ class Reply(Wire):
     """The reply as the model gave it. The host reads from it the agent's orders, messages and subscriptions."""
     status: ReplyStatus = "ok"
     detail: str = Field(default="", max_length=MAX_DETAIL_CHARACTERS)
-    """Why the agent did not decide: `timeout`, `http 500`, `budget`, …, and the endpoint's own words."""
+    """Why the agent did not decide: `timeout`, `http 500`, `budget`, …; decisions are counted by it."""
+    reason: str = Field(default="", max_length=MAX_DETAIL_CHARACTERS)
+    """The same in the words of its endpoint or its policy."""
     hopeless: bool = False
     """Whether the agent's endpoint refuses it for good: its key or its model is wrong."""
     latency_s: float = 0.0
@@ -122,7 +124,10 @@ class ModelCall(Wire):
     completion: str | None
     """None if no answer came."""
     status: str
-    """`ok`, `timeout`, `cancelled`, `http 429`, `connection`, `malformed`."""
+    """`ok`, `empty`, `cut`, `refused` or `filtered` of an answer; else `timeout`, `cancelled`, `http 429`,
+    `connection`, `malformed`."""
+    reason: str = ""
+    """Why there is nothing to play, in the words of the endpoint; "" if there is."""
     started_s: float
     """Since the observation's arrival."""
     latency_s: float

@@ -117,6 +117,9 @@ class AgentReport(Frozen):
     side: str
     status: AgentStatus
     detail: str = ""
+    """Why the agent did not decide, in a few words by which decisions are counted; "" if it did."""
+    reason: str = ""
+    """The same in the words of its endpoint or its policy."""
     latency_s: float | None = None
     """From the publication of the observation to the arrival of the reply, on the host's clock."""
     accepted: tuple[str, ...] = ()
@@ -224,8 +227,10 @@ class Result(Wire):
     """Rejected calls by reason."""
     fates: dict[str, dict[str, int]] = {}
     """By agent: how many of its decisions were `fresh`, `stale`, …"""
+    accepted_of: dict[str, int] = {}
+    """By agent: how many of its orders were carried out."""
     fallbacks: dict[str, dict[str, int]] = {}
-    """By agent: how often it fell back, by reason."""
+    """By agent: how often it did not decide itself, by reason."""
     incidents: tuple[str, ...] = ()
     """The first incidents of its reports, each with its step."""
     advisers: dict[str, int] = {}

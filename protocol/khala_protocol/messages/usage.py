@@ -23,13 +23,14 @@ class Usage(Frozen):
     """None if no price is known for the model."""
     unknown_requests: Count = 0
     """Requests that were cancelled or failed, whose tokens are unknown."""
+    unknown_usd: float | None = Field(default=None, ge=0, le=MOST)
+    """The most that these may have cost; None if no price is known for the model."""
     images: Count = 0
     """Number of pictures that were sent along."""
     image_tokens: Count = 0
     """The part of `prompt_tokens` for pictures, as the model file's rule estimates it."""
 
     def __add__(self, other: Usage) -> Usage:
-        costs = [c for c in (self.cost_usd, other.cost_usd) if c is not None]
         return Usage(
             requests=min(self.requests + other.requests, MOST),
             prompt_tokens=min(self.prompt_tokens + other.prompt_tokens, MOST),
@@ -37,11 +38,17 @@ class Usage(Frozen):
             cached_tokens=min(self.cached_tokens + other.cached_tokens, MOST),
             cache_write_tokens=min(self.cache_write_tokens + other.cache_write_tokens, MOST),
             reasoning_tokens=min(self.reasoning_tokens + other.reasoning_tokens, MOST),
-            cost_usd=min(sum(costs), MOST) if costs else None,
+            cost_usd=_sum_usd(self.cost_usd, other.cost_usd),
             unknown_requests=min(self.unknown_requests + other.unknown_requests, MOST),
+            unknown_usd=_sum_usd(self.unknown_usd, other.unknown_usd),
             images=min(self.images + other.images, MOST),
             image_tokens=min(self.image_tokens + other.image_tokens, MOST),
         )
+
+
+def _sum_usd(*sums: float | None) -> float | None:
+    known = [usd for usd in sums if usd is not None]
+    return min(sum(known), MOST) if known else None
 
 
 class Pace(Frozen):

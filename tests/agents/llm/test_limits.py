@@ -6,7 +6,9 @@ import asyncio
 
 import pytest
 
-from khala_agents.llm.limits import Budget, LimitExceeded, LimitRules, Limits, Turns
+from khala_agents.llm.client import LimitExceeded
+from khala_agents.llm.limits import LimitRules, Limits, Turns
+from khala_agents.llm.money import Budget
 from khala_agents.llm.pricing import Prices
 from khala_protocol.messages import Usage
 
@@ -19,7 +21,7 @@ async def use(
     limits: Limits, *, tokens: int = 100, takes_s: float = 0.0, usage: Usage | None = ONE, deadline: float | None = None
 ) -> float:
     """Make one request; return when it was admitted."""
-    async with limits.admit(tokens=tokens, deadline=deadline) as ticket:
+    async with limits.admit(tokens=tokens, answer_tokens=100, deadline=deadline) as ticket:
         admitted = asyncio.get_running_loop().time()
         await asyncio.sleep(takes_s)
         if usage:
@@ -35,7 +37,7 @@ async def test_no_more_requests_are_in_flight_than_allowed_and_the_first_come_go
 async def test_a_place_is_given_back_by_a_request_that_fails_or_is_cancelled() -> None:
     limits = Limits(LimitRules(in_flight=1))
     with pytest.raises(ZeroDivisionError):
-        async with limits.admit(tokens=1, deadline=None):
+        async with limits.admit(tokens=1, answer_tokens=None, deadline=None):
             _ = 1 / 0
     stuck = asyncio.create_task(use(limits, takes_s=1000))
     waiting = asyncio.create_task(use(limits))
@@ -60,10 +62,10 @@ async def test_tokens_are_counted_as_estimated_and_corrected_by_what_was_used() 
     assert await use(limits, tokens=500) == 10, "600 - 200 were left, and 10 flow in each second"
 
 
-async def test_a_request_that_nobody_settled_counts_with_its_prompt() -> None:
-    limits = Limits(LimitRules(tokens_per_minute=600), prices=PRICES, max_tokens=100, budget=(budget := Budget(10.0)))
+async def test_a_request_that_nobody_settled_counts_with_the_most_that_it_may_cost() -> None:
+    limits = Limits(LimitRules(tokens_per_minute=600), prices=PRICES, budget=(budget := Budget(10.0)))
     await use(limits, tokens=300, usage=None)
-    assert budget.spent_usd == pytest.approx(0.3)
+    assert budget.booked_usd == pytest.approx(2 * 0.3 + 0.2), "twice the estimated prompt, and the longest answer"
     assert await use(limits, tokens=600) == 30
 
 
@@ -98,21 +100,21 @@ async def test_the_request_is_given_back_when_there_are_no_tokens_for_it() -> No
 
 
 async def test_nothing_is_asked_when_the_money_is_used_up() -> None:
-    budget = Budget(0.65, source="the budget of this process")
-    limits = Limits(prices=PRICES, max_tokens=100, budget=budget)
+    budget = Budget(0.85, source="the budget of this process")
+    limits = Limits(prices=PRICES, budget=budget)
     await use(limits)
     await use(limits)
     with pytest.raises(LimitExceeded) as caught:
         await use(limits)
     error = caught.value
-    assert (error.type, error.limit, error.source) == ("budget_usd", 0.65, "the budget of this process")
+    assert (error.type, error.limit, error.source) == ("budget_usd", 0.85, "the budget of this process")
     assert error.value == pytest.approx(0.6)
     assert (error.status, error.retryable) == ("budget", False)
-    assert str(error) == "the limit budget_usd = 0.65 of the budget of this process is reached (0.6)"
+    assert str(error) == "the limit budget_usd = 0.85 of the budget of this process is reached (0.6)"
 
 
 async def test_who_waited_while_the_money_went_is_refused_too() -> None:
-    limits = Limits(LimitRules(in_flight=1), prices=PRICES, max_tokens=100, budget=Budget(0.3))
+    limits = Limits(LimitRules(in_flight=1), prices=PRICES, budget=Budget(0.4))
     outcomes = await asyncio.gather(use(limits, takes_s=1), use(limits), return_exceptions=True)
     assert outcomes[0] == 0
     assert isinstance(outcomes[1], LimitExceeded)
@@ -120,18 +122,25 @@ async def test_who_waited_while_the_money_went_is_refused_too() -> None:
 
 async def test_requests_in_flight_hold_the_most_that_they_may_cost() -> None:
     budget = Budget(1.0)
-    limits = Limits(prices=PRICES, max_tokens=100, budget=budget)
+    limits = Limits(prices=PRICES, budget=budget)
     outcomes = await asyncio.gather(*(use(limits, takes_s=1) for _ in range(9)), return_exceptions=True)
-    assert [isinstance(outcome, LimitExceeded) for outcome in outcomes] == [False] * 3 + [True] * 6
-    assert budget.spent_usd == pytest.approx(0.9)
-    assert budget.held_usd == pytest.approx(0.0)
+    assert [isinstance(outcome, LimitExceeded) for outcome in outcomes] == [False] * 2 + [True] * 7
+    assert budget.booked_usd == pytest.approx(0.6)
+
+
+async def test_a_prompt_is_held_as_the_endpoint_counts_once_it_has_counted_one() -> None:
+    limits = Limits(prices=PRICES, budget=(budget := Budget(10.0)))
+    await use(limits, usage=Usage(requests=1, prompt_tokens=120, completion_tokens=0, cost_usd=0.12))
+    async with limits.admit(tokens=100, answer_tokens=100, deadline=None) as ticket:
+        assert ticket.most_usd == pytest.approx(1.15 * 0.12 + 0.2)
+        assert budget.booked_usd == pytest.approx(0.12 + 1.15 * 0.12 + 0.2)
 
 
 async def test_a_budget_is_shared_by_endpoints_and_a_rate_is_not() -> None:
     budget = Budget(0.3)
-    first = Limits(LimitRules(requests_per_minute=1), budget=budget)
-    second = Limits(LimitRules(requests_per_minute=1), budget=budget)
-    assert await use(first) == 0
+    first = Limits(LimitRules(requests_per_minute=1), prices=PRICES, budget=budget)
+    second = Limits(LimitRules(requests_per_minute=1), prices=PRICES, budget=budget)
+    assert await use(first, tokens=10) == 0
     with pytest.raises(LimitExceeded, match="budget_usd"):
         await use(second)
 

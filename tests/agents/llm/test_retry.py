@@ -11,6 +11,7 @@ import pytest
 from khala_agents.llm.client import (
     Completion,
     EndpointUnavailable,
+    LimitExceeded,
     LLMError,
     MalformedCompletion,
     OutOfMoney,
@@ -21,7 +22,6 @@ from khala_agents.llm.client import (
     Unreachable,
 )
 from khala_agents.llm.http import error_for, retry_after_s
-from khala_agents.llm.limits import LimitExceeded
 from khala_agents.llm.retry import RetryRule, retried
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ import pytest
 from khala_bridge.observe import Observer
 from khala_bridge.observe.text import Page, find_sections, section, shorter
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import Untrusted, trust
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -120,11 +121,15 @@ def test_a_section_can_come_with_a_module_of_ones_own(
     )
     (tmp_path / "khala_test_creed.py").write_text("\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(Untrusted, match="names the code 'khala_test_creed'"):
+        told("khala_test_creed:creed", "answer")
+    trust("khala_test_creed")
     assert told("khala_test_creed:creed", "answer").startswith("Creed\n\nAnswer\n")
 
 
 def test_a_module_that_is_not_there_is_named(told: Any) -> None:
-    with pytest.raises(ConfigError, match="the module of section 'nowhere:creed' cannot be imported: No module named"):
+    trust("nowhere")
+    with pytest.raises(ConfigError, match="section 'nowhere:creed': there is no module 'nowhere'"):
         told("nowhere:creed")
 
 

@@ -13,6 +13,7 @@ from khala_agents.build import load_policy
 from khala_agents.policy import Context, Decision
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Briefing, Observation, Reply
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
@@ -29,6 +30,7 @@ NAME = "khala.dataset.replay:FromDataset"
 
 
 def both() -> dict[str, Policy]:
+    trust_named(NAME)
     return {agent: load_policy(NAME) for agent in ("Stalkers", "Zealots")}
 
 
@@ -79,13 +81,13 @@ def test_every_form_has_every_reply(recording: Recording, data_set: Path, form: 
         assert {place: reply.text for place, reply in replies.by_place.items()} == said
 
 
-async def test_what_the_data_set_does_not_have_is_a_fallback(
+async def test_what_the_data_set_does_not_have_is_no_decision(
     recording: Recording, data_set: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("KHALA_DATASET", str(data_set))
     later = next(recording.observations("Zealots")).but(step=1000)
     said = await FromDataset().decide(Context(next(recording.of(Briefing)), later))
-    assert said == Decision("", "fallback", "not in the data set")
+    assert said == Decision("", "failed", "not in the data set")
 
 
 async def test_another_game_than_the_recorded_one_is_noticed_once(

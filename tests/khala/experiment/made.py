@@ -35,14 +35,14 @@ def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bo
         run=run, agent=agent, side="blue", episode=0, step=0, attempt=1, model="m", endpoint="http://e", prompt=(),
         completion="", status="ok", started_s=0, latency_s=0, usage=usage,
     )  # fmt: skip
-    status, detail = ("fallback", "budget") if spent_out else ("ok", "")
+    status, detail = ("failed", "budget") if spent_out else ("ok", "")
     done = AgentReport(agent=agent, side="blue", status=status, detail=detail, usage=usage)
     report = Report(run=run, episode=0, step=0, game_loop=8, agents=(done,))
     value = Casualties(units=1, value=100.0)
     ended = Result(
         run=run, episode=0, outcome="win" if won else "loss", cause="enemy defeated", steps=1, game_loop=8, game_s=0.4,
         wall_s=2.0, killed=value, lost=value, kd=1.0, valid=valid,
-        invalid_because="" if valid else "no model ever answered for A",
+        invalid_because="" if valid else "A never decided",
     )  # fmt: skip
     with Recorder(path) as recorder:
         recorder.write(run_key(run, Topic.RUN), encode(run_card(config, GAME)))

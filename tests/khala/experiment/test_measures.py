@@ -15,7 +15,7 @@ import pytest_asyncio
 from khala.experiment.measures import GROUPS, Measures, measure
 from khala.experiment.measures.communication import is_acted_on
 from khala.experiment.measures.hallucinations import KINDS, Kind
-from khala.minds import spent_usd
+from khala.spending import spent_usd
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.act.raw import RawExecutor
@@ -266,12 +266,14 @@ def test_faults_and_people_are_counted_by_what_happened(tmp_path: Path) -> None:
         decided(status="fallback", detail="http 500"),
         decided(status="fallback", detail="timeout"),
         decided(status="late", fate=None),
+        decided(status="empty", fate=None),
         decided(status="gone", fate=None),
         decided(status="malformed", fate=None),
     ]
     step = report(0, *agents, messages=(advice,), advisers=("Coach",), incidents=("A was away",))
     (row,) = measure(recorded(tmp_path / "r.mcap", CARD, step, result()))
-    assert (row.fallbacks, row.fallback_reasons) == (3, "http 500: 1; timeout: 2")
+    assert (row.undecided, row.fallbacks) == (7, 3)
+    assert row.undecided_because == "empty: 1; gone: 1; http 500: 1; late: 1; malformed: 1; timeout: 2"
     assert (row.late, row.gone, row.malformed, row.ignored) == (1, 1, 1, 2)
     assert (row.advice, row.incidents, row.messages_sent) == (1, 1, 0)
 

@@ -88,7 +88,7 @@ async def test_a_lost_match_is_a_result_and_one_without_a_model_is_not(store: St
 
     await run(store, MadeEngine(ends=ends))
     assert [(one.seed, one.state, one.cause) for one in store.played().values()] == [
-        (1, "invalid", "model away"), (1, "invalid", "model away"), *[(s, "done", "") for s in (2, 2, 3, 3)],
+        (1, "invalid", "A never decided"), (1, "invalid", "A never decided"), *[(s, "done", "") for s in (2, 2, 3, 3)],
     ]  # fmt: skip
     assert {row["outcome"] for row in store.results() if row["state"] == "done"} == {"win", "loss"}
 

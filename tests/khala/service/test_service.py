@@ -164,9 +164,9 @@ async def test_owners_take_turns(stage: Stage) -> None:
     ("wanted", "because"),
     [
         ({"base_url": "http://elsewhere"}, "--base-url is for a service that was started with --trust"),
-        ({"match": {"task": WITH_A_COMMAND}}, "the command of an opponent is for a service"),
-        ({"policy": "os:system"}, "--policy MODULE:NAME is for a service that was started with --trust"),
-        ({"fallback": "os:system"}, "--fallback MODULE:NAME is for a service"),
+        ({"match": {"task": WITH_A_COMMAND}}, "the code 'rm -r x' is for a service"),
+        ({"policy": "os:system"}, "the code 'os' is for a service that was started with --trust"),
+        ({"fallback": "os:system"}, "the code 'os' is for a service"),
         ({"model": "/etc/model.yaml"}, "a model file is for a service"),
         ({"model": "no-such"}, "there is no model file 'no-such'"),
         ({"colour": "red"}, "there is no option 'colour'"),

@@ -11,7 +11,6 @@ Sections are pure functions of the page: no clock, no game, no state.
 from __future__ import annotations
 
 import difflib
-import importlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from khala_bridge.observe.text.tokens import tokens
 from khala_bridge.observe.text.words import INDENT
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import import_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -145,10 +145,7 @@ def find_sections(names: Iterable[str]) -> tuple[Section, ...]:
 def _find(reference: str) -> Section:
     module, colon, name = reference.rpartition(":")
     if colon:
-        try:
-            importlib.import_module(module)
-        except Exception as error:  # an import runs the user's code, which may raise anything
-            raise ConfigError(f"the module of section '{reference}' cannot be imported: {error}") from error
+        import_trusted(module, source=f"section '{reference}'")
     if name not in SECTIONS:
         close = difflib.get_close_matches(name, SECTIONS, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"there are {', '.join(sorted(SECTIONS))}"

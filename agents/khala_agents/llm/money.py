@@ -1,0 +1,221 @@
+"""What may be spent on models, and what was: a cap that holds whatever becomes of a request.
+
+    with budget.holding(0.02) as bill:      # raises `LimitExceeded` where less is left
+        completion = await client.complete(request)
+        bill.settle(0.004)                  # what it cost; without this line it has cost the 0.02
+
+A request is booked at the most that it may cost before it is sent. Once its cost is known, the rest is given back. A
+request that was cancelled, whose connection broke, or whose answer does not say what it cost keeps what was booked: the
+provider may have charged it. So a sum never lags behind what was charged, also if this process is killed.
+
+Sums stand in a `Ledger`. In a file, it is shared by the processes of a match, and a resumed match finds it again.
+Several budgets may share a ledger: each has an account there.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Self
+
+from khala_agents.llm.client import LimitExceeded
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+SUFFIX = ".ledger"
+"""Of the file beside a recording."""
+PATIENCE_S = 10.0
+"""How long a process waits for another that writes to the same file, which takes some 0.1 ms."""
+LEAST_USD = 1e-9
+"""Sums of money are not exact: a cap is not exceeded by less."""
+_SCHEMA = """
+create table if not exists paid (account text primary key, usd real not null);
+create table if not exists held (entry integer primary key autoincrement, account text not null, usd real not null);
+"""
+
+
+class Ledger:
+    """Sums of money in US dollars by account, in memory or in a file.
+
+    Args:
+        path: of the file, which is made when something is booked; None to keep the sums in memory.
+
+    Raises:
+        ConfigError: at any method, if the file cannot be read or written.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        self._database: sqlite3.Connection | None = None
+
+    @property
+    def exists(self) -> bool:
+        """Whether anything was ever booked in its file."""
+        return self.path is not None and self.path.exists()
+
+    def booked_usd(self, account: str | None = None) -> float:
+        """Return what an account has paid, and the most that its requests under way may cost; None for all accounts."""
+        if self.path is not None and not self.exists:
+            return 0.0
+        with self._writing() as database:
+            return _booked_usd(database, account)
+
+    def hold(self, account: str, usd: float, limit_usd: float | None) -> int:
+        """Book the most that a request may cost, and return the number of the entry.
+
+        Raises:
+            Overdrawn: the account would have more booked than its limit.
+        """
+        with self._writing() as database:
+            booked_usd = _booked_usd(database, account)
+            if limit_usd is not None and (booked_usd + usd > limit_usd + LEAST_USD or booked_usd >= limit_usd):
+                raise Overdrawn(booked_usd)
+            entry = database.execute("insert into held (account, usd) values (?, ?)", (account, usd)).lastrowid
+        assert entry is not None
+        return entry
+
+    def settle(self, entry: int, usd: float) -> None:
+        """Replace what was held for a request by what it has cost."""
+        with self._writing() as database:
+            row = database.execute("delete from held where entry = ? returning account", (entry,)).fetchone()
+            if row is not None:
+                _pay(database, row[0], usd)
+
+    def pay(self, account: str, usd: float) -> None:
+        """Add what was paid without an entry."""
+        with self._writing() as database:
+            _pay(database, account, usd)
+
+    def go_on_from(self, other: Ledger) -> None:
+        """Take over all sums of another ledger into this one, which is new."""
+        sums = "select account, usd from paid union all select account, usd from held"
+        with other, self._writing() as mine, other._writing() as theirs:
+            for account, usd in theirs.execute(sums):
+                _pay(mine, account, usd)
+
+    def close(self) -> None:
+        """Close the file. May be called twice, and the ledger be used again."""
+        database, self._database = self._database, None
+        if database is not None:
+            database.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        """Give the database for one step that no other process sees in part."""
+        try:
+            if self._database is None:
+                self._database = self._open()
+            self._database.execute("begin immediate")
+            try:
+                yield self._database
+            except BaseException:
+                self._database.execute("rollback")
+                raise
+            self._database.execute("commit")
+        except (sqlite3.Error, OSError) as error:
+            fault = f"what is spent cannot be noted here, so no model is asked: {error}"
+            raise ConfigError(fault, source=str(self.path)) from None
+
+    def _open(self) -> sqlite3.Connection:
+        if self.path is not None:
+            self.path.touch(0o600)
+        database = sqlite3.connect(self.path or ":memory:", timeout=PATIENCE_S, isolation_level=None)
+        # Without a sync, a killed process loses nothing, only a power failure may. With a log, a request takes 0.2 ms.
+        database.executescript(f"pragma journal_mode = wal; pragma synchronous = off; {_SCHEMA}")
+        return database
+
+
+class Overdrawn(Exception):
+    """An account has too little left.
+
+    Attributes:
+        booked_usd: what it has booked.
+    """
+
+    def __init__(self, booked_usd: float) -> None:
+        self.booked_usd = booked_usd
+        super().__init__(f"{booked_usd:.4f} USD are booked")
+
+
+class Bill:
+    """What one request costs."""
+
+    def __init__(self, most_usd: float) -> None:
+        self.usd = most_usd
+
+    def settle(self, usd: float) -> None:
+        """Say what it cost."""
+        self.usd = usd
+
+
+class Budget:
+    """What some agents may spend together.
+
+    Args:
+        limit_usd: None for no limit.
+        ledger: where the sums stand; None: in memory.
+        account: of these agents in the ledger.
+        source: where the limit was set, for errors.
+    """
+
+    def __init__(
+        self, limit_usd: float | None, *, ledger: Ledger | None = None, account: str = "", source: str = "budget"
+    ) -> None:
+        self.limit_usd = limit_usd
+        self.source = source
+        self._ledger = ledger or Ledger()
+        self._account = account
+
+    @property
+    def booked_usd(self) -> float:
+        """What was spent, and the most that requests under way may cost."""
+        return self._ledger.booked_usd(self._account)
+
+    def check(self) -> None:
+        """Raise `LimitExceeded` if nothing is left."""
+        if self.limit_usd is not None and (booked_usd := self.booked_usd) >= self.limit_usd:
+            raise self._exceeded(booked_usd)
+
+    @contextmanager
+    def holding(self, most_usd: float) -> Iterator[Bill]:
+        """Book the most that a request may cost, and what its bill says afterwards.
+
+        Raises:
+            LimitExceeded: there is not so much left.
+        """
+        if not most_usd:
+            yield Bill(0.0)
+            return
+        try:
+            entry = self._ledger.hold(self._account, most_usd, self.limit_usd)
+        except Overdrawn as error:
+            raise self._exceeded(error.booked_usd) from None
+        bill = Bill(most_usd)
+        try:
+            yield bill
+        finally:
+            self._ledger.settle(entry, bill.usd)
+
+    def _exceeded(self, booked_usd: float) -> LimitExceeded:
+        return LimitExceeded("budget_usd", value=booked_usd, limit=self.limit_usd or 0.0, source=self.source)
+
+
+def _booked_usd(database: sqlite3.Connection, account: str | None) -> float:
+    whose, values = ("", ()) if account is None else (" where account = ?", (account,) * 2)
+    sums = f"select usd from paid{whose} union all select usd from held{whose}"  # noqa: S608  # no text of others
+    return float(database.execute(f"select total(usd) from ({sums})", values).fetchone()[0])  # noqa: S608
+
+
+def _pay(database: sqlite3.Connection, account: str, usd: float) -> None:
+    database.execute(
+        "insert into paid values (?, ?) on conflict (account) do update set usd = usd + excluded.usd", (account, usd)
+    )

@@ -1,0 +1,71 @@
+"""What the models of a match have cost: in its ledger, which stands beside its recording, or else in the recording.
+
+A recording knows only what arrived at the host. The ledger knows what was sent: see `khala_agents.llm.money`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING
+
+from khala_agents.llm.money import SUFFIX, Ledger
+from khala_orchestrator.roster import Seat
+from khala_protocol.messages import ModelCall, Report
+from khala_protocol.recording import Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala_orchestrator.resume import Unfinished
+    from khala_protocol.messages import Usage
+
+
+def ledger_of(record: Path, past: Unfinished | None = None) -> Ledger:
+    """Return the ledger of a match that is recorded at a path; each side has an account in it.
+
+    A match that goes on begins with what was spent before.
+    """
+    ledger = Ledger(record.with_suffix(SUFFIX))
+    if past is not None:
+        before = Ledger(past.recording.path.with_suffix(SUFFIX))
+        if before.exists:
+            ledger.go_on_from(before)
+        else:
+            for seat, usd in spent_usd(past.recording).items():
+                ledger.pay(seat.side, usd)
+    return ledger
+
+
+def paid_usd(record: Path) -> float:
+    """Return the most that a recorded match has cost.
+
+    Raises:
+        RecordingError: it has no ledger, and there is no recording.
+    """
+    ledger = Ledger(record.with_suffix(SUFFIX))
+    if not ledger.exists:
+        return sum(spent_usd(Recording.open(record)).values())
+    with ledger:
+        return ledger.booked_usd()
+
+
+def spent_usd(recording: Recording) -> dict[Seat, float]:
+    """Return what each agent has paid at most for its model, as a recording has it; in a fork, since it was forked.
+
+    A call whose answer came too late is in no report, and one that the recording left out is in no exchange: the larger
+    of the two sums counts.
+    """
+    first = recording.run.forked.step if recording.run and recording.run.forked else 0
+    calls, reports = defaultdict[Seat, float](float), defaultdict[Seat, float](float)
+    for call in recording.of(ModelCall):
+        if call.step >= first:
+            calls[Seat(call.side, call.agent)] += _most_usd(call.usage)
+    for report in recording.of(Report):
+        for agent in report.agents:
+            if (report.step if agent.asked_step is None else agent.asked_step) >= first:
+                reports[Seat(agent.side, agent.agent)] += _most_usd(agent.usage)
+    return {seat: max(calls[seat], reports[seat]) for seat in {**calls, **reports}}
+
+
+def _most_usd(usage: Usage) -> float:
+    return (usage.cost_usd or 0.0) + (usage.unknown_usd or 0.0)

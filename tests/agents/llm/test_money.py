@@ -1,0 +1,166 @@
+"""Money: what was sent is booked at the most that it may cost, until its cost is known, in every process."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import os
+import signal
+from typing import TYPE_CHECKING
+
+import pytest
+
+from khala_agents.llm.client import LimitExceeded
+from khala_agents.llm.money import Budget, Ledger
+from khala_agents.llm.pricing import Prices, check_priced, listed, price_of
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ENDPOINT = "https://api.openai.com/v1"
+
+
+def test_a_request_of_known_cost_gives_the_rest_back() -> None:
+    budget = Budget(1.0)
+    with budget.holding(0.8) as bill:
+        assert budget.booked_usd == pytest.approx(0.8)
+        bill.settle(0.1)
+    assert budget.booked_usd == pytest.approx(0.1)
+
+
+async def test_a_request_that_was_cancelled_is_booked_at_the_most_that_it_may_cost() -> None:
+    budget, begun = Budget(1.0), asyncio.Event()
+
+    async def ask() -> None:
+        with budget.holding(0.8):
+            begun.set()
+            await asyncio.Event().wait()
+
+    asking = asyncio.create_task(ask())
+    await begun.wait()
+    asking.cancel()
+    await asyncio.gather(asking, return_exceptions=True)
+    assert budget.booked_usd == pytest.approx(0.8)
+    with pytest.raises(LimitExceeded, match=r"budget_usd = 1 of budget is reached \(0\.8\)"), budget.holding(0.3):
+        pass
+
+
+def test_a_request_that_may_cost_more_than_is_left_is_not_made() -> None:
+    budget = Budget(1.0)
+    with budget.holding(0.6), pytest.raises(LimitExceeded), budget.holding(0.5):
+        pass
+    with pytest.raises(LimitExceeded), budget.holding(0.5):
+        pass
+
+
+def _hold(path: Path, times: int) -> None:
+    budget = Budget(1.0, ledger=Ledger(path))
+    for _ in range(times):
+        try:
+            with budget.holding(0.01):
+                pass
+        except LimitExceeded:
+            return
+
+
+def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: Path) -> None:
+    path = tmp_path / "match.ledger"
+    spawn = multiprocessing.get_context("spawn")
+    processes = [spawn.Process(target=_hold, args=(path, 70)) for _ in range(2)]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join(60)
+    assert Ledger(path).booked_usd() == pytest.approx(1.0)
+
+
+def _die_while_asking(path: Path) -> None:
+    with Budget(1.0, ledger=Ledger(path)).holding(0.25):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
+    path = tmp_path / "match.ledger"
+    process = multiprocessing.get_context("spawn").Process(target=_die_while_asking, args=(path,))
+    process.start()
+    process.join(60)
+    assert process.exitcode == -signal.SIGKILL
+    assert Ledger(path).booked_usd() == pytest.approx(0.25)
+    with pytest.raises(LimitExceeded), Budget(1.0, ledger=Ledger(path)).holding(0.8):
+        pass
+
+
+def test_sides_have_accounts_of_their_own_in_one_ledger(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path / "match.ledger")
+    blue, red = (Budget(0.5, ledger=ledger, account=side) for side in ("blue", "red"))
+    with blue.holding(0.5) as bill:
+        bill.settle(0.4)
+    with red.holding(0.5):
+        pass
+    assert (blue.booked_usd, red.booked_usd, ledger.booked_usd()) == pytest.approx((0.4, 0.5, 0.9))
+
+
+def test_a_ledger_goes_on_from_another_one(tmp_path: Path) -> None:
+    before, after = Ledger(tmp_path / "a.ledger"), Ledger(tmp_path / "b.ledger")
+    before.pay("blue", 0.25)
+    before.hold("red", 0.5, None)
+    after.go_on_from(before)
+    assert (after.booked_usd("blue"), after.booked_usd("red")) == pytest.approx((0.25, 0.5))
+
+
+def test_a_ledger_is_a_file_of_its_owner_and_made_when_something_is_booked(tmp_path: Path) -> None:
+    path = tmp_path / "match.ledger"
+    ledger = Ledger(path)
+    assert (ledger.booked_usd(), path.exists()) == (0.0, False)
+    ledger.pay("blue", 0.1)
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("content", [b"no database at all, but a text", b"SQLite format 3\x00" + b"\xff" * 500])
+def test_nothing_is_spent_where_it_cannot_be_noted(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "match.ledger"
+    path.write_bytes(content)
+    budget = Budget(1.0, ledger=Ledger(path))
+    with (
+        pytest.raises(ConfigError, match="what is spent cannot be noted here, so no model is asked"),
+        budget.holding(0.1),
+    ):
+        pytest.fail("the request was made")
+
+
+@pytest.mark.parametrize(
+    ("model", "address", "prompt"),
+    [
+        ("gpt-4o-mini", ENDPOINT, 0.15),
+        ("gpt-4o", ENDPOINT, 2.5),
+        ("gpt-4o-2024-08-06", ENDPOINT, 2.5),
+        ("gpt-4o-2024-05-13", ENDPOINT, 5.0),
+        ("gpt-4o", "https://gateway.example/v1", None),
+        ("gpt-4o-mini-of-mine", ENDPOINT, None),
+        ("claude-sonnet-4-5-20250929", "https://api.anthropic.com/v1", 3.0),
+    ],
+)
+def test_a_list_price_goes_by_the_models_own_name_at_its_providers_own_address(
+    model: str, address: str, prompt: float | None
+) -> None:
+    assert price_of(model, address).prompt == prompt
+
+
+def test_all_list_prices_are_known_and_say_where_they_come_from() -> None:
+    for provider in listed().values():
+        assert provider.source.startswith("https://")
+        assert all(prices.known for prices in provider.models.values())
+
+
+def test_the_most_that_a_request_may_cost_has_the_dearest_price_of_a_prompt() -> None:
+    prices = Prices(prompt=3.0, completion=15.0, cached=0.3, cache_write=3.75)
+    assert prices.most_usd(prompt=1_000_000, completion=1_000_000) == pytest.approx(18.75)
+    assert Prices(prompt=1.0).most_usd(prompt=1, completion=1) is None
+
+
+def test_a_budget_without_a_price_is_refused_with_what_to_do() -> None:
+    with pytest.raises(
+        ConfigError, match=r"a budget needs the price of my-model at 10\.0\.0\.5:8000, and no price is known"
+    ):
+        check_priced(Prices(), "my-model", "http://10.0.0.5:8000/v1")
