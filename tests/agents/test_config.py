@@ -68,12 +68,12 @@ BAD_MODELS = [
     (
         GOOD.replace("h/", "me:sk-secret@h/"),
         ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
-        "name a variable in api_key_env"),
+        "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD.replace("/v1", "/v1?key=sk-secret"),
         ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
-        "name a variable in api_key_env"),
+        "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD + "api_key_env: sk-secret",

@@ -393,7 +393,7 @@ async def test_an_error_quotes_what_the_endpoint_said_on_one_line(status: int, a
     async with Recorder(answer, status) as server:
         with pytest.raises(LLMError) as caught:
             await ask(client(server.base_url))
-        assert str(caught.value) == f"{server.base_url} {words}"
+        assert str(caught.value) == f"{server.base_url}/chat/completions {words}"
 
 
 # --- Anthropic ----------------------------------------------------------------------------------------

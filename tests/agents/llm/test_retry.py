@@ -20,7 +20,7 @@ from khala_agents.llm.client import (
     Unauthorized,
     Unreachable,
 )
-from khala_agents.llm.http import error_for, retry_after_s
+from khala_agents.llm.faults import error_for, retry_after_s
 from khala_agents.llm.limits import LimitExceeded
 from khala_agents.llm.retry import RetryRule, retried
 
