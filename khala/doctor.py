@@ -210,7 +210,7 @@ def _network() -> Iterator[Finding]:
         try:
             proxy = proxy_for(address)
         except ConfigError as error:
-            yield Finding(f"way to {name}", "wrong", visible_line(str(error)))
+            yield Finding(f"proxy for {name}", "note", visible_line(str(error)))
             continue
         ways.setdefault(str(proxy) if proxy else "", []).append(name)
     direct = ways.pop("", [])
@@ -222,7 +222,9 @@ def _network() -> Iterator[Finding]:
     try:
         trust = trusted()
     except ConfigError as error:
-        yield Finding("trusted certificates", "wrong", visible_line(str(error)), "name a file or a directory, or unset")
+        yield Finding(
+            "trusted certificates", "note", visible_line(str(error)), "name a file or a directory, or unset it"
+        )
         return
     yield Finding("trusted certificates", "ok", visible_line(str(trust)) if trust else "those of the package certifi")
 

@@ -80,7 +80,7 @@ class HttpEndpoint:
     ) -> None:
         self.address = checked_address(base_url)
         self._proxy = proxy_for(self.address)
-        self._trust = trusted()
+        self._trust = trusted() if self.address.startswith("https:") else None
         self._headers = {
             "Content-Type": "application/json",
             "Accept": "application/json",
