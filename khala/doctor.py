@@ -222,9 +222,7 @@ def _network() -> Iterator[Finding]:
     try:
         trust = trusted()
     except ConfigError as error:
-        yield Finding(
-            "trusted certificates", "note", visible_line(str(error)), "name a file or a directory, or unset it"
-        )
+        yield Finding("trusted certificates", "note", visible_line(str(error)), "name what is there, or unset it")
         return
     yield Finding("trusted certificates", "ok", visible_line(str(trust)) if trust else "those of the package certifi")
 

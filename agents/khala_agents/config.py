@@ -33,14 +33,14 @@ _HEADER = r"^[A-Za-z0-9!#$%&'*+.^_`|~-]{1,100}$"
 _SENDABLE = r"^[ -~]{0,1000}$"
 _OWN_HEADERS = frozenset({"accept", "accept-encoding", "connection", "content-length", "content-type", "host",
                           "transfer-encoding"})  # fmt: skip
-_OWN_FIELDS = {
-    "stream": "Khala reads whole answers",
-    "n": "one answer is read, and all would be billed",
-    "best_of": "one answer is read, and all would be billed",
-    "messages": "Khala writes them",
-    "model": "the field `model` of the file names it",
+_OWN_FIELDS: dict[str, tuple[JsonValue, str]] = {
+    "stream": (False, "Khala reads whole answers"),
+    "n": (1, "one answer is read, and all would be billed"),
+    "best_of": (1, "one answer is read, and all would be billed"),
+    "messages": (None, "Khala writes them"),
+    "model": (None, "the field `model` of the file names it"),
 }
-"""Fields of a request body that cannot stand under `extra`, and why."""
+"""Fields of a request body that cannot stand under `extra`, the value that does no harm, and why."""
 
 
 class SentValue(Frozen):
@@ -153,8 +153,8 @@ class ModelConfig(Frozen):
         for name, sent in value.items():
             if _KEY_LIKE.search(name):
                 raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
-            if name in _OWN_FIELDS and sent not in (False, 1):
-                raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name]}")
+            if name in _OWN_FIELDS and sent != _OWN_FIELDS[name][0]:
+                raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name][1]}")
         return value
 
     @field_validator("headers", "query")

@@ -126,7 +126,7 @@ BAD_MODELS = [
     (GOOD + "headers: {'a b': c}", "m.yaml:4 (headers): 'a b' is no header that can be set here"),
     (
         GOOD + "system_role: robot",
-        "m.yaml:4 (system_role): input should be 'system', 'developer', 'user' or 'fold', not 'robot'",
+        "m.yaml:4 (system_role): 'robot' is none of 'system', 'developer', 'user' or 'fold'",
     ),
     (
         GOOD.replace("vllm", "anthropic") + "api_key_env: A\nsystem_role: fold",
@@ -150,7 +150,7 @@ def test_a_wrong_model_file_says_line_and_field_and_never_a_key(text: str, expec
 
 @pytest.mark.parametrize("harmless", ["{stream: false}", "{n: 1}"])
 def test_what_would_change_nothing_is_taken(harmless: str) -> None:
-    assert loads(f"{GOOD}extra: {harmless}", ModelConfig).extra
+    assert loads(f"{GOOD}extra: {harmless}", ModelConfig, source="m.yaml").extra
 
 
 AZURE = """
@@ -172,7 +172,7 @@ async def test_a_gateway_gets_its_headers_its_query_and_its_key(kind: str, monke
         monkeypatch.setenv(name, value)
     answer = Given({"error": {"message": f"no {' '.join(SECRETS.values())}"}}, 404)
     async with Canned(answer) as server:
-        config = loads(AZURE.format(base=server.root).replace("openai\n", f"{kind}\n"), ModelConfig)
+        config = loads(AZURE.format(base=server.root).replace("openai\n", f"{kind}\n"), ModelConfig, source="m.yaml")
         client = client_for(config)
         with pytest.raises(LLMError) as caught:
             await client.complete(Request((ChatMessage(role="user", content="Game"),), timeout_s=5.0))
@@ -194,13 +194,13 @@ async def test_a_gateway_gets_its_headers_its_query_and_its_key(kind: str, monke
 
 
 def test_a_prefix_of_the_key_is_that_of_the_model_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    config = loads(f"{GOOD}key_header: {{name: Authorization, prefix: 'Token '}}", ModelConfig)
+    config = loads(f"{GOOD}key_header: {{name: Authorization, prefix: 'Token '}}", ModelConfig, source="m.yaml")
     assert config.key_header is not None
     assert (config.key_header.name, config.key_header.prefix) == ("Authorization", "Token ")
 
 
 def test_a_process_of_an_agent_gets_every_variable_that_its_model_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    config = loads(AZURE.format(base="http://h") + "base_url_env: AZURE_URL", ModelConfig)
+    config = loads(AZURE.format(base="http://h") + "base_url_env: AZURE_URL", ModelConfig, source="m.yaml")
     given = dict.fromkeys(
         [*SECRETS, "GATEWAY_TOKEN_FILE", "AZURE_URL", "ALL_PROXY", "REQUESTS_CA_BUNDLE", "OTHER"], "x"
     )

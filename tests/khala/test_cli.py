@@ -386,6 +386,31 @@ def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
     assert "khala sc2 install" in wrong["advice"]
 
 
+def test_the_doctor_says_which_endpoint_goes_through_which_proxy_and_what_is_trusted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in ("http_proxy", "https_proxy", "all_proxy", "no_proxy", "HTTP_PROXY", "HTTPS_PROXY", "NO_PROXY"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("SSL_CERT_FILE", "SSL_CERT_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("ALL_PROXY", "http://me:hidden@proxy.example:3128")
+    monkeypatch.setenv("NO_PROXY", "api.deepseek.com")
+    monkeypatch.setenv("VLLM_BASE_URL", "http://gpu.example:8000/v1")
+    monkeypatch.setenv("REQUESTS_CA_BUNDLE", str(tmp_path))
+    _, out = tell(capsys, "doctor", "--json")
+    found = {finding["name"]: finding["found"] for finding in json.loads(out)["findings"]}
+    assert found["proxy"] == "http://proxy.example:3128 (ALL_PROXY) for anthropic, openai, vllm"
+    assert found["no proxy"] == "for deepseek, ollama, scripted"
+    assert found["trusted certificates"] == f"REQUESTS_CA_BUNDLE={tmp_path}"
+    assert "hidden" not in out
+    monkeypatch.setenv("ALL_PROXY", "socks4://proxy.example:1080")
+    monkeypatch.setenv("REQUESTS_CA_BUNDLE", str(tmp_path / "none"))
+    _, out = tell(capsys, "doctor", "--json")
+    notes = {finding["name"]: finding for finding in json.loads(out)["findings"] if finding["state"] == "note"}
+    assert "a proxy of the kind 'socks4' cannot be used" in notes["proxy for openai"]["found"]
+    assert "there is no file or directory" in notes["trusted certificates"]["found"]
+
+
 def test_the_doctor_says_what_a_game_needs_that_is_not_there(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

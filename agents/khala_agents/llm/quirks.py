@@ -124,7 +124,7 @@ def _fields(body: Mapping[str, Any]) -> set[str]:
 
 
 def _place(name: str, said: str) -> int:
-    """Return where a refusal names a field, in quotes or at a colon, or anywhere if it is no usual word; -1: nowhere."""
+    """Return where a refusal names a field: in quotes, at a colon, or anywhere if it is no usual word; -1: nowhere."""
     word = re.escape(name)
     rare = rf"|(?<![\w.]){word}(?!\w)" if "_" in name or len(name) >= 8 else ""
     found = re.search(rf"[\"'`]{word}[\"'`]|\b{word}:|: {word}\b{rare}", said)

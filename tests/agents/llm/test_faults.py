@@ -118,13 +118,13 @@ async def test_an_error_of_anthropic_with_ok_is_the_error_that_its_type_says(
 
 STATUSES: list[tuple[Given, type[LLMError], str]] = [
     (
-        Given({"type": "error", "error": {"type": "invalid_request_error", "message": "Your credit balance is too low."}}, 400),
+        Given({"error": {"type": "invalid_request_error", "message": "Your credit balance is too low."}}, 400),
         OutOfMoney,
         "the account has no money or quota left",
     ),
     (Given([{"error": {"code": 400, "message": "API key not valid."}}], 400), Unauthorized, "is the key right"),
     (Given({"error": {"message": "no", "type": "insufficient_quota", "code": None}}, 429), OutOfMoney, "no money"),
-    (Given(b"<html>502 Bad Gateway</html>", 502), EndpointUnavailable, "answered http 502: <html>502 Bad Gateway</html>"),
+    (Given(b"<html>Bad Gateway</html>", 502), EndpointUnavailable, "answered http 502: <html>Bad Gateway</html>"),
 ]  # fmt: skip
 
 

@@ -62,11 +62,11 @@ VERDICTS: list[tuple[str, Given, str, str]] = [
     ("blanks", completion(" \n"), "empty", "the model said nothing"),
     ("no content", Given({"choices": [{"message": {}}]}), "empty", "the model said nothing"),
     ("tools", completion(None, "tool_calls", tool_calls=[TOOL]), "empty", "none are offered: Attack_Unit"),
-    ("a function", completion(None, "function_call", function_call={"name": "Stop"}), "empty", "none are offered: Stop"),
+    ("a function", completion(None, function_call={"name": "Stop"}), "empty", "none are offered: Stop"),
     ("a refusal", completion(None, refusal="I will not."), "refused", "the model declined: I will not."),
     ("a refusal in parts", completion([{"type": "refusal", "refusal": "No."}]), "refused", "the model declined: No."),
-    ("a refusal in prose", completion("I'm sorry, but I can't assist with that."), "refused", "I'm sorry, but I can't"),
-    ("a refusal, curly", completion("I\u2019m sorry, I can\u2019t help with this request."), "refused", "I\u2019m sorry"),
+    ("a refusal in prose", completion("I'm sorry, but I can't assist with that."), "refused", "I'm sorry"),
+    ("a refusal, curly", completion("I\u2019m sorry, I can\u2019t help with this request."), "refused", "sorry"),
     ("a filter", completion(None, "content_filter"), "filtered", "a filter of the endpoint took the answer away"),
     ("a filter after some words", completion("Analysis", "content_filter"), "filtered", "(content_filter)"),
     ("a filter of Gemini", completion("", "SAFETY"), "filtered", "(SAFETY)"),
@@ -134,10 +134,10 @@ async def test_a_prompt_that_a_filter_refuses_is_filtered_and_may_have_cost_some
 BROKEN: list[tuple[Given, str]] = [
     (completion("Analysis: half of", "error"), "broke its answer off"),
     (
-        Given({"choices": [{"message": {"content": ""}, "finish_reason": "error", "error": {"code": 502, "message": "gone"}}]}),
+        Given({"choices": [{"finish_reason": "error", "error": {"code": 502, "message": "gone"}}]}),
         "broke its answer off: gone",
     ),
-    (Given({"choices": [{"message": {"content": "half"}}], "error": {"message": "out of memory"}}), "off: out of memory"),
+    (Given({"choices": [{"message": {"content": "half"}}], "error": {"message": "no memory"}}), "off: no memory"),
 ]  # fmt: skip
 
 
