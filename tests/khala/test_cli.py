@@ -168,6 +168,10 @@ def test_what_the_user_can_mend_is_one_sentence_and_no_traceback(
     assert len(told.err.strip().splitlines()) == 1
 
 
+NOWHERE = dict.fromkeys(["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "ALL_PROXY", "all_proxy"], "http://127.0.0.1:1")
+"""An environment whose proxy never answers: neither the game nor a model on this machine may go through it."""
+
+
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """Return where four steps were played, by a model whose key is in the environment, and what was printed."""
@@ -178,10 +182,20 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.C
         base_url = json.loads(endpoint.stdout.readline())["base_url"]
         command = ["-v", "run", "2s3z_pair", "--model", "openai", "--model-name", "focus-fire"]
         command += ["--base-url", base_url, "--max-steps", "4", "--json"]
-        done = khala(*command, cwd=place, OPENAI_API_KEY=KEY)
+        done = khala(*command, cwd=place, OPENAI_API_KEY=KEY, **NOWHERE)
         endpoint.terminate()
     assert done.returncode == 0, done.stderr
     return place, done
+
+
+@pytest.mark.game
+@pytest.mark.slow
+@pytest.mark.parametrize(("task", "proxy"), [("2s3z_pair", "nonsense://"), ("duel_3m", "socks5://127.0.0.1:1")])
+def test_a_proxy_in_the_environment_changes_nothing_on_this_machine(task: str, proxy: str, tmp_path: Path) -> None:
+    environ = dict.fromkeys(NOWHERE, proxy)
+    done = khala("run", task, "--policy", "silent", "--max-steps", "3", "--json", cwd=tmp_path, **environ)
+    assert done.returncode == 0, done.stderr
+    assert {result["cause"] for result in json.loads(done.stdout)["results"]} == {"step limit"}
 
 
 @pytest.mark.game

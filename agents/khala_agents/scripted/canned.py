@@ -14,8 +14,6 @@ from pydantic_core import from_json, to_json
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from pydantic import JsonValue
-
 
 @dataclass(frozen=True, slots=True)
 class Asked:
@@ -38,7 +36,7 @@ class Asked:
 class Given:
     """An answer: JSON, or bytes as they are."""
 
-    body: JsonValue | bytes = None
+    body: Any = None
     status: int = 200
     headers: Mapping[str, str] = field(default_factory=dict)
 
@@ -95,7 +93,7 @@ class Canned:
         )
 
 
-def completion(content: JsonValue, finish: JsonValue = "stop", usage: JsonValue = None, **message: JsonValue) -> Given:
+def completion(content: Any, finish: Any = "stop", usage: Any = None, **message: Any) -> Given:
     """Return a chat completion with this content and these other fields of its message."""
     said = {"role": "assistant", "content": content, **message}
     return Given(
@@ -103,6 +101,6 @@ def completion(content: JsonValue, finish: JsonValue = "stop", usage: JsonValue 
     )
 
 
-def refusal(status: int, message: str, **fields: JsonValue) -> Given:
+def refusal(status: int, message: str, **fields: Any) -> Given:
     """Return an error with a message, as OpenAI words it."""
     return Given({"error": {"message": message, **fields}}, status)

@@ -30,7 +30,7 @@ GOOD = completion("go")
 
 def client(server: Canned, **options: Any) -> OpenAICompatible:
     return OpenAICompatible(
-        PROFILES["compatible"], **({"model": "m", "base_url": server.base_url, "prices": Prices()} | options)
+        PROFILES["compatible"], **{"model": "m", "base_url": server.base_url, "prices": Prices(), **options}
     )
 
 
