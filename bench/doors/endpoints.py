@@ -152,6 +152,10 @@ def _two_roles(asked: Asked) -> Given:
     return completion(ORDERS) if roles == ["user"] else refusal(400, "System role not supported")
 
 
+def _strict(asked: Asked) -> Given:
+    return completion(ORDERS) if asked.path == "/v1/chat/completions" else refusal(404, "Not Found")
+
+
 def _azure(asked: Asked) -> Given:
     if asked.headers.get("api-key") != "sk-doors-0123456789" or "authorization" in asked.headers:
         return refusal(401, "Access denied due to missing subscription key.")
@@ -245,7 +249,7 @@ QUIRKS: Final[tuple[Quirk, ...]] = (
         Expected(error=RequestRefused, words=("/chat/completions answered", "/v1")),
         path="",
     ),
-    Quirk("a whole request's address as base", completion(ORDERS), OK, path="/v1/chat/completions"),
+    Quirk("a whole request's address as base", _strict, OK, path="/v1/chat/completions"),
     Quirk(
         "404 without /v1",
         refusal(404, "Not Found"),

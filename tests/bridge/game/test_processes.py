@@ -72,7 +72,7 @@ VARIABLES = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROX
 
 def proxy_of(host: str) -> str | None:
     """Return the proxy through which PySC2's client would connect to a game."""
-    found = proxy_info()
+    found = proxy_info()  # type: ignore[no-untyped-call]  # see below
     return get_proxy_info(host, False, found.proxy_host, found.proxy_port, found.auth, found.no_proxy)[0]  # type: ignore[no-any-return]  # untyped
 
 
