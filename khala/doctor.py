@@ -200,6 +200,7 @@ def _keys() -> Iterator[Finding]:
 
 def _network() -> Iterator[Finding]:
     from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only this check needs them
+    from khala_agents.llm.address import checked_address  # noqa: PLC0415
     from khala_agents.llm.network import proxy_for, trusted  # noqa: PLC0415
     from khala_protocol.errors import ConfigError  # noqa: PLC0415
 
@@ -208,8 +209,8 @@ def _network() -> Iterator[Finding]:
         model = load_model(name)
         address = (os.environ.get(model.base_url_env) if model.base_url_env else None) or model.base_url
         try:
-            proxy = proxy_for(address)
-        except ConfigError as error:
+            proxy = proxy_for(checked_address(address))
+        except (ConfigError, ValueError) as error:
             yield Finding(f"proxy for {name}", "note", visible_line(str(error)))
             continue
         ways.setdefault(str(proxy) if proxy else "", []).append(name)

@@ -30,7 +30,7 @@ from khala_agents.llm.client import (
     Unauthorized,
     Unreachable,
 )
-from khala_agents.scripted.canned import Asked, Canned, Given, completion, refusal
+from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Quirk:
     """One row, as data: what is answered, to which client, and what must become of it."""
 
     what: str
-    answer: Given | Callable[[Asked], Given]
+    answer: Given | Callable[[CannedRequest], Given]
     expected: Expected
     model: Mapping[str, Any] = field(default_factory=dict)
     path: str = "/v1"
@@ -142,21 +142,21 @@ def _environment(changes: Mapping[str, str]) -> Iterator[None]:
 # --- what is answered ---------------------------------------------------------------------------------
 
 
-def _refuses(name: str) -> Callable[[Asked], Given]:
+def _refuses(name: str) -> Callable[[CannedRequest], Given]:
     said = refusal(400, f"Unsupported parameter: '{name}' is not supported with this model.", param=name)
     return lambda asked: said if name in asked.body else completion(ORDERS)
 
 
-def _two_roles(asked: Asked) -> Given:
+def _two_roles(asked: CannedRequest) -> Given:
     roles = [message["role"] for message in asked.body["messages"]]
     return completion(ORDERS) if roles == ["user"] else refusal(400, "System role not supported")
 
 
-def _strict(asked: Asked) -> Given:
+def _strict(asked: CannedRequest) -> Given:
     return completion(ORDERS) if asked.path == "/v1/chat/completions" else refusal(404, "Not Found")
 
 
-def _azure(asked: Asked) -> Given:
+def _azure(asked: CannedRequest) -> Given:
     if asked.headers.get("api-key") != "sk-doors-0123456789" or "authorization" in asked.headers:
         return refusal(401, "Access denied due to missing subscription key.")
     if asked.query.get("api-version") != "2024-10-21":

@@ -12,7 +12,7 @@ from khala_agents.llm.client import Completion, Request, model_name
 from khala_agents.llm.faults import no_completion, unpacked
 from khala_agents.llm.http import HttpEndpoint
 from khala_agents.llm.quirks import CACHE_MARK
-from khala_agents.llm.verdict import Said, judge
+from khala_agents.llm.verdict import AnswerParts, judge
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pydantic import JsonValue, SecretStr
 
-    from khala_agents.llm.http import Answer
+    from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import ChatMessage
 
@@ -81,14 +81,14 @@ class Anthropic(HttpClient):
             body["system"] = _cached(system)["content"] if marks else system
         return body
 
-    def _read(self, answer: Answer) -> Completion:
+    def _read(self, answer: HttpAnswer) -> Completion:
         try:
             body = _Body.model_validate_json(unpacked(answer.body))
         except ValidationError:
             raise no_completion(answer.url, answer.body, "message") from None
         finish = body.stop_reason if isinstance(body.stop_reason, str) else "end_turn"
         blocks = [block for block in body.content if isinstance(block, dict)]
-        said = Said(
+        said = AnswerParts(
             text="".join(_text(block) for block in blocks if block.get("type") == "text"),
             finish=finish,
             reasoned=any(block.get("type") in {"thinking", "redacted_thinking"} for block in blocks),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic_core import to_json
 
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens
-from khala_agents.llm.faults import fault_in, is_filtered
+from khala_agents.llm.faults import verdict_of
 from khala_agents.llm.http import OK
 from khala_agents.llm.quirks import LIMITS, REFUSALS, SystemRole, quirks_of
 from khala_protocol.messages import MOST
@@ -21,7 +21,7 @@ from khala_protocol.messages import MOST
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_agents.llm.http import Answer, HttpEndpoint
+    from khala_agents.llm.http import HttpAnswer, HttpEndpoint
 
 _LONG_PROMPT = 2000
 _FAR_FEWER = 0.5
@@ -58,12 +58,10 @@ class HttpClient(ABC):
                 answer = await self._ask(request)
         except TimeoutError:
             raise TryTimeout(f"{self.endpoint} gave no answer within {request.timeout_s:g} s") from None
-        if is_filtered(answer.status, answer.body):
-            fault = fault_in(answer.body)
-            why = fault.message if fault else ""
-            return Completion(
-                "", finish="content_filter", verdict="filtered", reason=f"a filter took the prompt: {why}"
-            )
+        withheld = verdict_of(answer.status, answer.body)
+        if withheld is not None:
+            verdict, reason = withheld
+            return Completion("", finish=verdict, verdict=verdict, reason=reason)
         if answer.status != OK:
             raise answer.error
         completion = self._read(answer)
@@ -87,7 +85,7 @@ class HttpClient(ABC):
         """Return the body of a request, with `self._fields` in it."""
 
     @abstractmethod
-    def _read(self, answer: Answer) -> Completion:
+    def _read(self, answer: HttpAnswer) -> Completion:
         """Return the completion in an answer, or raise an `LLMError`."""
 
     @property
@@ -95,14 +93,14 @@ class HttpClient(ABC):
         """The role of the system message, if it can change."""
         return None
 
-    async def _ask(self, request: Request) -> Answer:
+    async def _ask(self, request: Request) -> HttpAnswer:
         """Return the answer to a request; ask again where only a field was refused, which is done once for each."""
         while True:
             self._fields = self._fit()  # another client may have learned something
             body = self._body(request)
             role = self._role if any(message.role == "system" for message in request.messages) else None
             answer = await self._http.post(self.PATH, to_json(body))
-            if answer.status not in REFUSALS or is_filtered(answer.status, answer.body):
+            if answer.status not in REFUSALS or verdict_of(answer.status, answer.body):
                 return answer
             learned = self.quirks.learn(answer.body, body, role)
             if not learned:

@@ -31,6 +31,8 @@ from khala_agents.secret import excerpt
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from khala_agents.llm.client import Verdict
+
 _LONGEST_MESSAGE = 400
 _BOM = b"\xef\xbb\xbf"
 _SPENT: Final = frozenset(
@@ -39,6 +41,7 @@ _SPENT: Final = frozenset(
 """Codes under which "429 Too Many Requests" means that the account has no money left."""
 _NO_CREDIT = re.compile(r"credit balance is too low|insufficient (?:credit|balance|funds)", re.IGNORECASE)
 _NO_KEY = re.compile(r"api[ _]key (?:is )?(?:not valid|invalid)|API_KEY_INVALID|invalid_api_key", re.IGNORECASE)
+_SPENT_ON_THOUGHTS = re.compile(r"could not finish the message because max_tokens", re.IGNORECASE)
 _NO_SUCH_PATH = re.compile(
     r"unexpected endpoint|(?:unknown|invalid|no such) (?:endpoint|path|route|url)", re.IGNORECASE
 )
@@ -63,7 +66,7 @@ _STATUS: Final[tuple[tuple[re.Pattern[str], int], ...]] = tuple(
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class EndpointFault:
     """What an error body says.
 
     Attributes:
@@ -82,7 +85,7 @@ def unpacked(body: bytes) -> bytes:
     return body.removeprefix(_BOM)
 
 
-def fault_in(body: bytes) -> Fault | None:
+def fault_in(body: bytes) -> EndpointFault | None:
     """Return what an error body in a known form says; None for any other body."""
     try:
         said = from_json(unpacked(body))
@@ -93,21 +96,26 @@ def fault_in(body: bytes) -> Fault | None:
     if not isinstance(said, dict):
         return None
     error = said.get("error")
-    if not error and "error" in (said.get("object"), said.get("type")):  # vLLM
+    if not is_error(error) and "error" in (said.get("object"), said.get("type")):  # vLLM
         error = said
-    return fault_of(error) if error else None
+    return fault_of(error) if is_error(error) else None
 
 
-def fault_of(error: Any) -> Fault:
+def is_error(error: Any) -> bool:
+    """Return whether the `error` of a body says anything; some send it empty beside good answers."""
+    return any(error.values()) if isinstance(error, dict) else bool(error)
+
+
+def fault_of(error: Any) -> EndpointFault:
     """Return what the `error` of a body says."""
     if not isinstance(error, dict):
-        return Fault(None, (), excerpt(str(error), _LONGEST_MESSAGE))
+        return EndpointFault(None, (), excerpt(str(error), _LONGEST_MESSAGE))
     told = [error.get(name) for name in ("code", "type", "status")]
     names = tuple(str(name) for name in told if isinstance(name, str | int) and not isinstance(name, bool))
     metadata = error.get("metadata")
     raw = metadata.get("raw") if isinstance(metadata, dict) else None  # OpenRouter: what its provider said
     message = ": ".join(str(part) for part in (error.get("message"), raw) if part)
-    return Fault(_status(names), names, excerpt(message, _LONGEST_MESSAGE))
+    return EndpointFault(_status(names), names, excerpt(message, _LONGEST_MESSAGE))
 
 
 def _status(names: tuple[str, ...]) -> int | None:
@@ -143,7 +151,7 @@ def no_completion(url: str, body: bytes, what: str) -> LLMError:
             "switch streaming off at the endpoint or gateway"
         )
     if fault is None:
-        return MalformedCompletion(f"{url} answered with no {what}: {excerpt(body, 80)!r}{_without_version(url)}")
+        return MalformedCompletion(f"{url} answered with no {what}: {excerpt(body)!r}{_without_version(url)}")
     if fault.status is not None:
         return error_for(url, fault.status, {}, body)
     said = f"{url} answered with no {what}, but an error: {fault.message}"
@@ -155,17 +163,27 @@ def no_completion(url: str, body: bytes, what: str) -> LLMError:
 
 def broken_off(url: str, error: Any) -> LLMError:
     """Return the error for an answer that the endpoint itself says broke off; part of it may be billed."""
-    fault = fault_of(error) if error else None
-    why = f": {fault.message}" if fault and fault.message else ""
+    message = fault_of(error).message if error else ""
+    why = f": {message}" if message else ""
     return EndpointUnavailable(f"{url} broke its answer off{why}", status="broken off")
 
 
-def is_filtered(status: int, body: bytes) -> bool:
-    """Return whether an answer says that a filter took the prompt or the answer away."""
-    if status != 400:
-        return False
-    fault = fault_in(body)
-    return fault is not None and ("content_filter" in fault.names or b"ResponsibleAIPolicyViolation" in body)
+def verdict_of(status: int, body: bytes) -> tuple[Verdict, str] | None:
+    """Return what became of an answer that is withheld with 400, and why; None for any other answer.
+
+    A model worked for it, and may be billed, though its status says that the request was wrong.
+    """
+    fault = fault_in(body) if status == 400 else None
+    if fault is None:
+        return None
+    if "content_filter" in fault.names or b"ResponsibleAIPolicyViolation" in body:
+        return "filtered", f"a filter took the prompt: {fault.message}"
+    if _SPENT_ON_THOUGHTS.search(fault.message):
+        return (
+            "cut",
+            f"the model used all tokens on its reasoning: raise max_tokens in the model file ({fault.message})",
+        )
+    return None
 
 
 def _moved(url: str, name: str, headers: Mapping[str, str]) -> str:

@@ -37,7 +37,7 @@ OK, UNAUTHORIZED = 200, 401
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class HttpAnswer:
     """An HTTP answer.
 
     Attributes:
@@ -95,7 +95,7 @@ class HttpEndpoint:
         self._urls: dict[str, httpx.URL] = {}
         self._transport: httpx.AsyncBaseTransport | None = None
 
-    async def post(self, path: str, body: bytes) -> Answer:
+    async def post(self, path: str, body: bytes) -> HttpAnswer:
         """Return the answer, whatever its status.
 
         Raises:
@@ -146,7 +146,7 @@ class HttpEndpoint:
         if transport is not None:
             await transport.aclose()
 
-    async def _answer(self, method: str, path: str, body: bytes | None = None) -> Answer:
+    async def _answer(self, method: str, path: str, body: bytes | None = None) -> HttpAnswer:
         """Return the answer to a request.
 
         It goes to the transport itself: an `httpx.AsyncClient`, with redirects, authentication and cookies that no
@@ -158,7 +158,7 @@ class HttpEndpoint:
             self._urls[path] = httpx.URL(self.address + path + self._query)
         request = httpx.Request(method, self._urls[path], headers=self._headers, content=body)
         answer = await self._connected().handle_async_request(request)
-        return Answer(self.address + path, answer.status_code, answer.headers, answer.content)
+        return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 
     def _connected(self) -> httpx.AsyncBaseTransport:
         if self._transport is None:

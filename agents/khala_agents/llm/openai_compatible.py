@@ -12,9 +12,9 @@ from pydantic import BaseModel, Field, ValidationError
 
 from khala_agents.llm.asking import HttpClient, count
 from khala_agents.llm.client import Completion, MalformedCompletion, Request, model_name
-from khala_agents.llm.faults import broken_off, no_completion, unpacked
+from khala_agents.llm.faults import broken_off, is_error, no_completion, unpacked
 from khala_agents.llm.http import HttpEndpoint
-from khala_agents.llm.verdict import CUT, FILTERED, Said, judge
+from khala_agents.llm.verdict import CUT, FILTERED, AnswerParts, judge
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from pydantic import JsonValue, SecretStr
 
-    from khala_agents.llm.http import Answer
+    from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
     from khala_agents.llm.profiles import Profile
     from khala_agents.llm.quirks import SystemRole
@@ -102,15 +102,15 @@ class OpenAICompatible(HttpClient):
             parts.append({"type": "image_url", "image_url": {"url": url, "detail": self._detail}})
         return {"role": role, "content": [*parts, {"type": "text", "text": message.content}]}
 
-    def _read(self, answer: Answer) -> Completion:
+    def _read(self, answer: HttpAnswer) -> Completion:
         try:
             body = _Body.model_validate_json(unpacked(answer.body))
         except ValidationError:
             raise no_completion(answer.url, answer.body, "chat completion") from None
         choice = body.choices[0]
         finish = choice.finish_reason if isinstance(choice.finish_reason, str) else "stop"
-        error = choice.error or body.error
-        if finish == "error" or error:
+        error = next(filter(is_error, (choice.error, body.error)), None)
+        if finish == "error" or error is not None:
             raise broken_off(answer.url, error)
         if choice.message is None and finish.lower() not in CUT | FILTERED:
             raise MalformedCompletion(f"{answer.url} answered with a choice that has no message")
@@ -150,11 +150,12 @@ class _Message(BaseModel):
     tool_calls: Any = None
     function_call: Any = None
 
-    def said(self, finish: str, limit: int | None) -> Said:
+    def said(self, finish: str, limit: int | None) -> AnswerParts:
         """Return it in common terms."""
         parts = self.content if isinstance(self.content, list) else []
-        thoughts = next((told for told in (self.reasoning_content, self.reasoning) if isinstance(told, str)), "")
-        return Said(
+        told = (self.reasoning_content, self.reasoning)
+        thoughts = next((thoughts for thoughts in told if thoughts and isinstance(thoughts, str)), "")
+        return AnswerParts(
             text=self.content if isinstance(self.content, str) else "".join(map(_text, parts)),
             finish=finish,
             refusal=self.refusal if isinstance(self.refusal, str) else "".join(map(_refusal, parts)),

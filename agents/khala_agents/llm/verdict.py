@@ -38,7 +38,7 @@ _DECLINES = re.compile(
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class AnswerParts:
     """An answer in common terms.
 
     Attributes:
@@ -61,7 +61,7 @@ class Said:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class Judgement:
     """What is played of an answer, and why there is nothing; `reason` may also remark on words that there are."""
 
     text: str
@@ -69,20 +69,22 @@ class Judged:
     reason: str = ""
 
 
-def judge(said: Said) -> Judged:
+def judge(said: AnswerParts) -> Judgement:
     """Return what became of an answer."""
     text = scrub(said.text)
     finish = said.finish.lower()
     if finish in FILTERED:
-        return Judged(text, "filtered", f"a filter of the endpoint took the answer away ({excerpt(said.finish, 40)})")
+        return Judgement(
+            text, "filtered", f"a filter of the endpoint took the answer away ({excerpt(said.finish, 40)})"
+        )
     words = _without_thoughts(text)
     if finish == "refusal" or (said.refusal and not words):
         told = excerpt(said.refusal or text)
-        return Judged(scrub(said.refusal) or text, "refused", f"the model declined: {told or 'it gave no reason'}")
+        return Judgement(scrub(said.refusal) or text, "refused", f"the model declined: {told or 'it gave no reason'}")
     if words:
         if _declines(words):
-            return Judged(text, "refused", f"the model declined: {excerpt(words)}")
-        return Judged(text)
+            return Judgement(text, "refused", f"the model declined: {excerpt(words)}")
+        return Judgement(text)
     return _wordless(said, text, finish)
 
 
@@ -93,17 +95,19 @@ def _declines(words: str) -> bool:
     return bool(_DECLINES.search(words.replace("\u2019", "'")))
 
 
-def _wordless(said: Said, text: str, finish: str) -> Judged:
+def _wordless(said: AnswerParts, text: str, finish: str) -> Judgement:
     thought = said.reasoned or bool(said.thoughts.strip() or text.strip())
     if finish in CUT:
-        return Judged(text, "cut", _why_cut(said.limit, finish, thought=thought))
+        return Judgement(text, "cut", _why_cut(said.limit, finish, thought=thought))
     if said.tools:
         names = excerpt(", ".join(said.tools), 80)
-        return Judged(text, "empty", f"the model called tools, of which none are offered: {names}")
+        return Judgement(text, "empty", f"the model called tools, of which none are offered: {names}")
     if said.thoughts.strip() and not text.strip():
-        return Judged(scrub(said.thoughts), "ok", "the whole answer was among the model's reasoning, and is read there")
+        return Judgement(
+            scrub(said.thoughts), "ok", "the whole answer was among the model's reasoning, and is read there"
+        )
     why = "the model thought, and then said nothing" if thought else "the model said nothing"
-    return Judged(text, "empty", f"{why} (it ended with {excerpt(said.finish, 40)!r})")
+    return Judgement(text, "empty", f"{why} (it ended with {excerpt(said.finish, 40)!r})")
 
 
 def _why_cut(limit: int | None, finish: str, *, thought: bool) -> str:

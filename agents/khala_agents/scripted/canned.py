@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class CannedRequest:
     """A request as it arrived.
 
     Attributes:
@@ -41,7 +41,7 @@ class Given:
     headers: Mapping[str, str] = field(default_factory=dict)
 
 
-Answering: TypeAlias = "Given | Callable[[Asked], Given]"
+Answering: TypeAlias = "Given | Callable[[CannedRequest], Given]"
 
 
 class Canned:
@@ -53,7 +53,7 @@ class Canned:
     """
 
     def __init__(self, answer: Answering) -> None:
-        self.asked: list[Asked] = []
+        self.asked: list[CannedRequest] = []
         self.base_url = ""
         self._answer = answer
         self._runner: web.AppRunner | None = None
@@ -78,7 +78,7 @@ class Canned:
 
     async def _note(self, request: web.Request) -> web.Response:
         body = await request.read()
-        asked = Asked(
+        asked = CannedRequest(
             path=request.path,
             query=dict(request.query),
             headers={name.lower(): value for name, value in request.headers.items()},

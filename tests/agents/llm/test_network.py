@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib.util
+import random
 import ssl
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
@@ -17,6 +19,7 @@ from khala_agents.llm.network import proxy_for, trusted
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
+from khala_agents.llm.retry import RetryRule, retried
 from khala_agents.scripted.canned import Canned, Given, completion
 from khala_protocol.certificates import make_authority
 from khala_protocol.errors import ConfigError
@@ -162,6 +165,7 @@ async def test_a_proxy_that_refuses_is_named_without_its_password_and_nothing_wa
         with pytest.raises(Unreachable) as caught:
             await ask("https://model.invalid/v1")
     assert heard[0].startswith(b"CONNECT model.invalid:443 ")
+    assert b"Proxy-Authorization: Basic bWU6aGlkZGVu" in heard[0]
     assert str(caught.value) == (
         f"https://model.invalid/v1 cannot be reached through the proxy http://127.0.0.1:{port} (HTTPS_PROXY): "
         "the proxy refused the connection: http 407 (ProxyError)"
@@ -257,6 +261,21 @@ async def test_a_connection_that_breaks_after_the_request_may_be_billed(answer: 
         with pytest.raises(Unreachable) as caught:
             await ask(f"http://127.0.0.1:{port}/v1")
     assert caught.value.may_be_billed
+
+
+async def test_a_connection_that_was_dropped_while_idle_is_made_again() -> None:
+    body = b'{"choices": [{"message": {"content": "go"}}]}'
+    async with serving(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)) as (port, heard):
+        model = OpenAICompatible(
+            PROFILES["compatible"], model="m", base_url=f"http://127.0.0.1:{port}/v1", prices=Prices()
+        )
+        at_once = RetryRule(base_s=0, jitter_s=0)
+        for _ in range(3):
+            request = Request((ChatMessage(role="user", content="Game"),), timeout_s=5.0)
+            tried = await retried(partial(model.complete, request), at_once, deadline=None, rng=random.Random(1))
+            assert tried.text == "go"
+        await model.close()
+    assert len(heard) == 3
 
 
 # --- certificates -------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.quirks import Quirks
-from khala_agents.scripted.canned import Asked, Canned, Given, completion, refusal
+from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ async def ask(model: OpenAICompatible | Anthropic) -> Completion:
     return await model.complete(Request(PROMPT, timeout_s=5.0, stable=3))
 
 
-def refuses(field: str, answer: Given) -> Callable[[Asked], Given]:
+def refuses(field: str, answer: Given) -> Callable[[CannedRequest], Given]:
     """Return an endpoint that answers so whenever a request has this field."""
     return lambda asked: answer if field in asked.body else GOOD
 
@@ -98,7 +98,7 @@ async def test_the_limit_of_tokens_is_called_by_its_other_name_and_never_dropped
 
 
 async def test_an_endpoint_that_takes_no_limit_under_either_name_is_not_asked_without_one() -> None:
-    def answer(asked: Asked) -> Given:
+    def answer(asked: CannedRequest) -> Given:
         return refusal(400, UNSUPPORTED.format("max_tokens" if "max_tokens" in asked.body else "max_completion_tokens"))
 
     async with Canned(answer) as server:
@@ -130,7 +130,7 @@ async def test_what_is_refused_for_its_value_or_without_a_name_is_an_error(answe
 
 
 async def test_several_refusals_are_learned_in_one_try() -> None:
-    def answer(asked: Asked) -> Given:
+    def answer(asked: CannedRequest) -> Given:
         for field in ("max_tokens", "temperature", "seed"):
             if field in asked.body:
                 return refusal(400, UNSUPPORTED.format(field), param=field)
@@ -157,11 +157,11 @@ async def test_clients_of_one_model_share_what_was_found_and_others_do_not() -> 
 # --- the system message -------------------------------------------------------------------------------
 
 
-def roles(asked: Asked) -> list[str]:
+def roles(asked: CannedRequest) -> list[str]:
     return [message["role"] for message in asked.body["messages"]]
 
 
-def gemma(asked: Asked) -> Given:
+def gemma(asked: CannedRequest) -> Given:
     """Answer as a template that knows two roles, which alternate."""
     if {"system", "developer"} & set(roles(asked)):
         return refusal(400, "System role not supported")
@@ -170,7 +170,7 @@ def gemma(asked: Asked) -> Given:
     return GOOD
 
 
-def no_developer(asked: Asked) -> Given:
+def no_developer(asked: CannedRequest) -> Given:
     known = "Invalid value: 'developer'. Supported values are: 'system', 'assistant', 'user'."
     return refusal(400, known, param="messages[0].role") if "developer" in roles(asked) else GOOD
 
@@ -212,7 +212,7 @@ async def test_roles_that_are_refused_even_so_are_an_error_and_no_loop() -> None
 
 
 async def test_a_gateway_that_refuses_marks_for_a_cache_gets_none() -> None:
-    def answer(asked: Asked) -> Given:
+    def answer(asked: CannedRequest) -> Given:
         if "cache_control" in str(asked.body):
             return refusal(400, "messages.0.content.0.cache_control: Extra inputs are not permitted")
         return Given({"content": [{"type": "text", "text": "go"}], "stop_reason": "end_turn"})

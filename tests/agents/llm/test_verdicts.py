@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from pydantic import SecretStr
+from pydantic_core import to_json
 
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import Completion, EndpointUnavailable, MalformedCompletion, Request
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
-from khala_agents.llm.verdict import Said, judge
+from khala_agents.llm.verdict import AnswerParts, judge
 from khala_agents.scripted.canned import Canned, Given, completion
 from khala_protocol.messages import ChatMessage, Usage
 
@@ -101,7 +102,7 @@ NO_REFUSALS = [
 
 @pytest.mark.parametrize("words", NO_REFUSALS)
 def test_a_player_that_cannot_help_another_one_does_not_decline(words: str) -> None:
-    assert judge(Said(words, "stop")).verdict == "ok"
+    assert judge(AnswerParts(words, "stop")).verdict == "ok"
 
 
 async def test_an_answer_among_the_reasoning_is_read_and_said_once(caplog: pytest.LogCaptureFixture) -> None:
@@ -129,6 +130,13 @@ async def test_a_prompt_that_a_filter_refuses_is_filtered_and_may_have_cost_some
     found = await asked(Given(FILTER_400, 400))
     assert (found.verdict, found.reason) == ("filtered", "a filter took the prompt: The prompt was filtered.")
     assert found.usage == Usage(requests=1, unknown_requests=1)
+
+
+async def test_a_model_that_could_not_finish_for_lack_of_tokens_was_cut_and_may_have_cost_something() -> None:
+    message = "Could not finish the message because max_tokens or model output limit was reached."
+    found = await asked(Given({"error": {"message": message, "type": "invalid_request_error"}}, 400))
+    assert (found.verdict, found.usage.unknown_requests) == ("cut", 1)
+    assert found.reason.startswith("the model used all tokens on its reasoning: raise max_tokens in the model file")
 
 
 BROKEN: list[tuple[Given, str]] = [
@@ -166,6 +174,9 @@ ODD_BUT_GOOD = [
     completion(ORDERS, refusal=False, reasoning_content={"a": 1}, tool_calls={}, function_call=[]),
     completion([{"type": "text", "text": None}, {"type": "reference"}, {"type": "output_text", "text": ORDERS}]),
     completion(["", ORDERS]),
+    Given({"choices": [{"message": {"content": ORDERS}, "error": None}], "error": {"code": None, "message": ""}}),
+    Given(b'{"choices": [{"logprobs": NaN, "message": {"content": ' + to_json(ORDERS) + b"}}]}"),
+    Given({"choices": [{"message": {"content": "", "reasoning_content": "", "reasoning": ORDERS}}]}),
     Given(
         b"\xef\xbb\xbf" + b'{"choices": [{"message": {"content": "' + ORDERS.replace("\n", "\\n").encode() + b'"}}]}'
     ),
