@@ -38,8 +38,7 @@ class Profile:
 
     Attributes:
         length_field: name of the limit of generated tokens.
-        system_role: role under which the system message is sent; `fold` puts it in front of the first message of the
-            user, where a model has no such role.
+        system_role: role of the system message; `fold` puts it in front of the first message of the user.
         temperature: whether `temperature` may be sent; a reasoning model refuses it with 400.
         seed: whether `seed` may be sent.
         cached_path: where in `usage` the number of cached prompt tokens stands.

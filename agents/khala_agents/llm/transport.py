@@ -24,6 +24,8 @@ CONNECT_S = 5.0
 KEEP_ALIVE_S = 120.0
 MAX_BODY_BYTES = 8 * 2**20
 """Of an answer, unpacked; the longest completion of today's models has half a megabyte."""
+MAX_HEADER_BYTES = 2**16
+"""Of one header; gateways tell of a model in some that are longer than aiohttp's 8 kB."""
 _DONE = ("content-encoding", "content-length", "transfer-encoding")
 """Headers that no longer say what the body is."""
 _OURS = frozenset({"Accept", "Accept-Encoding", "User-Agent", "Content-Type"})
@@ -66,9 +68,11 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 body = await _whole(answer.content.iter_any(), answer)
         except aiohttp.ServerTimeoutError as error:
             raise httpx.ConnectTimeout(str(error), request=request) from error
-        except aiohttp.ClientHttpProxyError as error:  # its text has the proxy's address, and so its password
+        except aiohttp.ClientHttpProxyError as error:
             said = f"the proxy refused the connection: http {error.status}"
             raise httpx.ProxyError(said, request=request) from None
+        except aiohttp.ClientResponseError as error:  # its text has the whole address; the query may have a key
+            raise httpx.RemoteProtocolError(f"that is no HTTP: {error.message}", request=request) from None
         except (aiohttp.ClientConnectorError, aiohttp.InvalidURL) as error:
             raise httpx.ConnectError(str(error), request=request) from error
         except (aiohttp.ClientError, OSError) as error:
@@ -90,6 +94,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 timeout=aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_S),
                 cookie_jar=aiohttp.DummyCookieJar(),
                 skip_auto_headers=_OURS,  # httpx has set them
+                max_field_size=MAX_HEADER_BYTES,
             )
         return self._session
 

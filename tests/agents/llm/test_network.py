@@ -263,6 +263,21 @@ async def test_a_connection_that_breaks_after_the_request_may_be_billed(answer: 
     assert caught.value.may_be_billed
 
 
+async def test_an_answer_that_is_no_http_shows_no_query() -> None:
+    async with serving(b"nonsense\r\n\r\n") as (port, _):
+        http = HttpEndpoint(f"http://127.0.0.1:{port}/v1", query={"key": "a/b c"})
+        with pytest.raises(Unreachable, match=r"cannot be reached: that is no HTTP: ") as caught:
+            await http.post("/chat/completions", b"{}")
+        await http.close()
+    assert "key" not in str(caught.value)
+    assert caught.value.may_be_billed
+
+
+async def test_a_gateway_may_send_long_headers() -> None:
+    async with Canned(Given(GOOD.body, headers={"X-Model-Info": "a" * 20_000})) as server:
+        assert await ask(server.base_url) == "go"
+
+
 async def test_a_connection_that_was_dropped_while_idle_is_made_again() -> None:
     body = b'{"choices": [{"message": {"content": "go"}}]}'
     async with serving(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)) as (port, heard):
