@@ -7,14 +7,15 @@ keys. Above it are `openai_compatible` and `anthropic`.
 
 from __future__ import annotations
 
+import math
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urljoin
 
-from pydantic_core import from_json
+from pydantic_core import from_json, to_json
 
 from khala_agents.llm.address import base_of, is_versioned
 from khala_agents.llm.client import (
@@ -114,7 +115,7 @@ def fault_of(error: Any) -> EndpointFault:
     names = tuple(str(name) for name in told if isinstance(name, str | int) and not isinstance(name, bool))
     metadata = error.get("metadata")
     raw = metadata.get("raw") if isinstance(metadata, dict) else None  # OpenRouter: what its provider said
-    message = ": ".join(str(part) for part in (error.get("message"), raw) if part)
+    message = ": ".join(str(part) for part in (error.get("message"), raw) if part) or to_json(error)
     return EndpointFault(_status(names), names, excerpt(message, _LONGEST_MESSAGE))
 
 
@@ -190,7 +191,7 @@ def _moved(url: str, name: str, headers: Mapping[str, str]) -> str:
     place = headers.get("location")
     if not place:
         return f"{url} answered {name}: it has moved, and does not say where"
-    there = excerpt(base_of(place) if "://" in place else place.partition("?")[0], _LONGEST_MESSAGE)
+    there = excerpt(base_of(urljoin(url, place)), _LONGEST_MESSAGE)
     return f"{url} answered {name}: it has moved, and keys are not sent after it: set base_url to {there}"
 
 
@@ -201,13 +202,15 @@ def _without_version(url: str) -> str:
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
     """Return the seconds that the headers `Retry-After-Ms` or `Retry-After` (seconds, or a date) ask to wait."""
-    with suppress(KeyError, ValueError):
-        return max(float(headers["retry-after-ms"]) / 1000, 0.0)
+    milliseconds = _number(headers.get("retry-after-ms", ""))
+    if milliseconds is not None:
+        return milliseconds / 1000
     value = headers.get("retry-after")
     if value is None:
         return None
-    with suppress(ValueError):
-        return max(float(value), 0.0)
+    seconds = _number(value)
+    if seconds is not None:
+        return seconds
     try:
         until = parsedate_to_datetime(value)
         # by the server's own clock if it sends the time: ours may differ
@@ -215,3 +218,12 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
         return max((until - now).total_seconds(), 0.0)
     except (ValueError, TypeError):
         return None
+
+
+def _number(text: str) -> float | None:
+    """Return a time that can be waited for; None for anything else, such as `nan`."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return max(number, 0.0) if math.isfinite(number) else None

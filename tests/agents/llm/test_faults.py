@@ -66,6 +66,7 @@ INSIDE: list[tuple[Given, type[LLMError], str]] = [
     (Given({"object": "error", "message": "because", "code": 503}), EndpointUnavailable, "http 503"),
     (Given({"choices": None, "error": {"code": 429, "message": "because"}}), EndpointUnavailable, "http 429"),
     (said(code="brand_new_code"), MalformedCompletion, "malformed"),
+    (Given({"error": {"code": 503, "detail": "because"}}), EndpointUnavailable, "http 503"),
     (Given({"error": "because the model is loading"}), MalformedCompletion, "malformed"),
 ]
 
@@ -167,7 +168,7 @@ async def test_the_address_of_a_whole_request_is_a_base_as_well(pasted: str) -> 
 
 MOVED = [
     ("https://new.example/v1/chat/completions?key=secret", "set base_url to https://new.example/v1"),
-    ("/other/v1/chat/completions", "set base_url to /other/v1/chat/completions"),
+    ("/other/v1/chat/completions", "/other/v1"),
     ("", "it has moved, and does not say where"),
 ]
 
