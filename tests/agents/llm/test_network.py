@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import importlib.util
 import random
+import socket
 import ssl
 from functools import partial
 from typing import TYPE_CHECKING
@@ -241,7 +242,11 @@ async def test_a_connection_that_is_refused_was_never_billed() -> None:
     assert not caught.value.may_be_billed
 
 
-async def test_a_name_that_nobody_knows_was_never_billed() -> None:
+async def test_a_name_that_nobody_knows_was_never_billed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def know_nobody(*asked: object, **options: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "getaddrinfo", know_nobody)
     with pytest.raises(Unreachable) as caught:
         await ask("http://model.invalid/v1")
     assert not caught.value.may_be_billed
