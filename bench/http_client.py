@@ -73,7 +73,7 @@ async def compare(base_url: str, count: int, rounds: int) -> list[Row]:
     kinds: dict[str, Callable[[], httpx.AsyncClient]] = {
         "httpx": lambda: httpx.AsyncClient(verify=tls, limits=LIMITS, timeout=TIMEOUT, trust_env=False),
         "httpx over our transport": lambda: httpx.AsyncClient(
-            transport=AiohttpTransport(tls, proxies=False), timeout=TIMEOUT, trust_env=False
+            transport=AiohttpTransport(tls), timeout=TIMEOUT, trust_env=False
         ),
     }
     for name, make in kinds.items():

@@ -13,6 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from khala_protocol.visible import visible_line
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
@@ -196,4 +198,34 @@ def _keys() -> Iterator[Finding]:
         )
 
 
-CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _engine, _bus, _keys)
+def _network() -> Iterator[Finding]:
+    from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only this check needs them
+    from khala_agents.llm.address import checked_address  # noqa: PLC0415
+    from khala_agents.llm.network import proxy_for, trusted  # noqa: PLC0415
+    from khala_protocol.errors import ConfigError  # noqa: PLC0415
+
+    ways: dict[str, list[str]] = {}
+    for name in model_files():
+        model = load_model(name)
+        address = (os.environ.get(model.base_url_env) if model.base_url_env else None) or model.base_url
+        try:
+            proxy = proxy_for(checked_address(address))
+        except (ConfigError, ValueError) as error:
+            yield Finding(f"proxy for {name}", "note", visible_line(str(error)))
+            continue
+        ways.setdefault(str(proxy) if proxy else "", []).append(name)
+    direct = ways.pop("", [])
+    for shown, names in ways.items():
+        advice = "set NO_PROXY for those that it cannot reach; this machine never needs a proxy"
+        yield Finding("proxy", "ok", f"{visible_line(shown)} for {', '.join(names)}", advice)
+    if direct:
+        yield Finding("no proxy", "ok", f"for {', '.join(direct)}")
+    try:
+        trust = trusted()
+    except ConfigError as error:
+        yield Finding("trusted certificates", "note", visible_line(str(error)), "name what is there, or unset it")
+        return
+    yield Finding("trusted certificates", "ok", visible_line(str(trust)) if trust else "those of the package certifi")
+
+
+CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _engine, _bus, _keys, _network)

@@ -37,9 +37,8 @@ def plain(environ: Mapping[str, str] = os.environ) -> dict[str, str]:
 
 
 def with_model(model: ModelConfig, environ: Mapping[str, str] = os.environ) -> dict[str, str]:
-    """Return the environment of an agent with this model: with its key and its address."""
-    key = (model.api_key_env, f"{model.api_key_env}_FILE") if model.api_key_env else ()
-    return _only(environ, *PLAIN, *NETWORK, *key, *filter(None, [model.base_url_env]))
+    """Return the environment of an agent with this model: with the variables that the model's file names."""
+    return _only(environ, *PLAIN, *NETWORK, *model.variables)
 
 
 def _only(environ: Mapping[str, str], *patterns: str) -> dict[str, str]:

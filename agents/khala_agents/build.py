@@ -37,6 +37,7 @@ from khala_protocol.trust import import_trusted
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from khala_agents.config import SentValue
     from khala_agents.llm.client import LLMClient
     from khala_agents.llm.limits import Gates
     from khala_protocol.messages import MemoryRule, ModelCall
@@ -49,36 +50,40 @@ def client_for(config: ModelConfig) -> LLMClient:
     """Return a client for one agent.
 
     Raises:
-        ConfigError: the key that the model file names is missing.
+        ConfigError: a key that the model file names is missing, or the environment names a proxy that cannot be used.
     """
     key = read_key(config.api_key_env) if config.api_key_env else None
-    if key is not None and sends_openly(config.base_url):
+    if config.secrets and sends_openly(config.base_url):
+        names = " and ".join(config.secrets)
         _warn_once(
-            f"the key in {config.api_key_env} goes to {config.base_url} unencrypted: everyone on the way can read it; "
-            "use https://"
+            f"the key in {names} goes to {config.base_url} unencrypted: everyone on the way can read it; use https://"
         )
+    sent: dict[str, Any] = {
+        "model": config.model,
+        "base_url": config.base_url,
+        "prices": config.prices,
+        "key": key,
+        "headers": {name: _sent(value) for name, value in config.headers.items()},
+        "query": {name: _sent(value) for name, value in config.query.items()},
+        "temperature": config.temperature,
+        "extra": config.extra,
+    }
+    if config.key_header is not None:
+        sent["key_header"] = config.key_header.name, config.key_header.prefix
     if config.profile == "anthropic":
-        return Anthropic(
-            model=config.model,
-            prices=config.prices,
-            key=key,
-            base_url=config.base_url,
-            max_tokens=config.max_tokens or 1024,
-            temperature=config.temperature,
-            extra=config.extra,
-        )
+        return Anthropic(max_tokens=config.max_tokens or 1024, **sent)
     return OpenAICompatible(
         PROFILES[config.profile],
-        model=config.model,
-        base_url=config.base_url,
-        prices=config.prices,
-        key=key,
         max_tokens=config.max_tokens,
-        temperature=config.temperature,
         seed=config.seed,
-        extra=config.extra,
+        system_role=config.system_role,
         detail=config.images.detail if config.images else "auto",
+        **sent,
     )
+
+
+def _sent(value: SentValue) -> str:
+    return value.prefix + read_key(value.env).get_secret_value() if value.env else value.text
 
 
 @cache

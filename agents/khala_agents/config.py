@@ -18,6 +18,7 @@ from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.limits import LimitRules
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES, ProfileName
+from khala_agents.llm.quirks import SystemRole  # noqa: TC001  # pydantic evaluates it
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import ANTHROPIC, Vision
 from khala_configs import CONFIGS
@@ -27,7 +28,58 @@ from khala_protocol.keys import check_name
 from khala_protocol.messages import Frozen, MemoryRule, Pace
 
 _VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
-_KEY_LIKE = re.compile(r"key|token$|secret|password|authorization", re.IGNORECASE)
+_KEY_LIKE = re.compile(r"key|token$|secret|password|authorization|cookie|signature", re.IGNORECASE)
+_HEADER = r"^[A-Za-z0-9!#$%&'*+.^_`|~-]{1,100}$"
+_SENDABLE = r"^[ -~]{0,1000}$"
+_OWN_HEADERS = frozenset({"accept", "accept-encoding", "connection", "content-length", "content-type", "host",
+                          "transfer-encoding"})  # fmt: skip
+_OWN_FIELDS: dict[str, tuple[JsonValue, str]] = {
+    "stream": (False, "Khala reads whole answers"),
+    "n": (1, "one answer is read, and all would be billed"),
+    "best_of": (1, "one answer is read, and all would be billed"),
+    "messages": (None, "Khala writes them"),
+    "model": (None, "the field `model` of the file names it"),
+}
+"""Fields of a request body that cannot stand under `extra`, the value that does no harm, and why."""
+
+
+class SentValue(Frozen):
+    """What a header or a part of the query has: words, or what an environment variable holds."""
+
+    text: str = Field(default="", pattern=_SENDABLE)
+    """The words. `name: words` is short for it."""
+    env: str | None = None
+    """Name of the environment variable that holds the value, which is treated as a key. With `_FILE` appended, of the
+    variable with the path of a file."""
+    prefix: str = Field(default="", pattern=_SENDABLE)
+    """What is sent in front of the variable's value, such as `"Bearer "`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, value: object) -> object:
+        return {"text": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _words_or_variable(self) -> Self:
+        if bool(self.text) == (self.env is not None) or (self.prefix and self.env is None):
+            raise ValueError("either words, or {env: NAME} of an environment variable with or without a prefix")
+        if "${" in self.text or (self.env is not None and not _VARIABLE.fullmatch(self.env)):
+            raise ValueError("the name of an environment variable is wanted here, such as {env: GATEWAY_TOKEN}")
+        return self
+
+
+class KeyHeader(Frozen):
+    """The header that carries the key."""
+
+    name: str = Field(pattern=_HEADER)
+    """`name` alone is short for it."""
+    prefix: str = Field(default="", pattern=_SENDABLE)
+    """What stands in front of the key, such as `"Bearer "`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, value: object) -> object:
+        return {"name": value} if isinstance(value, str) else value
 
 
 class ModelConfig(Frozen):
@@ -43,6 +95,16 @@ class ModelConfig(Frozen):
     """Name of the environment variable that replaces `base_url` where it is set."""
     api_key_env: str | None = None
     """Name of the environment variable with the key; with `_FILE` appended, of the variable with the path of a file."""
+    key_header: KeyHeader | None = None
+    """The header that carries the key: `api-key` for Azure, or `{name: Authorization, prefix: "Token "}`; None: as
+    endpoints of this kind want it."""
+    headers: dict[str, SentValue] = Field(default_factory=dict)
+    """Sent with each request: words, or `{env: NAME}` for what an environment variable holds."""
+    query: dict[str, SentValue] = Field(default_factory=dict)
+    """Added to the address of each request, such as `api-version`; values as in `headers`."""
+    system_role: SystemRole | None = None
+    """Role of the system message; `fold` puts it in front of the first message of the user. None: as the profile says.
+    Where an endpoint refuses one, Khala finds the next by itself."""
     max_tokens: int | None = Field(default=None, ge=1)
     """Limit of generated tokens."""
     temperature: float | None = Field(default=None, ge=0)
@@ -88,9 +150,27 @@ class ModelConfig(Frozen):
     @field_validator("extra")
     @classmethod
     def _no_keys(cls, value: dict[str, JsonValue]) -> dict[str, JsonValue]:
-        for name in value:
+        for name, sent in value.items():
             if _KEY_LIKE.search(name):
                 raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
+            if name in _OWN_FIELDS and sent != _OWN_FIELDS[name][0]:
+                raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name][1]}")
+        return value
+
+    @field_validator("headers", "query")
+    @classmethod
+    def _no_open_keys(cls, value: dict[str, SentValue]) -> dict[str, SentValue]:
+        for name, sent in value.items():
+            if _KEY_LIKE.search(name) and sent.env is None:
+                raise ValueError(f"'{name}' looks like a key, which no file holds: write {{env: NAME}} of a variable")
+        return value
+
+    @field_validator("headers")
+    @classmethod
+    def _header_names(cls, value: dict[str, SentValue]) -> dict[str, SentValue]:
+        for name in value:
+            if not re.fullmatch(_HEADER, name) or name.lower() in _OWN_HEADERS:
+                raise ValueError(f"'{name}' is no header that can be set here")
         return value
 
     @model_validator(mode="after")
@@ -98,7 +178,21 @@ class ModelConfig(Frozen):
         needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
         if needs_key and self.api_key_env is None:
             raise ValueError(f"{self.profile} wants a key: name the environment variable that holds it in api_key_env")
+        if self.profile == "anthropic" and self.system_role is not None:
+            raise ValueError("system_role is for chat completions: Anthropic's messages have a field for it")
         return self
+
+    @property
+    def secrets(self) -> tuple[str, ...]:
+        """Names of the environment variables that hold what nobody else may read."""
+        sent = [value.env for value in (*self.headers.values(), *self.query.values())]
+        return tuple(name for name in (self.api_key_env, *sent) if name)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of all environment variables that a client of this model reads."""
+        files = (f"{name}_FILE" for name in self.secrets)
+        return (*self.secrets, *files, *filter(None, [self.base_url_env]))
 
     @property
     def vision(self) -> Vision | None:

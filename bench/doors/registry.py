@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from bench.doors import money, trust
+from bench.doors import endpoints, money, trust
 
 if TYPE_CHECKING:
     from bench.doors.rows import Row
 
-ROWS: Final[tuple[Row, ...]] = (*trust.ROWS, *money.ROWS)
+ROWS: Final[tuple[Row, ...]] = (*trust.ROWS, *money.ROWS, *endpoints.ROWS)

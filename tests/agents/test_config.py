@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from khala.environment import plain, with_model
 from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic
+from khala_agents.llm.client import LLMError, Request
 from khala_agents.llm.money import Budget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import FunctionPolicy, ObjectPolicy
+from khala_agents.scripted.canned import Canned, Given
 from khala_agents.scripted.policies import Silent
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
+from khala_protocol.messages import ChatMessage
 from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
@@ -70,12 +74,12 @@ BAD_MODELS = [
     (
         GOOD.replace("h/", "me:sk-secret@h/"),
         ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
-        "name a variable in api_key_env"),
+        "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD.replace("/v1", "/v1?key=sk-secret"),
         ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
-        "name a variable in api_key_env"),
+        "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD + "api_key_env: sk-secret",
@@ -93,6 +97,43 @@ BAD_MODELS = [
         GOOD.replace("vllm", "openai"),
         "m.yaml:1: openai wants a key: name the environment variable that holds it in api_key_env",
     ),
+    (GOOD + "extra: {stream: true}", "m.yaml:4 (extra): 'stream' cannot be sent: Khala reads whole answers"),
+    (GOOD + "extra: {n: 4}", "m.yaml:4 (extra): 'n' cannot be sent: one answer is read, and all would be billed"),
+    (GOOD + "extra: {model: x}", "m.yaml:4 (extra): 'model' cannot be sent: the field `model` of the file names it"),
+    (
+        GOOD + "headers: {Authorization: Bearer sk-secret}",
+        ("m.yaml:4 (headers): 'Authorization' looks like a key, which no file holds: "
+        "write {env: NAME} of a variable"),
+    ),
+    (
+        GOOD + "query: {subscription-key: sk-secret}",
+        ("m.yaml:4 (query): 'subscription-key' looks like a key, which no file holds: "
+        "write {env: NAME} of a variable"),
+    ),
+    (
+        GOOD + "headers: {X-Team: '${sk-secret}'}",
+        ("m.yaml:4 (headers.X-Team): the name of an environment variable is wanted here, "
+        "such as {env: GATEWAY_TOKEN}"),
+    ),
+    (
+        GOOD + "headers: {X-Team: {env: sk-secret}}",
+        ("m.yaml:4 (headers.X-Team): the name of an environment variable is wanted here, "
+        "such as {env: GATEWAY_TOKEN}"),
+    ),
+    (
+        GOOD + "headers: {X-Team: {prefix: a}}",
+        "m.yaml:4 (headers.X-Team): either words, or {env: NAME} of an environment variable with or without a prefix",
+    ),
+    (GOOD + "headers: {Host: other}", "m.yaml:4 (headers): 'Host' is no header that can be set here"),
+    (GOOD + "headers: {'a b': c}", "m.yaml:4 (headers): 'a b' is no header that can be set here"),
+    (
+        GOOD + "system_role: robot",
+        "m.yaml:4 (system_role): 'robot' is none of 'system', 'developer', 'user' or 'fold'",
+    ),
+    (
+        GOOD.replace("vllm", "anthropic") + "api_key_env: A\nsystem_role: fold",
+        "m.yaml:1: system_role is for chat completions: Anthropic's messages have a field for it",
+    ),
     (GOOD + "try_timeout_s: 0", "m.yaml:4 (try_timeout_s): input should be greater than 0, not 0"),
     (GOOD + "retry: {tries: 0}", "m.yaml:4 (retry.tries): input should be greater than or equal to 1, not 0"),
     (GOOD + "prices: {promt: 1}", "m.yaml:4 (prices.promt): no such field, did you mean 'prompt'?"),
@@ -107,6 +148,66 @@ def test_a_wrong_model_file_says_line_and_field_and_never_a_key(text: str, expec
         loads(text, ModelConfig, source="m.yaml")
     assert str(caught.value) == expected
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("harmless", ["{stream: false}", "{n: 1}"])
+def test_what_would_change_nothing_is_taken(harmless: str) -> None:
+    assert loads(f"{GOOD}extra: {harmless}", ModelConfig, source="m.yaml").extra
+
+
+AZURE = """
+profile: openai
+model: my-deployment
+base_url: {base}/openai/deployments/my-deployment/chat/completions
+api_key_env: AZURE_KEY
+key_header: api-key
+headers: {{X-Team: research, X-Gateway: {{env: GATEWAY_TOKEN, prefix: "Token "}}}}
+query: {{api-version: "2024-10-21", subscription-key: {{env: SUBSCRIPTION}}}}
+max_tokens: 40
+"""
+SECRETS = {"AZURE_KEY": "azure-0123456789", "GATEWAY_TOKEN": "gateway-0123456789", "SUBSCRIPTION": "sub-0123456789"}
+
+
+@pytest.mark.parametrize("kind", ["openai", "anthropic"])
+async def test_a_gateway_gets_its_headers_its_query_and_its_key(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in SECRETS.items():
+        monkeypatch.setenv(name, value)
+    answer = Given({"error": {"message": f"no {' '.join(SECRETS.values())}"}}, 404)
+    async with Canned(answer) as server:
+        config = loads(AZURE.format(base=server.root).replace("openai\n", f"{kind}\n"), ModelConfig, source="m.yaml")
+        client = client_for(config)
+        with pytest.raises(LLMError) as caught:
+            await client.complete(Request((ChatMessage(role="user", content="Game"),), timeout_s=5.0))
+        await client.check()
+        await client.close()
+    for asked in server.asked:
+        assert asked.query == {"api-version": "2024-10-21", "subscription-key": SECRETS["SUBSCRIPTION"]}
+        assert asked.headers["api-key"] == SECRETS["AZURE_KEY"]
+        assert asked.headers["x-team"] == "research"
+        assert asked.headers["x-gateway"] == f"Token {SECRETS['GATEWAY_TOKEN']}"
+        assert "authorization" not in asked.headers
+    path = "/openai/deployments/my-deployment"
+    assert [asked.path for asked in server.asked] == [
+        f"{path}/{'messages' if kind == 'anthropic' else 'chat/completions'}",
+        f"{path}/models",
+    ]
+    assert client.endpoint == server.root + path, "what is recorded has no query"
+    assert not any(value in f"{caught.value} {config!r} {client.params}" for value in SECRETS.values())
+
+
+def test_a_prefix_of_the_key_is_that_of_the_model_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = loads(f"{GOOD}key_header: {{name: Authorization, prefix: 'Token '}}", ModelConfig, source="m.yaml")
+    assert config.key_header is not None
+    assert (config.key_header.name, config.key_header.prefix) == ("Authorization", "Token ")
+
+
+def test_a_process_of_an_agent_gets_every_variable_that_its_model_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = loads(AZURE.format(base="http://h") + "base_url_env: AZURE_URL", ModelConfig, source="m.yaml")
+    given = dict.fromkeys(
+        [*SECRETS, "GATEWAY_TOKEN_FILE", "AZURE_URL", "ALL_PROXY", "REQUESTS_CA_BUNDLE", "OTHER"], "x"
+    )
+    assert with_model(config, given).keys() == given.keys() - {"OTHER"}
+    assert plain(given) == {}
 
 
 BAD_AGENTS = [

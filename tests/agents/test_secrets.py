@@ -13,6 +13,7 @@ from khala_agents.build import Workshop, client_for
 from khala_agents.config import ModelConfig, WorkerSpec
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import MalformedCompletion
+from khala_agents.llm.http import HttpAnswer
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
@@ -77,9 +78,9 @@ def test_an_answer_that_is_no_completion_shows_no_part_of_a_key(kind: type[OpenA
     read_key("K", {"K": KEY})
     options: dict[str, Any] = {"profile": PROFILES["compatible"]} if kind is OpenAICompatible else {}
     model = kind(model="m", base_url="http://localhost/v1", prices=Prices(), key=None, **options)
-    for before in range(90):
+    for before in range(210):
         with pytest.raises(MalformedCompletion) as caught:
-            model._read(b"x" * before + KEY.encode())
+            model._read(HttpAnswer(model.endpoint, 200, {}, b"x" * before + KEY.encode()))
         assert "sk-" not in str(caught.value)
         assert "x" * min(before, 70) in str(caught.value)
 

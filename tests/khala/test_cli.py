@@ -168,6 +168,10 @@ def test_what_the_user_can_mend_is_one_sentence_and_no_traceback(
     assert len(told.err.strip().splitlines()) == 1
 
 
+NOWHERE = dict.fromkeys(["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "ALL_PROXY", "all_proxy"], "http://127.0.0.1:1")
+"""An environment whose proxy never answers: neither the game nor a model on this machine may go through it."""
+
+
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """Return where four steps were played, by a model whose key is in the environment, and what was printed."""
@@ -178,10 +182,20 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.C
         base_url = json.loads(endpoint.stdout.readline())["base_url"]
         command = ["-v", "run", "2s3z_pair", "--model", "openai", "--model-name", "focus-fire"]
         command += ["--base-url", base_url, "--max-steps", "4", "--json"]
-        done = khala(*command, cwd=place, OPENAI_API_KEY=KEY)
+        done = khala(*command, cwd=place, OPENAI_API_KEY=KEY, **NOWHERE)
         endpoint.terminate()
     assert done.returncode == 0, done.stderr
     return place, done
+
+
+@pytest.mark.game
+@pytest.mark.slow
+@pytest.mark.parametrize(("task", "proxy"), [("2s3z_pair", "nonsense://"), ("duel_3m", "socks5://127.0.0.1:1")])
+def test_a_proxy_in_the_environment_changes_nothing_on_this_machine(task: str, proxy: str, tmp_path: Path) -> None:
+    environ = dict.fromkeys(NOWHERE, proxy)
+    done = khala("run", task, "--policy", "silent", "--max-steps", "3", "--json", cwd=tmp_path, **environ)
+    assert done.returncode == 0, done.stderr
+    assert {result["cause"] for result in json.loads(done.stdout)["results"]} == {"step limit"}
 
 
 @pytest.mark.game
@@ -384,6 +398,31 @@ def test_the_doctor_says_what_to_do_about_a_wrong_sc2path(
     (wrong,) = [finding for finding in json.loads(out)["findings"] if finding["state"] == "wrong"]
     assert code == 1
     assert "khala sc2 install" in wrong["advice"]
+
+
+def test_the_doctor_says_which_endpoint_goes_through_which_proxy_and_what_is_trusted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in ("http_proxy", "https_proxy", "all_proxy", "no_proxy", "HTTP_PROXY", "HTTPS_PROXY", "NO_PROXY"):
+        monkeypatch.delenv(name, raising=False)
+    for name in ("SSL_CERT_FILE", "SSL_CERT_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("ALL_PROXY", "http://me:hidden@proxy.example:3128")
+    monkeypatch.setenv("NO_PROXY", "api.deepseek.com")
+    monkeypatch.setenv("VLLM_BASE_URL", "http://gpu.example:8000/v1")
+    monkeypatch.setenv("REQUESTS_CA_BUNDLE", str(tmp_path))
+    _, out = tell(capsys, "doctor", "--json")
+    found = {finding["name"]: finding["found"] for finding in json.loads(out)["findings"]}
+    assert found["proxy"] == "http://proxy.example:3128 (ALL_PROXY) for anthropic, openai, vllm"
+    assert found["no proxy"] == "for deepseek, ollama, scripted"
+    assert found["trusted certificates"] == f"REQUESTS_CA_BUNDLE={tmp_path}"
+    assert "hidden" not in out
+    monkeypatch.setenv("ALL_PROXY", "socks4://proxy.example:1080")
+    monkeypatch.setenv("REQUESTS_CA_BUNDLE", str(tmp_path / "none"))
+    _, out = tell(capsys, "doctor", "--json")
+    notes = {finding["name"]: finding for finding in json.loads(out)["findings"] if finding["state"] == "note"}
+    assert "a proxy of the kind 'socks4' cannot be used" in notes["proxy for openai"]["found"]
+    assert "there is no file or directory" in notes["trusted certificates"]["found"]
 
 
 def test_the_doctor_says_what_a_game_needs_that_is_not_there(

@@ -5,12 +5,14 @@ from __future__ import annotations
 from base64 import b64encode
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, Field, ValidationError
-from pydantic_core import to_json
+from pydantic import BaseModel, ValidationError
 
-from khala_agents.llm.client import Completion, MalformedCompletion, Request, Scalar, model_name
+from khala_agents.llm.asking import HttpClient, count
+from khala_agents.llm.client import Completion, Request, model_name
+from khala_agents.llm.faults import no_completion, unpacked
 from khala_agents.llm.http import HttpEndpoint
-from khala_agents.secret import excerpt, scrub
+from khala_agents.llm.quirks import CACHE_MARK
+from khala_agents.llm.verdict import AnswerParts, judge
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
     from pydantic import JsonValue, SecretStr
 
+    from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import ChatMessage
 
@@ -25,18 +28,22 @@ API_VERSION = "2023-06-01"
 DEFAULT_BASE_URL = "https://api.anthropic.com/v1"
 
 
-class Anthropic:
+class Anthropic(HttpClient):
     """An `LLMClient` for one Claude model.
 
     Args:
         model: `claude-…`.
         prices: to price the tokens with.
         key: of the account.
+        key_header: name and prefix of the header that carries the key.
+        headers, query: sent with each request.
         base_url: set it for a gateway; Anthropic's own by default.
         max_tokens: limit of generated tokens; the API requires one.
         temperature: sent if given.
         extra: fields of the request body, unchanged.
     """
+
+    PATH = "/messages"
 
     def __init__(
         self,
@@ -44,6 +51,9 @@ class Anthropic:
         model: str,
         prices: Prices,
         key: SecretStr | None,
+        key_header: tuple[str, str] = ("x-api-key", ""),
+        headers: Mapping[str, str] | None = None,
+        query: Mapping[str, str] | None = None,
         base_url: str = DEFAULT_BASE_URL,
         max_tokens: int = 1024,
         temperature: float | None = None,
@@ -53,60 +63,52 @@ class Anthropic:
         if temperature is not None:
             asked["temperature"] = temperature
         asked.update(extra or {})
-        self.model = model
-        self.answer_tokens: int | None = max_tokens
-        self.params: Mapping[str, Scalar] = {k: v for k, v in asked.items() if not isinstance(v, dict | list)}
-        self._http = HttpEndpoint(
-            base_url, headers={"anthropic-version": API_VERSION}, key_header=("x-api-key", ""), key=key
-        )
-        self.endpoint = self._http.address
+        sent = {"anthropic-version": API_VERSION, **(headers or {})}
+        http = HttpEndpoint(base_url, headers=sent, query=query, key_header=key_header, key=key)
+        super().__init__(http, model=model, fields=asked)
         self._prices = prices
-        self._fixed = {"model": model, **asked}
 
-    async def complete(self, request: Request) -> Completion:
-        """Make one try; see `LLMClient`."""
+    def _body(self, request: Request) -> dict[str, Any]:
         system = "\n\n".join(m.content for m in request.messages if m.role == "system")
-        last = request.stable - 1
+        marks = request.stable if CACHE_MARK not in self.quirks.left_out else 0
         turns = [
-            _cached(message.content, role=message.role) if place == last else _turn(message, request.pictures)
+            _cached(message.content, role=message.role) if place == marks - 1 else _turn(message, request.pictures)
             for place, message in enumerate(request.messages)
             if message.role != "system"
         ]
-        body: dict[str, Any] = {**self._fixed, "messages": turns}
+        body: dict[str, Any] = {"model": self.model, **self._fields, "messages": turns}
         if system:
-            body["system"] = _cached(system)["content"] if request.stable else system
-        answer = await self._http.post("/messages", to_json(body), request.timeout_s)
-        return self._read(answer)
+            body["system"] = _cached(system)["content"] if marks else system
+        return body
 
-    async def check(self) -> None:
-        """Check that the endpoint accepts the key; see `LLMClient.check`."""
-        await self._http.check()
-
-    async def refresh(self) -> None:
-        """Drop old connections and make a new one."""
-        await self._http.refresh()
-
-    async def close(self) -> None:
-        """Close the connections."""
-        await self._http.close()
-
-    def _read(self, answer: bytes) -> Completion:
+    def _read(self, answer: HttpAnswer) -> Completion:
         try:
-            body = _Body.model_validate_json(answer)
+            body = _Body.model_validate_json(unpacked(answer.body))
         except ValidationError:
-            begin = excerpt(answer, 80)
-            raise MalformedCompletion(f"{self.endpoint} answered with no message: {begin!r}") from None
+            raise no_completion(answer.url, answer.body, "message") from None
+        finish = body.stop_reason if isinstance(body.stop_reason, str) else "end_turn"
+        blocks = [block for block in body.content if isinstance(block, dict)]
+        said = AnswerParts(
+            text="".join(_text(block) for block in blocks if block.get("type") == "text"),
+            finish=finish,
+            reasoned=any(block.get("type") in {"thinking", "redacted_thinking"} for block in blocks),
+            tools=tuple(str(block.get("name", "")) for block in blocks if block.get("type") == "tool_use"),
+            limit=self.answer_tokens,
+        )
+        judged = judge(said)
         return Completion(
-            text=scrub("".join(block.text for block in body.content if block.type == "text")),
-            usage=body.usage.priced(self._prices) if body.usage else Usage(requests=1, unknown_requests=1),
-            finish=body.stop_reason or "end_turn",
+            text=judged.text,
+            usage=_usage(body.usage, self._prices),
+            finish=finish,
             model=model_name(body.model),
+            verdict=judged.verdict,
+            reason=judged.reason,
         )
 
 
 def _cached(text: str, role: str = "") -> dict[str, Any]:
     """Return a message up to whose end a prompt is cached: the same in all requests of an episode."""
-    block = {"type": "text", "text": text, "cache_control": {"type": "ephemeral"}}
+    block = {"type": "text", "text": text, CACHE_MARK: {"type": "ephemeral"}}
     return {"role": role, "content": [block]}
 
 
@@ -121,33 +123,33 @@ def _turn(message: ChatMessage, pictures: Mapping[str, bytes]) -> dict[str, Any]
     return {"role": message.role, "content": [*blocks, {"type": "text", "text": message.content}]}
 
 
-class _Block(BaseModel):
-    type: str
-    text: str = ""
+def _text(block: Mapping[str, Any]) -> str:
+    text = block.get("text")
+    return text if isinstance(text, str) else ""
 
 
-class _Usage(BaseModel):
-    input_tokens: int = Field(ge=0, le=10**12)
-    output_tokens: int = Field(ge=0, le=10**12)
-    cache_read_input_tokens: int | None = Field(default=None, ge=0, le=10**12)
-    cache_creation_input_tokens: int | None = Field(default=None, ge=0, le=10**12)
-
-    def priced(self, prices: Prices) -> Usage:
-        """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""
-        cached, kept = self.cache_read_input_tokens or 0, self.cache_creation_input_tokens or 0
-        prompt = self.input_tokens + cached + kept
-        return Usage(
-            requests=1,
-            prompt_tokens=prompt,
-            completion_tokens=self.output_tokens,
-            cached_tokens=cached,
-            cache_write_tokens=kept,
-            cost_usd=prices.cost_usd(prompt=prompt, completion=self.output_tokens, cached=cached, cache_write=kept),
-        )
+def _usage(said: object, prices: Prices) -> Usage:
+    """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""
+    read, written = count(said, "input_tokens"), count(said, "output_tokens")
+    if read is None or written is None:
+        return Usage(requests=1, unknown_requests=1)
+    cached = count(said, "cache_read_input_tokens") or 0
+    kept = count(said, "cache_creation_input_tokens") or 0
+    prompt = read + cached + kept
+    return Usage(
+        requests=1,
+        prompt_tokens=prompt,
+        completion_tokens=written,
+        cached_tokens=cached,
+        cache_write_tokens=kept,
+        cost_usd=prices.cost_usd(prompt=prompt, completion=written, cached=cached, cache_write=kept),
+    )
 
 
 class _Body(BaseModel):
+    """An answer. Of what is no text for us any form is taken: it must not cost us the text."""
+
     model: Any = None
-    content: list[_Block]
-    stop_reason: str | None = None
-    usage: _Usage | None = None
+    content: list[Any]
+    stop_reason: Any = None
+    usage: Any = None

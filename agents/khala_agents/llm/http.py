@@ -7,52 +7,52 @@ episodes, with whatever cancelled calls left behind. HTTP/2 stays off: a few lon
 httpx and aiohttp take 0.4 s to import, and a host that looks whether a model file is right makes no request: they are
 imported when an endpoint connects.
 
-Above it are `openai_compatible` and `anthropic`, which know what the bytes mean.
+Above it is `khala_agents.llm.asking`, which knows what a try is; `khala_agents.llm.network` knows the way.
 """
 
 from __future__ import annotations
 
 import asyncio
-import logging
+import ssl
 from contextlib import suppress
-from datetime import UTC, datetime
-from email.utils import parsedate_to_datetime
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
+from urllib.parse import urlencode
 
-from pydantic_core import from_json
-
-from khala_agents.llm.address import LOOPBACK, checked_address
-from khala_agents.llm.client import (
-    EndpointUnavailable,
-    LLMError,
-    MalformedCompletion,
-    OutOfMoney,
-    RequestRefused,
-    TryTimeout,
-    Unauthorized,
-    Unreachable,
-)
-from khala_agents.llm.retry import is_retried
+from khala_agents.llm.address import checked_address
+from khala_agents.llm.client import LLMError, MalformedCompletion, RequestRefused, Unreachable
+from khala_agents.llm.faults import error_for
+from khala_agents.llm.network import Trust, proxy_for, trusted
 from khala_agents.secret import excerpt
 
 if TYPE_CHECKING:
-    import ssl
     from collections.abc import Mapping
 
     import httpx
     from pydantic import SecretStr
 
-    from khala_agents.llm.transport import AiohttpTransport
-
-log = logging.getLogger(__name__)
-
 _WARM_TIMEOUT_S = 5.0
-_SPENT_CODES = frozenset(
-    {"insufficient_quota", "billing_hard_limit_reached", "billing_not_active", "enforced_spend_limit_reached"}
-)
-"""Codes under which "429 Too Many Requests" means that the account has no money left."""
+OK, UNAUTHORIZED = 200, 401
+
+
+@dataclass(frozen=True, slots=True)
+class HttpAnswer:
+    """An HTTP answer.
+
+    Attributes:
+        url: what was asked, without its query.
+    """
+
+    url: str
+    status: int
+    headers: Mapping[str, str]
+    body: bytes
+
+    @property
+    def error(self) -> LLMError:
+        """The error that its status stands for."""
+        return error_for(self.url, self.status, self.headers, self.body)
 
 
 class HttpEndpoint:
@@ -61,8 +61,12 @@ class HttpEndpoint:
     Args:
         base_url: `https://host/v1`; paths are appended to it.
         headers: sent with each request.
+        query: of each request's address.
         key_header: name and prefix of the header that carries the key.
         key: None for no key.
+
+    Raises:
+        ConfigError: the environment names a proxy or certificates that cannot be used.
     """
 
     def __init__(
@@ -70,10 +74,13 @@ class HttpEndpoint:
         base_url: str,
         *,
         headers: Mapping[str, str] | None = None,
+        query: Mapping[str, str] | None = None,
         key_header: tuple[str, str] = ("Authorization", "Bearer "),
         key: SecretStr | None = None,
     ) -> None:
         self.address = checked_address(base_url)
+        self._proxy = proxy_for(self.address)
+        self._trust = trusted() if self.address.startswith("https:") else None
         self._headers = {
             "Content-Type": "application/json",
             "Accept": "application/json",
@@ -84,33 +91,31 @@ class HttpEndpoint:
         if key is not None:
             name, prefix = key_header
             self._headers[name] = prefix + key.get_secret_value()
+        self._query = f"?{urlencode(query)}" if query else ""
         self._urls: dict[str, httpx.URL] = {}
-        self._transport: AiohttpTransport | None = None
+        self._transport: httpx.AsyncBaseTransport | None = None
 
-    async def post(self, path: str, body: bytes, timeout_s: float | None) -> bytes:
-        """Return the body of the answer.
+    async def post(self, path: str, body: bytes) -> HttpAnswer:
+        """Return the answer, whatever its status.
 
         Raises:
-            LLMError: there was no answer within `timeout_s` seconds, or its status is an error.
+            LLMError: there is none.
         """
         import httpx  # noqa: PLC0415  # see above
 
         from khala_agents.llm.transport import BodyTooLarge  # noqa: PLC0415
 
         try:
-            async with asyncio.timeout(timeout_s):
-                response = await self._answer("POST", path, body)
-        except TimeoutError:
-            raise TryTimeout(f"{self.address} gave no answer within {timeout_s:g} s") from None
+            return await self._answer("POST", path, body)
         except BodyTooLarge as error:
             raise MalformedCompletion(f"{self.address} cannot be used: {error}") from None
         except httpx.DecodingError:
             raise MalformedCompletion(f"{self.address} sent a body that cannot be unpacked") from None
+        except httpx.InvalidURL as error:
+            raise RequestRefused(f"{self.address} is no URL: {_words(error)}", status="connection") from None
         except httpx.TransportError as error:
-            raise Unreachable(f"{self.address} cannot be reached: {_words(error)}") from None
-        if response.status_code != httpx.codes.OK:
-            raise error_for(self.address, response.status_code, response.headers, response.content)
-        return response.content
+            never_sent = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout | httpx.ProxyError)
+            raise Unreachable(self._unreachable(error), sent=not never_sent) from None
 
     async def refresh(self) -> None:
         """Discard the connections and open a new one, so that the first request of an episode finds it warm."""
@@ -129,11 +134,11 @@ class HttpEndpoint:
         """
         import httpx  # noqa: PLC0415  # see above
 
-        with suppress(httpx.HTTPError, TimeoutError):
+        with suppress(httpx.HTTPError, httpx.InvalidURL, TimeoutError):
             async with asyncio.timeout(_WARM_TIMEOUT_S):
-                response = await self._answer("GET", "/models")
-            if response.status_code == httpx.codes.UNAUTHORIZED:
-                raise error_for(self.address, response.status_code, response.headers, response.content)
+                answer = await self._answer("GET", "/models")
+            if answer.status == UNAUTHORIZED:
+                raise answer.error
 
     async def close(self) -> None:
         """Close the connections; the next request opens new ones."""
@@ -141,7 +146,7 @@ class HttpEndpoint:
         if transport is not None:
             await transport.aclose()
 
-    async def _answer(self, method: str, path: str, body: bytes | None = None) -> httpx.Response:
+    async def _answer(self, method: str, path: str, body: bytes | None = None) -> HttpAnswer:
         """Return the answer to a request.
 
         It goes to the transport itself: an `httpx.AsyncClient`, with redirects, authentication and cookies that no
@@ -150,69 +155,51 @@ class HttpEndpoint:
         import httpx  # noqa: PLC0415  # see above
 
         if path not in self._urls:
-            self._urls[path] = httpx.URL(self.address + path)
+            self._urls[path] = httpx.URL(self.address + path + self._query)
         request = httpx.Request(method, self._urls[path], headers=self._headers, content=body)
-        return await self._connected().handle_async_request(request)
+        answer = await self._connected().handle_async_request(request)
+        return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 
-    def _connected(self) -> AiohttpTransport:
+    def _connected(self) -> httpx.AsyncBaseTransport:
         if self._transport is None:
-            from khala_agents.llm.transport import AiohttpTransport  # noqa: PLC0415  # see above
+            from khala_agents.llm.transport import AiohttpTransport, SocksTransport  # noqa: PLC0415  # see above
 
-            proxies = urlsplit(self.address).hostname not in LOOPBACK
-            self._transport = AiohttpTransport(_tls(), proxies=proxies)
+            tls = _tls(self._trust)
+            if self._proxy is not None and self._proxy.is_socks:
+                self._transport = SocksTransport(tls, proxy=self._proxy.url)
+            else:
+                self._transport = AiohttpTransport(tls, proxy=self._proxy.url if self._proxy else None)
         return self._transport
 
-
-def error_for(address: str, status: int, headers: Mapping[str, str], body: bytes) -> LLMError:
-    """Return the error for an answer with this status. The server's text is quoted briefly, without keys."""
-    code, message = _said(body)
-    name = f"http {status}"
-    said = f"{address} answered {name}" + (f": {message}" if message else "")
-    if status in {401, 403}:
-        return Unauthorized(f"{said}; is the key right, and may it use this model?", status=name)
-    if status == 402 or code in _SPENT_CODES:
-        return OutOfMoney(f"{said}; the account has no money or quota left", status=name)
-    if is_retried(status):
-        return EndpointUnavailable(said, status=name, retry_after_s=retry_after_s(headers))
-    return RequestRefused(said, status=name)
+    def _unreachable(self, error: httpx.TransportError) -> str:
+        said = f"{self.address} cannot be reached"
+        if self._proxy is not None:
+            said += f" through the proxy {self._proxy}"
+        hint = ""
+        if "CERTIFICATE_VERIFY_FAILED" in str(error):
+            hint = "; if a company's proxy signs its certificate, name the company's own in SSL_CERT_FILE"
+        return f"{said}: {_words(error)}{hint}"
 
 
-def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds that the headers `Retry-After-Ms` or `Retry-After` (seconds, or a date) ask to wait."""
-    with suppress(KeyError, ValueError):
-        return max(float(headers["retry-after-ms"]) / 1000, 0.0)
-    value = headers.get("retry-after")
-    if value is None:
-        return None
-    with suppress(ValueError):
-        return max(float(value), 0.0)
-    try:
-        until = parsedate_to_datetime(value)
-        # by the server's own clock if it sends the time: ours may differ
-        now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
-        return max((until - now).total_seconds(), 0.0)
-    except (ValueError, TypeError):
-        return None
-
-
-def _said(body: bytes) -> tuple[str, str]:
-    """Return code and message of an error body in the known forms; ("", beginning of the text) otherwise."""
-    try:
-        error = from_json(body)["error"]
-    except (ValueError, KeyError, TypeError):
-        return "", excerpt(body)
-    if not isinstance(error, dict):
-        return "", excerpt(str(error))
-    return str(error.get("code") or error.get("type") or ""), excerpt(str(error.get("message") or ""))
-
-
-def _words(error: httpx.TransportError) -> str:
+def _words(error: Exception) -> str:
     text = excerpt(str(error))
     return f"{text} ({type(error).__name__})" if text else type(error).__name__
 
 
 @cache
-def _tls() -> ssl.SSLContext:
+def _tls(trust: Trust | None) -> ssl.SSLContext:
+    """Return the certificates to trust: 28 ms, once per process and not once per agent.
+
+    Raises:
+        RequestRefused: the file that the environment names holds none.
+    """
     import httpx  # noqa: PLC0415  # see above
 
-    return httpx.create_ssl_context()  # 28 ms: once per process, not once per agent
+    if trust is None:
+        return httpx.create_ssl_context(trust_env=False)
+    try:
+        if trust.path.is_dir():
+            return ssl.create_default_context(capath=str(trust.path))
+        return ssl.create_default_context(cafile=str(trust.path))
+    except (OSError, ssl.SSLError) as error:
+        raise RequestRefused(f"{trust} holds no certificates: {excerpt(str(error))}", status="certificates") from None

@@ -15,6 +15,8 @@ from khala_agents.llm.vision import OPENAI, OPENAI_REASONING, QWEN, TokenRule
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from khala_agents.llm.quirks import SystemRole
+
 ProfileName = Literal[
     "openai",
     "openai-reasoning",
@@ -36,7 +38,7 @@ class Profile:
 
     Attributes:
         length_field: name of the limit of generated tokens.
-        system_role: role under which the system message is sent; `user` where a model has no such role.
+        system_role: role of the system message; `fold` puts it in front of the first message of the user.
         temperature: whether `temperature` may be sent; a reasoning model refuses it with 400.
         seed: whether `seed` may be sent.
         cached_path: where in `usage` the number of cached prompt tokens stands.
@@ -46,7 +48,7 @@ class Profile:
     """
 
     length_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
-    system_role: Literal["system", "developer", "user"] = "system"
+    system_role: SystemRole = "system"
     temperature: bool = True
     seed: bool = True
     cached_path: tuple[str, ...] = ("prompt_tokens_details", "cached_tokens")

@@ -1,14 +1,16 @@
-"""httpx's requests over aiohttp's connections.
+"""httpx's requests over aiohttp's connections, and over httpx's own where a SOCKS proxy is in between.
 
 httpx's own transport spends most of a call's CPU, and cancelled calls keep slots of its pool
-(httpcore 1.0.9, encode/httpcore#1093). Over this one, a call costs half as much when many are made at once,
-see `bench/http_client.py`. Bodies are read whole, because no completion is streamed here, and up to `MAX_BODY_BYTES`;
-aiohttp unpacks them in pieces, so that a small body that unpacks to gigabytes is noticed after a few megabytes.
+(httpcore 1.0.9, encode/httpcore#1093). Over aiohttp's connections, a call costs half as much when many are made at
+once, see `bench/http_client.py`. The package httpx-aiohttp joins the two as well, but a connection that was refused and
+one that broke after the request was sent are the same `ConnectTimeout` there (0.2.0), and only the second may be
+billed. Bodies are read whole, because no completion is streamed here, and up to `MAX_BODY_BYTES`; aiohttp unpacks them
+in pieces, so that a small body that unpacks to gigabytes is noticed after a few megabytes.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import aiohttp
 import httpx
@@ -16,11 +18,14 @@ from aiohttp.http_exceptions import ContentEncodingError
 
 if TYPE_CHECKING:
     import ssl
+    from collections.abc import AsyncIterator
 
 CONNECT_S = 5.0
 KEEP_ALIVE_S = 120.0
 MAX_BODY_BYTES = 8 * 2**20
 """Of an answer, unpacked; the longest completion of today's models has half a megabyte."""
+MAX_HEADER_BYTES = 2**16
+"""Of one header; gateways tell of a model in some that are longer than aiohttp's 8 kB."""
 _DONE = ("content-encoding", "content-length", "transfer-encoding")
 """Headers that no longer say what the body is."""
 _OURS = frozenset({"Accept", "Accept-Encoding", "User-Agent", "Content-Type"})
@@ -31,23 +36,24 @@ class BodyTooLarge(httpx.DecodingError):
 
 
 class AiohttpTransport(httpx.AsyncBaseTransport):
-    """The transport of one `httpx.AsyncClient`; may be cancelled at any moment, limits no connections.
+    """Connections to one endpoint; requests may be cancelled at any moment, and no connections are limited.
 
     Args:
         tls: which certificates to trust.
-        proxies: whether to use the proxies that the environment names; no proxy can reach our loopback.
+        proxy: address of the HTTP proxy to go through; None for a direct connection.
     """
 
-    def __init__(self, tls: ssl.SSLContext, *, proxies: bool) -> None:
+    def __init__(self, tls: ssl.SSLContext, *, proxy: str | None = None) -> None:
         self._tls = tls
-        self._proxies = proxies
+        self._proxy = proxy
         self._session: aiohttp.ClientSession | None = None
 
     async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
         """Return the answer with its body.
 
         Raises:
-            httpx.TransportError: there is no answer.
+            httpx.TransportError: there is no answer. It is a `ConnectError`, `ConnectTimeout` or `ProxyError` if the
+                request never left.
             httpx.DecodingError: it cannot be unpacked, or is too large.
         """
         try:
@@ -57,11 +63,17 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 headers=request.headers.multi_items(),
                 data=request.content,
                 allow_redirects=False,
+                proxy=self._proxy,
             ) as answer:
-                body = await _body(answer)
+                body = await _whole(answer.content.iter_any(), answer)
         except aiohttp.ServerTimeoutError as error:
             raise httpx.ConnectTimeout(str(error), request=request) from error
-        except aiohttp.ClientConnectorError as error:
+        except aiohttp.ClientHttpProxyError as error:
+            said = f"the proxy refused the connection: http {error.status}"
+            raise httpx.ProxyError(said, request=request) from None
+        except aiohttp.ClientResponseError as error:  # its text has the whole address; the query may have a key
+            raise httpx.RemoteProtocolError(f"that is no HTTP: {error.message}", request=request) from None
+        except (aiohttp.ClientConnectorError, aiohttp.InvalidURL) as error:
             raise httpx.ConnectError(str(error), request=request) from error
         except (aiohttp.ClientError, OSError) as error:
             kind = httpx.DecodingError if isinstance(error.__cause__, ContentEncodingError) else httpx.ReadError
@@ -81,17 +93,44 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 connector=aiohttp.TCPConnector(limit=0, ssl=self._tls, keepalive_timeout=KEEP_ALIVE_S),
                 timeout=aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_S),
                 cookie_jar=aiohttp.DummyCookieJar(),
-                trust_env=self._proxies,
                 skip_auto_headers=_OURS,  # httpx has set them
+                max_field_size=MAX_HEADER_BYTES,
             )
         return self._session
 
 
-async def _body(answer: aiohttp.ClientResponse) -> bytes:
+class SocksTransport(httpx.AsyncBaseTransport):
+    """The same through a SOCKS proxy, which aiohttp does not speak."""
+
+    def __init__(self, tls: ssl.SSLContext, *, proxy: str) -> None:
+        limits = httpx.Limits(max_connections=None, keepalive_expiry=KEEP_ALIVE_S)
+        self._inner = httpx.AsyncHTTPTransport(verify=tls, limits=limits, proxy=proxy)
+
+    async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
+        """Return the answer with its body; errors as above."""
+        request.headers["Accept-Encoding"] = "identity"  # httpx unpacks without a limit
+        request.extensions = {"timeout": {"connect": CONNECT_S, "read": None, "write": None, "pool": None}}
+        answer = await self._inner.handle_async_request(request)
+        try:
+            if answer.headers.get("content-encoding", "identity") != "identity":
+                raise httpx.DecodingError("the body is packed, which was not asked for", request=request)
+            body = await _whole(answer.aiter_raw(), None)
+        finally:
+            await answer.aclose()
+        headers = [(name, value) for name, value in answer.headers.raw if name.decode("latin-1").lower() not in _DONE]
+        return httpx.Response(answer.status_code, headers=headers, content=body, request=request)
+
+    async def aclose(self) -> None:
+        """Close the connections."""
+        await self._inner.aclose()
+
+
+async def _whole(pieces: AsyncIterator[bytes] | Any, answer: aiohttp.ClientResponse | None) -> bytes:
     body = bytearray()
-    async for piece in answer.content.iter_any():
+    async for piece in pieces:
         body += piece
         if len(body) > MAX_BODY_BYTES:
-            answer.close()  # the rest is not read for the sake of the connection
+            if answer is not None:
+                answer.close()  # the rest is not read for the sake of the connection
             raise BodyTooLarge(f"the answer is larger than {MAX_BODY_BYTES >> 20} MB")
     return bytes(body)

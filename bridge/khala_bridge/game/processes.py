@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _environment = threading.RLock()
+_THIS_MACHINE = "127.0.0.0/8,::1,localhost"
 _LISTENS_AFTER_S = 0.2
 """The simulator listens 0.05 s after its start, 0.15 s on a busy machine. Who comes later waits for a second more."""
 
@@ -70,7 +71,8 @@ class Launched:
             return None
         time.sleep(max(0.0, self._started_s + _LISTENS_AFTER_S - time.monotonic()))
         try:  # as `StarcraftProcess` does
-            process._controller = remote_controller.RemoteController(process.host, process.port, process)  # noqa: SLF001
+            with no_proxy():
+                process._controller = remote_controller.RemoteController(process.host, process.port, process)  # noqa: SLF001
         except BaseException:
             process.close()
             raise
@@ -174,17 +176,36 @@ def settle_flags() -> None:
 
 @contextlib.contextmanager
 def pointed_to(directory: Path) -> Iterator[None]:
-    """Point SC2PATH to this install; PySC2 reads it once, while it starts."""
+    """Point SC2PATH to this install; PySC2 reads it once, while it starts. It connects to its game directly."""
+    with no_proxy(), _variable("SC2PATH", str(directory)):
+        yield
+
+
+@contextlib.contextmanager
+def no_proxy() -> Iterator[None]:
+    """Have PySC2 connect to a game on this machine directly.
+
+    Its websocket-client takes a proxy of the environment even for 127.0.0.1, and then waits for an answer that no proxy
+    can give. Names are added to `no_proxy`, so that whoever else reads it in the meantime finds what the user wrote.
+    """
     with _environment:
-        before = os.environ.get("SC2PATH")
-        os.environ["SC2PATH"] = str(directory)
+        given = os.environ.get("no_proxy") or os.environ.get("NO_PROXY")
+        with _variable("no_proxy", ",".join(filter(None, [given, _THIS_MACHINE]))):
+            yield
+
+
+@contextlib.contextmanager
+def _variable(name: str, value: str) -> Iterator[None]:
+    with _environment:
+        before = os.environ.get(name)
+        os.environ[name] = value
         try:
             yield
         finally:
             if before is None:
-                del os.environ["SC2PATH"]
+                del os.environ[name]
             else:
-                os.environ["SC2PATH"] = before
+                os.environ[name] = before
 
 
 @contextlib.contextmanager

@@ -21,7 +21,7 @@ from khala_agents.llm.client import (
     Unauthorized,
     Unreachable,
 )
-from khala_agents.llm.http import error_for, retry_after_s
+from khala_agents.llm.faults import error_for, retry_after_s
 from khala_agents.llm.retry import RetryRule, retried
 
 if TYPE_CHECKING:
@@ -155,6 +155,10 @@ HEADERS = [
     ({}, None),
     ({"retry-after": "3"}, 3.0),
     ({"retry-after": "0.25"}, 0.25),
+    ({"retry-after": "7200"}, 7200.0),
+    ({"retry-after": "nan"}, None),
+    ({"retry-after": "inf"}, None),
+    ({"retry-after-ms": "nan", "retry-after": "9"}, 9.0),
     ({"retry-after": "-1"}, 0.0),
     ({"retry-after-ms": "1500", "retry-after": "9"}, 1.5),
     ({"retry-after-ms": "soon", "retry-after": "9"}, 9.0),

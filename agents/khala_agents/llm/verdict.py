@@ -1,0 +1,124 @@
+"""What became of a model's answer: whether it has words to play, and if not, why.
+
+An answer that arrived need not have any: the reasoning may have eaten all tokens, a filter may have taken the words,
+the model may decline. Clients of all kinds of endpoints say here what they found, in common terms.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from khala_agents.secret import excerpt, scrub
+
+if TYPE_CHECKING:
+    from khala_agents.llm.client import Verdict
+
+CUT: Final = frozenset({"length", "max_tokens", "model_length", "max_output_tokens", "model_context_window_exceeded"})
+"""Why an answer ended, in the words of endpoints in lower case: at a limit of tokens."""
+FILTERED: Final = frozenset(
+    {"content_filter", "content-filter", "sensitive", "safety", "recitation", "blocklist", "prohibited_content", "spii"}
+)
+"""The same: a filter took it away. The last five are Gemini's."""
+
+_CALL = re.compile(r"<\s*+[A-Za-z]\w*+\s*+\(")
+_NAMES = r"(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)"
+_END = rf"<\s*+/\s*+{_NAMES}\s*+>|\[/THINK\]|◁/think▷"
+_BLOCK = re.compile(rf"(?:<\s*+{_NAMES}\s*+>|\[THINK\]|◁think▷).*?(?:{_END}|\Z)", re.IGNORECASE | re.DOTALL)
+_BEGAN_BEFORE = re.compile(rf"\A.*(?:{_END})", re.IGNORECASE | re.DOTALL)
+"""Reasoning whose beginning stands in the prompt, as templates of some models have it."""
+_LONGEST_REFUSAL = 500
+_DECLINES = re.compile(
+    r"\bI(?:'m| am)? (?:can't|cannot|can not|won't|will not|unable to|not able to)"
+    r" (?:assist|help|comply|fulfill?|participate)"
+    r"(?: you)?(?: (?:with|in) (?:that|this|your|the request|such|any|harmful|violen\w+)\b[^.!\n]*)?\s*(?:[.!,;]|\Z)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerParts:
+    """An answer in common terms.
+
+    Attributes:
+        text: the words for us.
+        finish: why it ended, in the endpoint's words.
+        refusal: the words with which the model declined, in a place of their own.
+        thoughts: its reasoning, in a place of its own, if that could be the answer.
+        reasoned: whether it reasoned in any other place.
+        tools: names of tools that it called; none are offered.
+        limit: of generated tokens, None for none.
+    """
+
+    text: str
+    finish: str
+    refusal: str = ""
+    thoughts: str = ""
+    reasoned: bool = False
+    tools: tuple[str, ...] = ()
+    limit: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is played of an answer, and why there is nothing; `reason` may also remark on words that there are."""
+
+    text: str
+    verdict: Verdict = "ok"
+    reason: str = ""
+
+
+def judge(said: AnswerParts) -> Judgement:
+    """Return what became of an answer."""
+    text = scrub(said.text)
+    finish = said.finish.lower()
+    if finish in FILTERED:
+        return Judgement(
+            text, "filtered", f"a filter of the endpoint took the answer away ({excerpt(said.finish, 40)})"
+        )
+    words = _without_thoughts(text)
+    if finish == "refusal" or (said.refusal and not words):
+        told = excerpt(said.refusal or text)
+        return Judgement(scrub(said.refusal) or text, "refused", f"the model declined: {told or 'it gave no reason'}")
+    if words:
+        if _declines(words):
+            return Judgement(text, "refused", f"the model declined: {excerpt(words)}")
+        return Judgement(text)
+    return _wordless(said, text, finish)
+
+
+def _declines(words: str) -> bool:
+    """Return whether a short text without any order says that the model will not play."""
+    if len(words) > _LONGEST_REFUSAL or _CALL.search(words):
+        return False
+    return bool(_DECLINES.search(words.replace("\u2019", "'")))
+
+
+def _wordless(said: AnswerParts, text: str, finish: str) -> Judgement:
+    thought = said.reasoned or bool(said.thoughts.strip() or text.strip())
+    if finish in CUT:
+        return Judgement(text, "cut", _why_cut(said.limit, finish, thought=thought))
+    if said.tools:
+        names = excerpt(", ".join(said.tools), 80)
+        return Judgement(text, "empty", f"the model called tools, of which none are offered: {names}")
+    if said.thoughts.strip() and not text.strip():
+        return Judgement(
+            scrub(said.thoughts), "ok", "the whole answer was among the model's reasoning, and is read there"
+        )
+    why = "the model thought, and then said nothing" if thought else "the model said nothing"
+    return Judgement(text, "empty", f"{why} (it ended with {excerpt(said.finish, 40)!r})")
+
+
+def _why_cut(limit: int | None, finish: str, *, thought: bool) -> str:
+    if finish == "model_context_window_exceeded":
+        return "the prompt left no room for an answer: the model's context is full"
+    spent = "on its reasoning" if thought else "before it said anything"
+    if limit is None:
+        return f"the model used all tokens that its endpoint allows {spent}: set max_tokens in the model file"
+    return f"the model used all {limit} tokens {spent}: raise max_tokens in the model file, or have it think less"
+
+
+def _without_thoughts(text: str) -> str:
+    """Return a text without its reasoning blocks; a block that is not closed lasts until the end."""
+    return _BEGAN_BEFORE.sub("", _BLOCK.sub("", text)).strip()
