@@ -66,7 +66,7 @@ def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json:
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    reasons, idle = list(why_not_valid(results)), without_orders(results)
+    reasons, idle = list(reasons_not_valid(results)), without_orders(results)
     said = f"no order of {', '.join(idle)} was carried out" if idle else ""
     if reasons:
         words = visible_line("; ".join([*reasons, *filter(None, [said])]))
@@ -86,7 +86,7 @@ def without_orders(results: Sequence[Result]) -> list[str]:
     return [name for name, count in orders.items() if not count]
 
 
-def why_not_valid(results: Sequence[Result]) -> Iterator[str]:
+def reasons_not_valid(results: Sequence[Result]) -> Iterator[str]:
     """Yield each reason once, after the name of the side if it is not every side's."""
     sides: dict[str, list[str]] = {}
     for result in results:

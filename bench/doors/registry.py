@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from bench.doors import endpoints, money, trust
+from bench.doors import endpoints, money, trust, validity
 
 if TYPE_CHECKING:
     from bench.doors.rows import Row
 
-ROWS: Final[tuple[Row, ...]] = (*trust.ROWS, *money.ROWS, *endpoints.ROWS)
+ROWS: Final[tuple[Row, ...]] = (*trust.ROWS, *money.ROWS, *validity.ROWS, *endpoints.ROWS)

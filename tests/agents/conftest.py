@@ -178,13 +178,13 @@ def result() -> Callable[[int], Result]:
 
 
 class ListedModel:
-    """An `LLMClient`: each request takes the next entry: a text, an error, or seconds that it takes before the next."""
+    """An `LLMClient`: a request takes the next entry: an answer, an error, or seconds that it takes before the next."""
 
     model, endpoint = "listed", "http://listed/v1"
     params: Mapping[str, str | int | float | bool | None] = {}
     answer_tokens: int | None = None
 
-    def __init__(self, *entries: str | LLMError | float) -> None:
+    def __init__(self, *entries: str | Completion | LLMError | float) -> None:
         self.entries = list(entries)
         self.requests: list[tuple[float, Request]] = []
         self.refreshed = 0
@@ -198,6 +198,8 @@ class ListedModel:
             entry = self.entries.pop(0)
         if isinstance(entry, LLMError):
             raise entry
+        if isinstance(entry, Completion):
+            return entry
         assert isinstance(entry, str)
         usage = Usage(requests=1, prompt_tokens=100, completion_tokens=10, cost_usd=0.5)
         return Completion(entry, usage)

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.llm.client import EndpointUnavailable, LimitExceeded, LLMError, Unreachable
+from khala_agents.llm.client import (
+    Completion,
+    EndpointUnavailable,
+    LimitExceeded,
+    LLMError,
+    RequestRefused,
+    Unauthorized,
+    Unreachable,
+    Verdict,
+)
 from khala_agents.llm.limits import LimitRules, Limits
 from khala_agents.llm.money import Budget
 from khala_agents.llm.pricing import Prices
@@ -18,7 +27,7 @@ from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import WholeSteps
-from khala_agents.policy import Context, Said
+from khala_agents.policy import Context, Decision, Said
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import ModelCall, Usage
 
@@ -126,6 +135,55 @@ async def test_memory_is_of_one_episode_and_of_answered_steps_only(
     await policy.policy.prepare(briefing(episode=1))
     await policy.decide(briefing(episode=1), observation(0, episode=1))
     assert [message.content for message in model.requests[3][1].messages[3:]] == ["step 0"]
+
+
+@pytest.mark.parametrize("verdict", ["empty", "cut", "refused", "filtered"])
+async def test_an_answer_without_words_is_a_decision_that_nobody_made_with_the_reason(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation],
+    verdict: Verdict,
+) -> None:  # fmt: skip
+    policy, exchanges = traced(
+        listed_model(Completion("", verdict=verdict, reason="all 100 tokens were thoughts"), "go")
+    )
+    said = await policy.decide(briefing(), observation(0))
+    assert said == Decision("", verdict, reason="all 100 tokens were thoughts")
+    assert (exchanges[0].status, exchanges[0].reason) == (verdict, "all 100 tokens were thoughts")
+    assert await policy.decide(briefing(), observation(1)) == "go"
+
+
+@pytest.mark.parametrize(
+    ("before", "error", "hopeless"),
+    [
+        ((), RequestRefused("no such model", status="http 404"), True),
+        (("go",), RequestRefused("the prompt is too long", status="http 400"), False),
+        (("go",), Unauthorized("revoked", status="http 401"), True),
+        ((), EndpointUnavailable("busy", status="http 503"), False),
+    ],
+)
+async def test_a_refusal_that_no_later_request_can_escape_is_hopeless(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation],
+    before: tuple[str, ...], error: LLMError, hopeless: bool,
+) -> None:  # fmt: skip
+    policy, _ = traced(listed_model(*before, error), retry=RetryRule(tries=1))
+    for step in range(len(before)):
+        await policy.decide(briefing(), observation(step))
+    with pytest.raises(LLMError) as caught:
+        await policy.decide(briefing(), observation(9))
+    assert caught.value.hopeless == hopeless
+
+
+async def test_a_request_of_unknown_usage_says_the_most_that_it_may_have_cost(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    limits = Limits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := Budget(1.0)))
+    policy, exchanges = traced(listed_model(60.0, "too late"), limits=limits)
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(5):
+            await policy.decide(briefing(), observation())
+    (exchange,) = exchanges
+    assert (exchange.status, exchange.usage.unknown_requests) == ("cancelled", 1)
+    assert exchange.usage.unknown_usd == pytest.approx(budget.booked_usd)
+    assert budget.booked_usd > 4_000e-6, "the longest answer, and the prompt"
 
 
 # --- replay ---------------------------------------------------------------------------------------------

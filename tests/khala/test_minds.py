@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.commands import until_interrupted, why_not_valid
+from khala.commands import reasons_not_valid, until_interrupted, without_orders
 from khala.local import _shares_of, spent_before
 from khala.minds import Minds, minds_of, named_sides
 from khala.spending import spent_usd
@@ -159,8 +159,16 @@ def test_a_match_that_is_not_valid_says_so_without_markup(capsys: pytest.Capture
     assert capsys.readouterr().err.endswith("\nnot valid: the [red] side left\n")
 
 
+def test_agents_none_of_whose_orders_was_carried_out_are_named() -> None:
+    asked = {"statuses": {"A": {"ok": 3}, "B": {"ok": 3}}}
+    first, second = result("blue").but(**asked, accepted_of={"A": 1}), result("blue").but(**asked)
+    assert without_orders([first, second]) == ["B"]
+    assert without_orders([first, second.but(side="red")]) == ["blue/B", "red/A", "red/B"]
+    assert without_orders([second.but(outcome="aborted")]) == []
+
+
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
-    assert list(why_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
-    assert list(why_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
-    assert list(why_not_valid([result("blue", "x")])) == ["x"]
-    assert list(why_not_valid([result("blue"), result("red")])) == []
+    assert list(reasons_not_valid([result("blue", "x"), result("red", "x"), result("red", "x")])) == ["x"]
+    assert list(reasons_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
+    assert list(reasons_not_valid([result("blue", "x")])) == ["x"]
+    assert list(reasons_not_valid([result("blue"), result("red")])) == []

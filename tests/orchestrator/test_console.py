@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -56,6 +57,22 @@ def agent(name: str, **changes: Any) -> AgentReport:
 
 def report(step: int, *agents: AgentReport) -> Report:
     return Report(run=RUN, episode=0, step=step, game_loop=224 * step, agents=agents, score=2.5 * step)
+
+
+# --- failures ---------------------------------------------------------------------------------------------
+
+
+def test_the_first_failure_of_each_kind_is_shown_at_once_with_the_log() -> None:
+    out = io.StringIO()
+    progress = Progress(Console(file=out, width=200), logs=Path("runs/first"))
+    failed = agent("Stalkers", status="failed", detail="http 500", reason="the \x1b[31mendpoint is on fire")
+    for step in range(1, 4):
+        progress(report(step, failed, agent("Zealots", status="empty")))
+    lines = out.getvalue().splitlines()
+    assert lines == [
+        "step 1: Stalkers: failed, it did not decide: the \\x1b[31mendpoint is on fire; its log is in runs/first",
+        "step 1: Zealots: empty, it did not decide: empty; its log is in runs/first",
+    ]
 
 
 # --- panels -----------------------------------------------------------------------------------------------

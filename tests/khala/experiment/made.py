@@ -27,7 +27,7 @@ GAME = GameIdentity("4.10", "B0", "Map.SC2Map", "0" * 64)
 
 
 def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bool = True, won: bool = True,
-           spent_out: bool = False, valid: bool = True) -> None:  # fmt: skip
+           spent_out: bool = False, valid: bool = True, refused: bool = False) -> None:  # fmt: skip
     """Write the recording of a match of one step; without a result, as a runner that was killed leaves it."""
     run, agent = config.run, config.task.agents[0].name
     usage = Usage(requests=1, prompt_tokens=900, completion_tokens=100, cost_usd=cost_usd)
@@ -39,10 +39,11 @@ def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bo
     done = AgentReport(agent=agent, side="blue", status=status, detail=detail, usage=usage)
     report = Report(run=run, episode=0, step=0, game_loop=8, agents=(done,))
     value = Casualties(units=1, value=100.0)
+    why = "the endpoint of blue/A will not answer it: there is no model 'x'" if refused else "A never decided"
+    cause = "model refused" if refused else "enemy defeated"
     ended = Result(
-        run=run, episode=0, outcome="win" if won else "loss", cause="enemy defeated", steps=1, game_loop=8, game_s=0.4,
-        wall_s=2.0, killed=value, lost=value, kd=1.0, valid=valid,
-        invalid_because="" if valid else "A never decided",
+        run=run, episode=0, outcome="win" if won else "loss", cause=cause, steps=1, game_loop=8, game_s=0.4,
+        wall_s=2.0, killed=value, lost=value, kd=1.0, valid=valid, invalid_because="" if valid else why,
     )  # fmt: skip
     with Recorder(path) as recorder:
         recorder.write(run_key(run, Topic.RUN), encode(run_card(config, GAME)))
@@ -88,5 +89,6 @@ class MadeEngine:
         cost = self.cost_usd(job) if left_usd is None else min(self.cost_usd(job), left_usd)
         spent_out = how == "spent" or (left_usd is not None and cost < self.cost_usd(job))
         record(job.config.record, job.config, cost_usd=cost, result=how != "lost", spent_out=spent_out,
-               won=job.config.seed % 2 == 0, valid=how != "invalid")  # fmt: skip
+               won=job.config.seed % 2 == 0, valid=how not in {"invalid", "refused"},
+               refused=how == "refused")  # fmt: skip
         return Done(state="lost", words="killed") if how == "lost" else Done(state="done")

@@ -11,6 +11,7 @@ from khala.experiment.plan import plan
 from khala.experiment.runner import Event, Runner, pilot_of
 from khala.experiment.spec import Budget, Experiment
 from khala.experiment.store import Store
+from khala_agents.llm.money import Ledger
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.made import MadeEngine, record
 
@@ -75,6 +76,28 @@ async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(stor
     assert [event.what for event in seen if event.match.key == always and event.what != "begins"] == [
         "again", "again", "ends",
     ]  # fmt: skip
+
+
+async def test_matches_of_a_model_that_is_refused_for_good_are_not_begun_any_more(store: Store) -> None:
+    found = experiment(factors={"model": ["scripted/skilled", "silent"]}, fixed={"task": "2s3z_pair"})
+    engine = MadeEngine(slots=1, ends=lambda job, _: "done" if job.minds["blue"].policy else "refused")
+    runner = await run(store, engine, found)
+    assert [job.minds["blue"].policy for job in engine.jobs] == [None, "silent", "silent", "silent"]
+    assert runner.stopped == "the endpoint of blue/A will not answer it: there is no model 'x'"
+    assert states(store).count("invalid") == 1
+
+
+async def test_a_match_whose_recording_is_lost_has_cost_what_its_ledger_says(store: Store) -> None:
+    def ends(job: Job, _: int) -> str:
+        assert job.config.record is not None
+        with Ledger(job.config.record.with_suffix(".ledger")) as ledger:
+            ledger.pay("blue", 0.25)
+            ledger.hold("blue", 0.125, None)
+        return "nothing"
+
+    runner = await run(store, MadeEngine(ends=ends), experiment(seeds=1, retries=0), usd=9.0)
+    assert runner.spent.usd == pytest.approx(2 * 0.375)
+    assert Runner(experiment(), store, MadeEngine(), Budget(usd=9.0)).spent.usd == pytest.approx(2 * 0.375)
 
 
 async def test_a_match_without_any_recording_is_known_as_crashed(store: Store) -> None:
