@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from khala.listening import bound
+from khala.doors.listening import bound
 from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
