@@ -4,6 +4,7 @@
     brake      how long a peer waits after wrong tries, likewise
     asgi       the rules around an ASGI application: `khala mcp`, `khala openenv`
     pages      the rules around an aiohttp application: `khala view`, the metrics of `khala serve`
+    serving    uvicorn, as it serves them
     listening  sockets, and how long a connection may take to say what it wants
 
 Khala's servers are for programs and pages of their owner. The rules assume that other users of the machine, other

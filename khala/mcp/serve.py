@@ -19,8 +19,9 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 
 from khala.doors.asgi import Guarded, head_of
-from khala.doors.listening import Patience, bound
+from khala.doors.listening import bound
 from khala.doors.rules import TOKEN, Door, token_of
+from khala.doors.serving import uvicorn_config
 from khala.exit_codes import SIGNALLED
 from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
@@ -81,7 +82,7 @@ async def over_http(table: Table, port: int) -> None:
     with bound(HOST, port) as listening:
         for seat in seats:
             sys.stderr.write(f"{seat.seat}: {seat.address(listening.getsockname()[1])}\n")
-        server = _Server(config_of(app))
+        server = _Server(uvicorn_config(app, timeout_graceful_shutdown=1))
         signalled = _first_signal()
         signalled.add_done_callback(lambda _: server.end())
         await server.serve(sockets=[listening])
@@ -127,14 +128,6 @@ class _SeatAddress:
             await send(message)
 
         await self._served(scope, receive, named)
-
-
-def config_of(app: Application) -> uvicorn.Config:
-    """Return how an application is served."""
-    config = uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1, proxy_headers=False, server_header=False)
-    config.load()
-    config.http_protocol_class = Patience(config.http_protocol_class)  # type: ignore[assignment]  # it makes them
-    return config
 
 
 class _Server(uvicorn.Server):

@@ -1,0 +1,31 @@
+"""How uvicorn serves an application of Khala. It is of the extras `mcp` and `openenv`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import uvicorn
+
+from khala.doors.listening import Patience
+
+if TYPE_CHECKING:
+    from khala.doors.asgi import Application
+
+
+def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
+    """Return the configuration of a server.
+
+    uvicorn takes the address of a peer from headers of a proxy by default, and a peer could choose it; and it pings
+    websockets, and closes those of programs that think for a minute. Peers that are gone are found by TCP.
+
+    Args:
+        app: the application.
+        options: more of `uvicorn.Config`.
+    """
+    config = uvicorn.Config(
+        app, log_config=None, proxy_headers=False, server_header=False, ws_ping_interval=None, ws_ping_timeout=None,
+        **options,
+    )  # fmt: skip
+    config.load()
+    config.http_protocol_class = Patience(config.http_protocol_class)  # type: ignore[assignment]  # it makes them
+    return config
