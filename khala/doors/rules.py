@@ -174,6 +174,8 @@ class Door:
         # the token cannot be guessed, so whoever has it never waits for what others try
         if self.token and any(is_same(secret, self.token) for secret in given):
             return None
+        if not any(given):
+            return self._denied()
         if (wait_s := self.brake.wait_s(head.peer)) > 0:
             return Refusal(
                 429,
@@ -183,8 +185,7 @@ class Door:
         if self.password and scheme == "basic" and is_same(credential, self.password):
             self.brake.note_right(head.peer)
             return None
-        if any(given):
-            self.brake.note_wrong(head.peer)
+        self.brake.note_wrong(head.peer)
         return self._denied()
 
     def _denied(self) -> Refusal:

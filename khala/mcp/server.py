@@ -108,7 +108,9 @@ class _SeatServer:
         self,
         ctx: Context[None],
         to: Annotated[str, Field(description="An agent or a channel that the observation names.")],
-        text: Annotated[str, Field(description="What it is to read.", min_length=1, max_length=MOST_MESSAGE_CHARACTERS)],
+        text: Annotated[
+            str, Field(description="What it is to read.", min_length=1, max_length=MOST_MESSAGE_CHARACTERS)
+        ],
     ) -> str:
         """Write to another agent: the message goes out with your next act, and arrives with its next observation."""
         with _clear(), self._playing(ctx):

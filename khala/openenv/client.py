@@ -5,8 +5,9 @@
         while not result.done:
             result = await env.step(KhalaAction(reply=decide(result.observation.text)))
 
-`KhalaEnv(…).sync()` is the same without `await`. A server with a token has it in its address,
-`http://khala:TOKEN@host:8000`, or the client finds it in KHALA_OPENENV_TOKEN. It needs `openenv-core`, and neither a game nor a server.
+`KhalaEnv(…).sync()` is the same without `await`. The token of a server stands in its address,
+`http://khala:TOKEN@host:8000`, or in KHALA_OPENENV_TOKEN. The client needs `openenv-core`, and neither a game nor a
+server.
 """
 
 from __future__ import annotations

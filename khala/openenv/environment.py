@@ -49,7 +49,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     def __init__(
         self, settings: Settings | None = None, games: IdleGames | None = None, places: Places | None = None
     ) -> None:
-        """Take what the server decides, and the processes and places that its sessions share; without, it has its own."""
+        """Take what the server decides, and the processes and places that its sessions share, or make its own."""
         self._settings = settings or Settings()
         self._places = places or Places(1)
         self._games, self._owns_games = games or IdleGames(), games is None

@@ -68,7 +68,9 @@ class Places:
             del self._last_s[loser]
         self._last_s[player] = self.clock()
         if loser is not None:
-            await loser.give_up("it did nothing for long, and another client needed its place: call reset to begin anew")
+            await loser.give_up(
+                "it did nothing for long, and another client needed its place: call reset to begin anew"
+            )
 
     def touch(self, player: Player) -> None:
         """Note that a session does something."""

@@ -112,7 +112,7 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
 def _write_privately(path: Path, text: str) -> None:
     """Write a file that its user alone can read, also over one that others could."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)  # it holds prompts and replies
-    with open(descriptor, "w", encoding="utf-8") as file:
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         if stat.S_ISREG(os.fstat(descriptor).st_mode):
             path.chmod(0o600)
         file.write(text)

@@ -1,8 +1,8 @@
 """What the server of a view adds to the door: a token that becomes a cookie, and the policy of its page.
 
 Recordings hold prompts and replies, and the page writes to agents, so the door asks for a token. It comes in the
-address that `khala view` prints, and becomes a cookie, so that it does not stay in the address bar. A page runs only its
-own script.
+address that `khala view` prints, and becomes a cookie, so that it does not stay in the address bar. A page runs only
+its own script.
 """
 
 from __future__ import annotations
