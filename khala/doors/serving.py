@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import uvicorn
 
@@ -10,6 +10,9 @@ from khala.doors.listening import Patience
 
 if TYPE_CHECKING:
     from khala.doors.asgi import Application
+
+KEEP_ALIVE_S: Final = 30
+"""Longer than clients keep a connection that they do not use, 5 s for httpx, or they would lose a request now and then."""
 
 
 def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
@@ -23,7 +26,7 @@ def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
         options: more of `uvicorn.Config`.
     """
     config = uvicorn.Config(
-        app, log_config=None, proxy_headers=False, server_header=False, ws_ping_interval=None, ws_ping_timeout=None,
+        app, timeout_keep_alive=KEEP_ALIVE_S, log_config=None, proxy_headers=False, server_header=False, ws_ping_interval=None, ws_ping_timeout=None,
         **options,
     )  # fmt: skip
     config.load()

@@ -148,7 +148,7 @@ class _Leaving:
 
         async def closing(message: Message) -> None:
             if leaves.is_set() and message["type"] == "websocket.close":
-                message |= {"code": 1013, "reason": "too many clients wait: connect again when you begin to play"}
+                message.update(code=1013, reason="too many clients wait: connect again when you begin to play")
             await send(message)
 
         with contextlib.suppress(WebSocketDisconnect):
