@@ -12,22 +12,23 @@ if TYPE_CHECKING:
     from khala.doors.asgi import Application
 
 KEEP_ALIVE_S: Final = 30
-"""Longer than clients keep a connection that they do not use, 5 s for httpx, or they would lose a request now and then."""
+"""Longer than clients keep an idle connection, 5 s for httpx: else they lose a request now and then."""
 
 
 def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
     """Return the configuration of a server.
 
     uvicorn takes the address of a peer from headers of a proxy by default, and a peer could choose it; and it pings
-    websockets, and closes those of programs that think for a minute. Peers that are gone are found by TCP.
+    websockets, and closes those of programs that think for a minute. Peers that are gone are found by TCP. It would
+    also log addresses, with the tokens in them.
 
     Args:
         app: the application.
         options: more of `uvicorn.Config`.
     """
     config = uvicorn.Config(
-        app, timeout_keep_alive=KEEP_ALIVE_S, log_config=None, proxy_headers=False, server_header=False, ws_ping_interval=None, ws_ping_timeout=None,
-        **options,
+        app, log_config=None, access_log=False, proxy_headers=False, server_header=False,
+        timeout_keep_alive=KEEP_ALIVE_S, ws_ping_interval=None, ws_ping_timeout=None, **options,
     )  # fmt: skip
     config.load()
     config.http_protocol_class = Patience(config.http_protocol_class)  # type: ignore[assignment]  # it makes them

@@ -29,7 +29,7 @@ from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
     import signal
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Iterable, Iterator
 
     from khala.doors.asgi import Application, Message, Receive, Scope, Send
     from khala.mcp.table import Table
@@ -68,7 +68,7 @@ async def over_http(table: Table, port: int) -> None:
     Raises:
         ConfigError: the port is taken, or the token that the environment gives can be guessed.
     """
-    seats = [_SeatAddress(table, seat) for seat in table.seats]
+    seats = [SeatAddress(table, seat) for seat in table.seats]
 
     @contextlib.asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
@@ -78,7 +78,7 @@ async def over_http(table: Table, port: int) -> None:
                 await stack.enter_async_context(seat.server.session_manager.run())
             yield
 
-    app = Starlette(routes=[Mount(f"/{seat.seat}", app=seat.app) for seat in seats], lifespan=running)
+    app = Starlette(routes=routes_of(seats), lifespan=running)
     with bound(HOST, port) as listening:
         for seat in seats:
             sys.stderr.write(f"{seat.seat}: {seat.address(listening.getsockname()[1])}\n")
@@ -90,10 +90,16 @@ async def over_http(table: Table, port: int) -> None:
         raise typer.Exit(SIGNALLED + signalled.result())
 
 
-class _SeatAddress:
+def routes_of(seats: Iterable[SeatAddress]) -> list[Mount]:
+    """Return the routes to seats, each behind its door."""
+    return [Mount(f"/{seat.seat}", app=seat.app) for seat in seats]
+
+
+class SeatAddress:
     """A seat behind a door of its own: its token opens no other seat."""
 
     def __init__(self, table: Table, seat: Seat) -> None:
+        """Take a match and the seat."""
         self.seat = seat
         self._holder = Holder(str(seat))
         self.server = server_of(table, seat, self._holder)

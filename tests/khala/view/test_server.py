@@ -17,7 +17,7 @@ from khala.view.server import NO_PAGE, Server
 from khala.view.sources import Sources
 from khala.view.wire import MOST_SCENES, Asked, Library, Moment, Progress, RunView, Scenes, Timeline
 from khala_protocol.codec import encode
-from khala_protocol.messages import Terrain
+from khala_protocol.messages import Scene, Terrain
 from khala_protocol.recording import Recorder
 from tests.khala.view.made import AGENT, PICTURE, STEPS, begin, key_of, make, put, step_of
 
@@ -235,20 +235,21 @@ async def test_a_page_that_another_site_links_to_opens_and_answers_nothing_to_th
 
 
 @pytest.mark.parametrize("loop", ["null", "2.5", '"x"', "-1"])
-async def test_a_recording_with_a_wrong_game_loop_is_shown(tmp_path: Path, loop: str) -> None:
-    """Anybody may have written it; the time line needs a game loop for each step."""
+@pytest.mark.parametrize("has_scenes", [True, False])
+async def test_a_recording_with_a_wrong_game_loop_is_shown(tmp_path: Path, loop: str, has_scenes: bool) -> None:
+    """Anybody may have written it; the time line needs a game loop for each step, and so does a map made of views."""
     path = tmp_path / "odd.mcap"
     with Recorder(path) as recorder:
-        put(recorder, *begin(), *step_of(0))
-        for message in step_of(1):
+        put(recorder, *begin())
+        for message in (one for one in step_of(1) if has_scenes or not isinstance(one, Scene)):
             wrong = encode(message).replace(b'"game_loop":23', f'"game_loop":{loop}'.encode())
             recorder.write(key_of(message), wrong.replace(b'"game_loop":46', f'"game_loop":{loop}'.encode()))
-        put(recorder, *step_of(2))
     async with browser(path) as page:
         await page.enter()
         await page.whole()
         run = f"/api/runs/{page.run}"
-        for name in (run, f"{run}/episodes/0/timeline", *(f"{run}/episodes/0/steps/{step}" for step in range(3))):
+        episode = f"{run}/episodes/0"
+        for name in (run, f"{episode}/timeline", f"{episode}/scenes?from=0&to=1", f"{episode}/steps/1"):
             status, text = await page.get(name)
             assert status == 200, text
 
