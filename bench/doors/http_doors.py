@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import json
 import os
 import secrets
 import socket
@@ -57,6 +58,10 @@ if TYPE_CHECKING:
 STEP_S: Final = 3.0
 """Longest time for a step of an honest client during an attack; a step takes 20 ms, and machines are busy."""
 ANSWER_S: Final = 10.0
+INITIALIZE: Final = json.dumps({
+    "jsonrpc": "2.0", "id": 1, "method": "initialize",
+    "params": {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "doors", "version": "1"}},
+}).encode()  # fmt: skip
 EVIL: Final = "http://evil.example"
 
 
@@ -134,7 +139,7 @@ async def mcp(directory: Path) -> AsyncIterator[Target]:
             port,
             f"{address.path}?{address.query}",
             "POST",
-            b'{"jsonrpc":"2.0","id":1,"method":"ping"}',
+            INITIALIZE,
             ("Content-Type: application/json", "Accept: application/json, text/event-stream"),
         )
 
@@ -207,7 +212,7 @@ async def _is_honest_answered(target: Target) -> str:
     began = time.perf_counter()
     status = await _status(target)
     took_s = time.perf_counter() - began
-    if status >= 400 and not (target.method == "POST" and status in {400, 404, 406}):  # it is no session yet
+    if status != 200:
         return f"an honest client got {status}"
     return f"an honest client waited {took_s:.1f} s" if took_s > STEP_S else ""
 
@@ -249,7 +254,7 @@ TRICKS: Final = (
     Trick("X-Forwarded-Host vouches", ("X-Forwarded-Host: localhost", "Forwarded: host=::1"), host="evil.example"),
     Trick("a method in a header, from a page", (f"Origin: {EVIL}", "X-HTTP-Method-Override: GET")),
     Trick("two origins, ours first", ("Origin: http://127.0.0.1:PORT", f"Origin: {EVIL}")),
-    Trick("a body of 100 MB", options={"length": 100_000_000, "method": "POST"}, expected=(413,)),
+    Trick("a body of 100 MB", options={"length": 100_000_000}, expected=(413,)),
 )  # fmt: skip
 
 
@@ -520,7 +525,7 @@ async def _play_second_client(directory: Path) -> str:
 async def _play_long_answer(directory: Path) -> str:
     """Send an answer of 100 kB, which the recording would keep."""
     async with mcp(directory) as target:
-        body = b'{"jsonrpc":"2.0","id":1,"method":"ping","params":{"x":"' + b"x" * 100_000 + b'"}}'
+        body = INITIALIZE.replace(b'"doors"', b'"' + b"x" * 100_000 + b'"')
         return _refused("a body of 100 kB", [await _status(target, body=body)], (413,))
 
 
