@@ -46,7 +46,9 @@ async def ask(app: App, asked: dict[str, Any], *parts: bytes, body_s: float = 5.
     sent: list[dict[str, Any]] = []
 
     async def receive() -> dict[str, Any]:
-        return messages.pop(0) if messages else await asyncio.Event().wait() and {}
+        if not messages:
+            await asyncio.Event().wait()
+        return messages.pop(0)
 
     async def send(message: Any) -> None:
         sent.append(message)

@@ -252,11 +252,12 @@ async def test_another_client_cannot_end_or_move_an_episode(serving: Serving) ->
         await owner.post("/reset", json=SHORT | {"episode_id": "mine"})
         step: dict[str, Any] = {"action": {"reply": ""}}
         named = {"episode_id": "mine"}
-        tries = (("/close", {}), ("/step", step), ("/close", named), ("/step", step | named), ("/reset", SHORT | named))
-        for path, body in tries:
-            refused = await other.post(path, json=body)
-            assert refused.status_code == 409, (path, body)
-        assert refused.json()["detail"].startswith("another client chose this episode_id: send the cookie")
+        tries: list[tuple[str, dict[str, Any]]] = [
+            ("/close", {}), ("/step", step), ("/close", named), ("/step", step | named), ("/reset", SHORT | named),
+        ]  # fmt: skip
+        refused = [await other.post(path, json=body) for path, body in tries]
+        assert [answer.status_code for answer in refused] == [409] * len(tries)
+        assert refused[-1].json()["detail"].startswith("another client chose this episode_id: send the cookie")
         assert (await other.get("/state")).status_code == 409
         played = await owner.post("/step", json=step)
         assert played.json()["observation"]["step"] == 1
