@@ -25,12 +25,13 @@ _KEEPALIVE: Final = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 15, "TCP_KEEPCNT": 4}
 _END: Final = b"\r\n\r\n"
 
 
-def bound(host: str, port: int) -> socket.socket:
+def bound(host: str, port: int, *, option: str = "--port") -> socket.socket:
     """Return a socket that listens.
 
     Args:
         host: address of this machine.
         port: 0 for a free one.
+        option: that names the port, for the error.
 
     Raises:
         ConfigError: the port is taken, or the address is none of this machine's.
@@ -40,7 +41,7 @@ def bound(host: str, port: int) -> socket.socket:
         listening = socket.create_server((host, port), family=family)
     except OSError as error:
         raise ConfigError(
-            f"cannot listen on {host}:{port}: {error.strerror}; --port names another port", source="--port"
+            f"cannot listen on {host}:{port}: {error.strerror}; {option} names another port", source=option
         ) from None
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # connections inherit it
     for name, value in _KEEPALIVE.items():

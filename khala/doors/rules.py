@@ -123,7 +123,7 @@ class Door:
         if not self.is_near:
             return None
         if head.peer and not is_loopback(head.peer.partition("%")[0]):
-            return Refusal(403, f"`{self.command}` serves this machine alone: --host opens it to others")
+            return Refusal(403, f"`{self.command}` serves this machine alone: say otherwise when you start it")
         if not names or not is_loopback(host_of(names[0])):
             return Refusal(
                 403, f"this server is not asked under this name: open the address that `{self.command}` printed"

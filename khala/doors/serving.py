@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import uvicorn
 
-from khala.doors.listening import Patience
+from khala.doors.listening import MOST_CONNECTIONS, Patience
 
 if TYPE_CHECKING:
     from khala.doors.asgi import Application
@@ -15,7 +15,7 @@ KEEP_ALIVE_S: Final = 30
 """Longer than clients keep an idle connection, 5 s for httpx: else they lose a request now and then."""
 
 
-def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
+def uvicorn_config(app: Application, *, most_connections: int = MOST_CONNECTIONS, **options: Any) -> uvicorn.Config:
     """Return the configuration of a server.
 
     uvicorn takes the address of a peer from headers of a proxy by default, and a peer could choose it; and it pings
@@ -24,6 +24,7 @@ def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
 
     Args:
         app: the application.
+        most_connections: at a time.
         options: more of `uvicorn.Config`.
     """
     config = uvicorn.Config(
@@ -31,5 +32,5 @@ def uvicorn_config(app: Application, **options: Any) -> uvicorn.Config:
         timeout_keep_alive=KEEP_ALIVE_S, ws_ping_interval=None, ws_ping_timeout=None, **options,
     )  # fmt: skip
     config.load()
-    config.http_protocol_class = Patience(config.http_protocol_class)  # type: ignore[assignment]  # it makes them
+    config.http_protocol_class = Patience(config.http_protocol_class, most=most_connections)  # type: ignore[assignment]  # it makes them
     return config

@@ -58,7 +58,9 @@ def run_openenv(wanted: Wanted) -> None:
     with bound(wanted.host, wanted.port) as listening:
         login = f"khala:{door.token}@" if door.token else ""
         sys.stderr.write(f"http://{login}{wanted.host}:{listening.getsockname()[1]}\n")
-        uvicorn.Server(server_config(app, timeout_graceful_shutdown=5)).run(sockets=[listening])
+        uvicorn.Server(server_config(app, sessions=wanted.sessions, timeout_graceful_shutdown=5)).run(
+            sockets=[listening]
+        )
 
 
 def settings_of(wanted: Wanted) -> Settings:

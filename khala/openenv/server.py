@@ -34,6 +34,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from khala import __version__
 from khala.doors.asgi import Guarded
+from khala.doors.listening import MOST_CONNECTIONS
 from khala.doors.rules import Door, is_same, token_of
 from khala.doors.serving import uvicorn_config
 from khala.openenv.environment import KhalaEnvironment, NoEpisode
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
 SESSIONS: Final = 8
 IDLE_S: Final = 3600.0
 MOST_WAITING: Final = 32
-"""Websockets that do not play; when one more comes, the oldest is closed."""
+"""Sessions that do not play, beyond as many as may play; when one more comes, the oldest is closed."""
 MOST_BODY_BYTES: Final = 2**20
 """Of a request or a message: twice the longest reply of an agent over the bus."""
 OPENENV_TOKEN: Final = "KHALA_OPENENV_TOKEN"  # noqa: S105  # the name of its variable
@@ -90,9 +91,10 @@ def openenv_door(host: str | None = None, *, is_open: bool = False) -> Door:
     )
 
 
-def server_config(app: Application, **options: Any) -> uvicorn.Config:
+def server_config(app: Application, *, sessions: int = SESSIONS, **options: Any) -> uvicorn.Config:
     """Return how the application is served; options are more of `uvicorn.Config`."""
-    return uvicorn_config(app, ws="websockets-sansio", ws_max_size=MOST_BODY_BYTES, **options)
+    most = max(MOST_CONNECTIONS, 4 * sessions)
+    return uvicorn_config(app, most_connections=most, ws="websockets-sansio", ws_max_size=MOST_BODY_BYTES, **options)
 
 
 def app_of(
@@ -119,7 +121,8 @@ def app_of(
         version="1.0.0",  # of OpenEnv's API: its clients and `openenv validate` read it
         description=f"StarCraft II for teams of LLM agents, by OpenEnv. Khala {__version__}.",
     )
-    limits = ConcurrencyConfig(max_concurrent_envs=sessions + MOST_WAITING, session_timeout=idle_s)
+    # those that play, those that wait, and those that are told to leave and have not left yet
+    limits = ConcurrencyConfig(max_concurrent_envs=2 * (sessions + MOST_WAITING), session_timeout=idle_s)
     _Server(settings or Settings(), games, Places(sessions), limits).register_routes(app)
     app.add_middleware(_Leaving)
     app.add_middleware(Guarded, door=door or openenv_door("127.0.0.1"))
@@ -262,10 +265,13 @@ class _Server(HTTPEnvServer):
         return Named(episode_id=name)
 
     async def _create_session(self) -> tuple[str, Environment[Any, Any, Any]]:
-        """Make room for a websocket that comes, if too many wait that do not play; then do as OpenEnv."""
-        waiting = [leaves for session, leaves in self._leaves.items() if not self._plays(session)]
-        if len(waiting) >= MOST_WAITING:
-            waiting[0].set()
+        """Make room for a session, if too many wait that do not play; then do as OpenEnv."""
+        waiting = [session for session, made in self._sessions.items() if made is not None and not self._plays(session)]
+        if len(waiting) >= self._places.most + MOST_WAITING:
+            if (leaves := self._leaves.get(waiting[0])) is not None:
+                leaves.set()
+            else:  # over HTTP nobody is there to be told
+                await self._destroy_session(waiting[0])
         session, environment = await super()._create_session()
         if (leaves := _LEAVES.get()) is not None:
             self._leaves[session] = leaves

@@ -62,7 +62,7 @@ class Metrics:
         await runner.setup()
         assert runner.server is not None
         try:
-            with bound(host, port) as listening:
+            with bound(host, port, option="--metrics") as listening:
                 server = await asyncio.get_running_loop().create_server(Patience(runner.server), sock=listening)
                 yield int(listening.getsockname()[1])
                 server.close()

@@ -12,6 +12,7 @@ import os
 
 import uvicorn
 
+from khala.doors.listening import bound
 from khala.openenv.server import OPENENV_OPEN, app_of, openenv_door, server_config
 
 app = app_of(door=openenv_door(is_open=os.environ.get(OPENENV_OPEN, "") not in {"", "0", "false"}))
@@ -23,7 +24,8 @@ def main() -> None:
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=8000)
     given = parser.parse_args()
-    uvicorn.Server(server_config(app, host=given.host, port=given.port)).run()
+    with bound(given.host, given.port) as listening:
+        uvicorn.Server(server_config(app)).run(sockets=[listening])
 
 
 if __name__ == "__main__":

@@ -125,7 +125,7 @@ def test_a_door_lets_in_what_its_rules_say(door: Door, asked: RequestHead, expec
     ("door", "asked", "says"),
     [
         (NEAR, head(host="evil.example"), "under this name: open the address that `khala openenv` printed"),
-        (NEAR, head(peer="10.0.0.9"), "`khala openenv` serves this machine alone: --host opens it to others"),
+        (NEAR, head(peer="10.0.0.9"), "`khala openenv` serves this machine alone: say otherwise when you start it"),
         (NEAR, head(("host", "x")), "the request names two hosts: send one Host header"),
         (NEAR, head(("origin", "null")), "another page asked this: only the page of `khala openenv` may"),
         (NEAR, head(("content-length", "20000")), "longer than 16384 bytes: send less at a time"),

@@ -13,13 +13,24 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import pytest
 from openenv.core.env_server.exceptions import SessionCapacityError
+from openenv.core.env_server.types import ConcurrencyConfig
 from openenv.core.generic_client import GenericEnvClient
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from khala.openenv.client import KhalaAction, KhalaEnv
 from khala.openenv.places import OVER_YIELD_S, YIELD_S, Places
-from khala.openenv.server import MOST_BODY_BYTES, MOST_WAITING, OPENENV_TOKEN, app_of, openenv_door, server_config
+from khala.openenv.server import (
+    MOST_BODY_BYTES,
+    MOST_WAITING,
+    OPENENV_TOKEN,
+    _Server,
+    app_of,
+    openenv_door,
+    server_config,
+)
+from khala.openenv.settings import Settings
+from khala_bridge.game.processes import IdleGames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,6 +140,19 @@ async def test_silent_websockets_take_no_session_and_the_oldest_make_room(servin
             assert (await env.state())["step_count"] == 0
         await silent[-1].send(STATE)
         assert json.loads(await silent[-1].recv())["type"] == "state"
+
+
+async def test_episodes_over_http_that_their_clients_left_do_not_fill_the_server(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("khala.openenv.server.MOST_WAITING", 2)
+    server = _Server(
+        Settings(), IdleGames(1), Places(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
+    )
+    made = [(await server._create_session())[0] for _ in range(20)]
+    assert list(server._sessions) == made[-3:]
+    for session in made[-3:]:
+        await server._destroy_session(session)
 
 
 class Blocked:
