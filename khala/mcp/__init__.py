@@ -2,6 +2,7 @@
 
     table     a match whose seats are played by sessions, each at its own pace
     words     what a player reads
+    holder    which client plays a seat
     server    one seat as an MCP server: tools, and resources
     serve     the servers of a match over stdio or streamable HTTP
     cli       the command

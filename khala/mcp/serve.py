@@ -8,27 +8,41 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import secrets
 import sys
 from typing import TYPE_CHECKING, Any
 
 import typer
 import uvicorn
+from mcp.server.transport_security import TransportSecuritySettings
 from starlette.applications import Starlette
 from starlette.routing import Mount
 
+from khala.doors.asgi import Guarded, head_of
+from khala.doors.listening import bound
+from khala.doors.rules import TOKEN, Door, token_of
+from khala.doors.serving import uvicorn_config
 from khala.exit_codes import SIGNALLED
-from khala.listening import bound
-from khala.mcp.server import server_of
+from khala.mcp.holder import Holder
+from khala.mcp.server import CLIENT, client_of, server_of
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
     import signal
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Iterable, Iterator
 
+    from khala.doors.asgi import Application, Message, Receive, Scope, Send
     from khala.mcp.table import Table
+    from khala.seats import Seat
 
 HOST = "127.0.0.1"
-"""The address to serve on: a seat has no password. The SDK refuses requests that a page of another site makes."""
+"""The address to serve on: connections are not encrypted."""
+TOKENS = "KHALA_MCP_TOKEN"
+"""The variable with a token for all seats, which stays the same; without it each seat has a new one."""
+METHOD, DISCOVER = "mcp-method", "server/discover"
+"""The header that names the method of a request, and the method with which newer clients begin."""
+MOST_BODY_BYTES = 65_536
+"""Of a request: twice the longest answer."""
 
 
 async def over_stdio(table: Table) -> None:
@@ -52,29 +66,74 @@ async def over_http(table: Table, port: int) -> None:
         port: on this machine; 0 for a free one.
 
     Raises:
-        ConfigError: the port is taken.
+        ConfigError: the port is taken, or the token that the environment gives can be guessed.
     """
-    servers = {seat: server_of(table, seat) for seat in table.seats}
-    apps = {seat: server.streamable_http_app(host=HOST) for seat, server in servers.items()}
+    seats = [SeatAddress(table, seat) for seat in table.seats]
 
     @contextlib.asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
         async with contextlib.AsyncExitStack() as stack:
             await stack.enter_async_context(table)
-            for server in servers.values():
-                await stack.enter_async_context(server.session_manager.run())
+            for seat in seats:
+                await stack.enter_async_context(seat.server.session_manager.run())
             yield
 
-    app = Starlette(routes=[Mount(f"/{seat}", app=one) for seat, one in apps.items()], lifespan=running)
+    app = Starlette(routes=routes_of(seats), lifespan=running)
     with bound(HOST, port) as listening:
-        for seat in table.seats:
-            sys.stderr.write(f"{seat}: http://{HOST}:{listening.getsockname()[1]}/{seat}/mcp\n")
-        server = _Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
+        for seat in seats:
+            sys.stderr.write(f"{seat.seat}: {seat.address(listening.getsockname()[1])}\n")
+        server = _Server(uvicorn_config(app, timeout_graceful_shutdown=1))
         signalled = _first_signal()
         signalled.add_done_callback(lambda _: server.end())
         await server.serve(sockets=[listening])
     if signalled.done():
         raise typer.Exit(SIGNALLED + signalled.result())
+
+
+def routes_of(seats: Iterable[SeatAddress]) -> list[Mount]:
+    """Return the routes to seats, each behind its door."""
+    return [Mount(f"/{seat.seat}", app=seat.app) for seat in seats]
+
+
+class SeatAddress:
+    """A seat behind a door of its own: its token opens no other seat."""
+
+    def __init__(self, table: Table, seat: Seat) -> None:
+        """Take a match and the seat."""
+        self.seat = seat
+        self._holder = Holder(str(seat))
+        self.server = server_of(table, seat, self._holder)
+        self._door = Door(
+            command="khala mcp",
+            token=token_of(TOKENS),
+            most_body_bytes=MOST_BODY_BYTES,
+            denied=403,  # of 401 clients think that they can log in
+        )
+        # the door has checked host and origin, more strictly than the SDK would
+        unchecked = TransportSecuritySettings(enable_dns_rebinding_protection=False)
+        self._served: Application = self.server.streamable_http_app(host=HOST, transport_security=unchecked)
+        self.app = Guarded(self._named, self._door)
+
+    def address(self, port: int) -> str:
+        """Return the address for a client that plays the seat."""
+        return f"http://{HOST}:{port}/{self.seat}/mcp?{TOKEN}={self._door.token}"
+
+    async def _named(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request, and give a client without a name one; free the seat whose client ends its session."""
+        headers = dict(head_of(scope).headers)
+        client = client_of(headers)
+        if scope["method"] == "DELETE":
+            self._holder.leave(client)
+        elif headers.get(METHOD) == DISCOVER:
+            self._holder.greet()
+
+        async def named(message: Message) -> None:
+            if message["type"] == "http.response.start" and not client:
+                cookie = f"{CLIENT}={secrets.token_urlsafe(16)}; Path=/{self.seat}; HttpOnly; SameSite=Strict"
+                message["headers"] = [*message.get("headers", ()), (b"set-cookie", cookie.encode())]
+            await send(message)
+
+        await self._served(scope, receive, named)
 
 
 class _Server(uvicorn.Server):

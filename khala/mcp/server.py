@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import contextlib
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from http.cookies import CookieError, SimpleCookie
+from typing import TYPE_CHECKING, Annotated, Final
 
 from mcp.server.mcpserver import Context, Image, MCPServer
 from mcp.server.mcpserver.exceptions import ResourceNotFoundError, ToolError
@@ -17,12 +18,13 @@ from mcp.types import ToolAnnotations
 from pydantic import Field
 
 from khala import __version__
+from khala.mcp.holder import Holder
 from khala.mcp.words import briefing_page, instructions, page, step_line
 from khala_bridge.knowledge.lookup import find, long
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterator
+    from collections.abc import Awaitable, Callable, Iterator, Mapping
 
     from khala.mcp.table import Look, Table
     from khala.seats import Seat, Seen
@@ -31,20 +33,33 @@ if TYPE_CHECKING:
 WITHIN_S = 25.0
 """Longest time that a tool waits for the match: clients give up after 60 s, or sooner."""
 
+MOST_REPLY_CHARACTERS: Final = 32_768
+"""Of an answer; it is kept in the recording."""
+MOST_MESSAGE_CHARACTERS: Final = 2_000
 NOTHING = "nothing has been observed yet: call the tool observe first"
 
 
-def server_of(table: Table, seat: Seat) -> MCPServer[None]:
-    """Return the server of one seat of a table."""
-    return _SeatServer(table, seat).server
+SESSION: Final = "mcp-session-id"
+CLIENT: Final = "khala_client"
+"""The cookie that names a client without a session."""
+
+
+def server_of(table: Table, seat: Seat, holder: Holder | None = None) -> MCPServer[None]:
+    """Return the server of one seat of a table.
+
+    Args:
+        table: the match.
+        seat: that clients of this server play.
+        holder: which of them plays it.
+    """
+    return _SeatServer(table, seat, holder or Holder(str(seat))).server
 
 
 class _SeatServer:
     """The tools and resources of one seat."""
 
-    def __init__(self, table: Table, seat: Seat) -> None:
-        self._table, self._seat = table, seat
-        self._briefed = False
+    def __init__(self, table: Table, seat: Seat, holder: Holder) -> None:
+        self._table, self._seat, self._holder = table, seat, holder
         self.server: MCPServer[None] = MCPServer(
             f"khala {seat}",
             title=f"Khala: {seat.agent} in {table.config.task.name}",
@@ -69,7 +84,7 @@ class _SeatServer:
 
         The first observation stands below your briefing: who you are, your actions, and the form of an answer.
         """
-        with _clear():
+        with _clear(), self._playing(ctx):
             return self._shown(await self._look(ctx), briefing=briefing)
 
     async def act(
@@ -79,22 +94,26 @@ class _SeatServer:
             str,
             Field(
                 description='Your answer: "Analysis:", then "Actions:", a line "Team NAME:" for each team, and under '
-                "it its actions, such as <Attack_Unit(0x1002c0001)>. Empty to go on as before."
+                "it its actions, such as <Attack_Unit(0x1002c0001)>. Empty to go on as before.",
+                max_length=MOST_REPLY_CHARACTERS,
             ),
         ],
     ) -> list[str | Image]:
         """Answer the observation that you saw last, and wait for the next one: it says what was refused, and why."""
-        with _clear():
+        with _clear(), self._playing(ctx):
             self._table.act(self._seat, reply)
             return self._shown(await self._look(ctx))
 
     async def message(
         self,
+        ctx: Context[None],
         to: Annotated[str, Field(description="An agent or a channel that the observation names.")],
-        text: Annotated[str, Field(description="What it is to read.", min_length=1)],
+        text: Annotated[
+            str, Field(description="What it is to read.", min_length=1, max_length=MOST_MESSAGE_CHARACTERS)
+        ],
     ) -> str:
         """Write to another agent: the message goes out with your next act, and arrives with its next observation."""
-        with _clear():
+        with _clear(), self._playing(ctx):
             self._table.message(self._seat, to, text)
         return f"Your next act takes it to {to}."
 
@@ -106,6 +125,18 @@ class _SeatServer:
         with _clear():
             return "\n".join(long(one) for one in find(name))
 
+    @contextlib.contextmanager
+    def _playing(self, ctx: Context[None]) -> Iterator[None]:
+        """Hold the seat for the client of a request while it is answered, and for a while after that.
+
+        Raises:
+            Taken: another client plays it.
+        """
+        client = client_of(ctx.headers or {})
+        self._holder.take(client)
+        yield
+        self._holder.take(client)
+
     async def _look(self, ctx: Context[None]) -> Look:
         async def on_step(report: Report) -> None:
             await ctx.report_progress(report.game_loop, message=step_line(report))
@@ -116,8 +147,7 @@ class _SeatServer:
         text = page(look, self._table.config)
         if look.seen is None:
             return [text]
-        if briefing or not self._briefed:
-            self._briefed = True
+        if self._holder.brief() or briefing:
             text = f"{briefing_page(look.seen.briefing)}\n{text}"
         shown: list[str | Image] = [text]
         for ref, picture in look.seen.arrived():
@@ -148,6 +178,16 @@ class _SeatServer:
             if ref.name == name:
                 return picture
         raise ResourceNotFoundError(f"the newest observation has no picture {name}")
+
+
+def client_of(headers: Mapping[str, str]) -> str:
+    """Return what names the client of a request: its session, or its cookie; "" if it has neither."""
+    if session := headers.get(SESSION):
+        return f"session {session}"
+    cookies = SimpleCookie()
+    with contextlib.suppress(CookieError):
+        cookies.load(headers.get("cookie", ""))
+    return f"cookie {cookies[CLIENT].value}" if CLIENT in cookies else ""
 
 
 @contextlib.contextmanager

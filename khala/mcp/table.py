@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from khala.seats import NotAsked, Seat, SeatedMatch
 from khala_protocol.errors import KhalaError
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from khala.seats import Seen, Turn
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Report, Result
+
+
+MOST_MESSAGES: Final = 16
+"""That one answer takes along; a client could add others without end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +147,7 @@ class Table:
 
         Raises:
             NotAsked: the seat has not been asked for anything yet.
-            KhalaError: it cannot write to such a recipient.
+            KhalaError: it cannot write to such a recipient, or has written too much.
         """
         place = self._places[seat]
         if place.seen is None:
@@ -152,6 +156,8 @@ class Table:
         known = [*(contact.name for contact in briefing.correspondents), *briefing.channels]
         if to not in known:
             raise KhalaError(f"{seat} cannot write to {to!r}: it can write to {', '.join(known) or 'nobody'}")
+        if len(place.messages) >= MOST_MESSAGES:
+            raise KhalaError(f"{MOST_MESSAGES} messages wait for your next act already: call act, which sends them")
         place.messages.append((to, text))
 
     def act(self, seat: Seat, reply: str) -> None:

@@ -2,6 +2,7 @@
 
     models        what travels between client and server: action, observation, state, options of a reset
     rubrics       what a step is worth
+    places        how many sessions play at a time, and which makes room for another
     environment   one session: a match, some of whose agents the client plays
     server        sessions over websocket and HTTP
     client        the client class

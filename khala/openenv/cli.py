@@ -13,6 +13,7 @@ Examples:\n
     khala openenv\n
     khala openenv pvz_task6_level1 --sessions 16 --port 8000\n
     khala openenv duel_3m --others focus-fire --allow openai\n
+    KHALA_OPENENV_TOKEN=... khala openenv 2s3z --host 0.0.0.0\n
     khala openenv 2s3z --rubric my_rewards:Mine --out runs\n
 """
 
@@ -29,7 +30,15 @@ def openenv(
         str, typer.Option(help="Address to serve on; 0.0.0.0 is all of this machine.", metavar="ADDRESS")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0 takes a free one.")] = 8000,
-    sessions: Annotated[int, typer.Option(min=1, help="Most sessions at a time; each has a game of its own.")] = 8,
+    is_open: Annotated[
+        bool,
+        typer.Option(
+            "--open", envvar="KHALA_OPENENV_OPEN", help="Let everybody who reaches the port play, without a token."
+        ),
+    ] = False,
+    sessions: Annotated[
+        int, typer.Option(min=1, help="Most sessions that play at a time; each has a game of its own.")
+    ] = 8,
     idle: Annotated[float, typer.Option(min=1, help="End a session that does nothing for so many seconds.")] = 3600.0,
     others: Annotated[
         str,
@@ -61,9 +70,9 @@ def openenv(
     """Serve OpenEnv: clients such as TRL play agents of matches, with rewards.
 
     Each session is a match of its own; with reset, a client chooses task, agents, seed and pictures. It plays one agent
-    or all of a side, over a websocket or HTTP. The server has no password: on other addresses than this machine's,
-    whoever reaches the port can play.
+    or all of a side, over a websocket or HTTP. On other addresses than this machine's clients need a token: that of
+    KHALA_OPENENV_TOKEN, or a new one that stands in the address that is printed.
     """
     from khala.openenv.commands import Wanted, run_openenv  # noqa: PLC0415  # the server, which --help can do without
 
-    run_openenv(Wanted(task, host, port, sessions, idle, others, tuple(allow or ()), rubric, game, out))
+    run_openenv(Wanted(task, host, port, sessions, idle, others, tuple(allow or ()), rubric, game, out, is_open))

@@ -5,13 +5,17 @@
         while not result.done:
             result = await env.step(KhalaAction(reply=decide(result.observation.text)))
 
-`KhalaEnv(…).sync()` is the same without `await`. It needs `openenv-core`, and neither a game nor a server.
+`KhalaEnv(…).sync()` is the same without `await`. The token of a server stands in its address,
+`http://khala:TOKEN@host:8000`, or in KHALA_OPENENV_TOKEN. The client needs `openenv-core`, and neither a game nor a
+server.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 from typing import Any, Self
+from urllib.parse import quote
 
 from openenv.core.client_types import StepResult
 from openenv.core.env_client import EnvClient
@@ -24,6 +28,10 @@ __all__ = ["KhalaAction", "KhalaEnv", "KhalaObservation", "KhalaState"]
 
 class KhalaEnv(EnvClient[KhalaAction, KhalaObservation, KhalaState]):
     """A session. `reset` takes the fields of `khala.openenv.models.ResetOptions`."""
+
+    def __init__(self, base_url: str, *arguments: Any, **options: Any) -> None:
+        """Take the address of a server; all else is as in `EnvClient`."""
+        super().__init__(_with_token(base_url), *arguments, **options)
 
     async def __aenter__(self) -> Self:
         await self.connect()
@@ -45,3 +53,12 @@ class KhalaEnv(EnvClient[KhalaAction, KhalaObservation, KhalaState]):
 
     def _parse_state(self, payload: dict[str, Any]) -> KhalaState:
         return KhalaState.model_validate(payload)
+
+
+def _with_token(address: str) -> str:
+    """Return an address with the token of the environment as its login, unless it has one."""
+    token = os.environ.get("KHALA_OPENENV_TOKEN", "")
+    scheme, separator, rest = address.rpartition("://")
+    if not token or "@" in rest.partition("/")[0]:
+        return address
+    return f"{scheme}{separator}khala:{quote(token, safe='')}@{rest}"

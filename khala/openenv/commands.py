@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from khala.listening import bound
+from khala.doors.listening import bound
 from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
@@ -37,6 +37,7 @@ class Wanted:
     rubric: str | None
     game: str
     out: Path | None
+    is_open: bool = False
 
 
 def run_openenv(wanted: Wanted) -> None:
@@ -48,16 +49,19 @@ def run_openenv(wanted: Wanted) -> None:
     try:
         import uvicorn  # noqa: PLC0415  # of the extra `openenv`, as all below it
 
-        from khala.openenv.server import app_of  # noqa: PLC0415
+        from khala.openenv.server import app_of, openenv_door, server_config  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"there is no module {error.name}: pip install 'khala[openenv]'", source="khala openenv"
         ) from None
-    app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s)
+    door = openenv_door(wanted.host, is_open=wanted.is_open)
+    app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s, door=door)
     with bound(wanted.host, wanted.port) as listening:
-        sys.stderr.write(f"http://{wanted.host}:{listening.getsockname()[1]}\n")
-        config = uvicorn.Config(app, log_config=None, ws="websockets-sansio", timeout_graceful_shutdown=5)
-        uvicorn.Server(config).run(sockets=[listening])
+        login = f"khala:{door.token}@" if door.token else ""
+        sys.stderr.write(f"http://{login}{wanted.host}:{listening.getsockname()[1]}\n")
+        uvicorn.Server(server_config(app, sessions=wanted.sessions, timeout_graceful_shutdown=5)).run(
+            sockets=[listening]
+        )
 
 
 def settings_of(wanted: Wanted) -> Settings:

@@ -18,6 +18,7 @@ from openenv.core.env_server.types import EnvironmentMetadata
 from khala import __version__
 from khala.loop_thread import LoopThread
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, ResetOptions
+from khala.openenv.places import Places
 from khala.openenv.settings import Settings
 from khala.openenv.views import outcome_of, view_of
 from khala.seats import Turn
@@ -45,9 +46,12 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
-    def __init__(self, settings: Settings | None = None, games: IdleGames | None = None) -> None:
-        """Take what the server decides, and the processes that its sessions share; without, it keeps one for itself."""
+    def __init__(
+        self, settings: Settings | None = None, games: IdleGames | None = None, places: Places | None = None
+    ) -> None:
+        """Take what the server decides, and the processes and places that its sessions share, or make its own."""
         self._settings = settings or Settings()
+        self._places = places or Places(1)
         self._games, self._owns_games = games or IdleGames(), games is None
         super().__init__(rubric=self._settings.rubric())
         self._choice = ResetOptions()
@@ -60,6 +64,8 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         self._briefed: set[str] = set()
         self._game_loop = 0
         self._closed = False
+        self._ended = ""
+        """Why there is no match any more, if the client did not end it."""
         self._one_at_a_time = asyncio.Lock()
         self._leaving: asyncio.Task[None] | None = None
 
@@ -83,11 +89,20 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         if self._closed:
             raise NoEpisode("this session was closed, or did nothing for too long: connect again")
         wanted = loads(json.dumps(options), ResetOptions, source="reset")
+        await self._places.take(self)
+        try:
+            return await self._begin(wanted)
+        finally:
+            self._places.touch(self)
+            if self._match is None:
+                self._places.free(self)
+
+    async def _begin(self, wanted: ResetOptions) -> KhalaObservation:
         goes_on = self._match is not None and self._turn.results and not self._turn.over
         if wanted.seed is not None or wanted.choice() != self._choice or not goes_on:
             await self._leave()
             await self._enter(await asyncio.to_thread(self._settings.match, wanted, self._games))
-            self._choice = wanted.choice()
+            self._choice, self._ended = wanted.choice(), ""
         else:
             assert self._state.seed is not None
             self._state.seed += 1
@@ -112,10 +127,15 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         """
         del timeout_s
         async with self._one_at_a_time:
-            return await self._step(action)
+            try:
+                return await self._step(action)
+            finally:
+                self._places.touch(self)
 
     async def _step(self, action: KhalaAction) -> KhalaObservation:
         match = self._match
+        if match is None and self._ended:
+            raise NoEpisode(f"the episode was ended, since {self._ended}")
         if match is None or self._state.episode_id is None:
             raise NoEpisode("no episode has begun: call reset first")
         if self._state.over:
@@ -150,6 +170,22 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         """What is played."""
         return self._state.model_copy()
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is answering a call."""
+        return self._one_at_a_time.locked()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its episode is over."""
+        return self._state.over
+
+    async def give_up(self, why: str) -> None:
+        """End the match, and tell the client why with its next call; it may reset."""
+        async with self._one_at_a_time:
+            self._ended = why
+            await self._leave()
+
     def get_metadata(self) -> EnvironmentMetadata:
         """Return what the environment is called."""
         return EnvironmentMetadata(
@@ -161,6 +197,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     def close(self) -> None:
         """End the match and its game, for good."""
         self._closed = True
+        self._places.free(self)
         loop = self._loop
         if loop is None:
             pass
@@ -205,6 +242,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
             self._turn = await self._match.turn()
         except KhalaError:
             await self._leave()
+            self._places.free(self)
             raise
         self._state.over = bool(self._turn.results) or self._turn.over
 

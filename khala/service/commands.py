@@ -93,7 +93,7 @@ async def _serve(
         socket = stack.enter_context(local_endpoint())
         bus = await open_bus(config.model_copy(update={"listen": (*config.listen_on, socket)}))
         stack.push_async_callback(bus.close)
-        listeners, port = _listeners(stack, metrics, otlp, traced=traced)
+        listeners, port = await _listeners(stack, metrics, otlp, traced=traced)
         pool = await stack.enter_async_context(Pool(warm, lambda: Worker.start(arguments)))
         service = Service(
             bus, BusConfig(connect=(socket,)), pool.take, out, limits, drain_s, listeners, exchanges=traced,
@@ -108,7 +108,7 @@ async def _serve(
         await service.run(stop)
 
 
-def _listeners(
+async def _listeners(
     stack: contextlib.AsyncExitStack, metrics: int | None, otlp: str | None, *, traced: bool
 ) -> tuple[list[Listener], int | None]:
     listeners: list[Listener] = []
@@ -117,7 +117,7 @@ def _listeners(
         from khala.service.metrics import Metrics  # noqa: PLC0415
 
         counted = Metrics()
-        port = counted.serve(metrics)
+        port = await stack.enter_async_context(counted.serve(metrics))
         listeners.append(counted)
     if traced:
         from khala.service import traces  # noqa: PLC0415  # 0.2 s

@@ -5,15 +5,23 @@ A match is no label: a series for each would stay for ever. `khala matches` tell
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections import Counter as Count
 from typing import TYPE_CHECKING, get_args
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, start_http_server
+from aiohttp import web
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
+from khala.doors.listening import Patience, bound
+from khala.doors.pages import guarded
+from khala.doors.rules import Door
 from khala_protocol.messages import Report, Result
 from khala_protocol.service import MatchState
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
     from khala.service.book import Book
     from khala_protocol.messages import AgentReport, Wire
 
@@ -41,10 +49,28 @@ class Metrics:
         self._rss = Gauge("khala_rss_bytes", "Memory of all processes of the service.", registry=registry)
         self._largest = Gauge("khala_match_rss_bytes", "Memory of the largest match.", registry=registry)
 
-    def serve(self, port: int, host: str = "127.0.0.1") -> int:
-        """Answer `GET /metrics` in a thread of its own; return the port."""
-        server, _ = start_http_server(port, host, registry=self.registry)
-        return int(server.server_port)
+    @contextlib.asynccontextmanager
+    async def serve(self, port: int, host: str = "127.0.0.1") -> AsyncIterator[int]:
+        """Answer `GET /metrics` to programs of this machine, and yield the port.
+
+        Raises:
+            ConfigError: the port is taken.
+        """
+        application = web.Application(middlewares=[guarded(Door(command="khala serve"))])
+        application.router.add_get("/metrics", self._answer)
+        runner = web.AppRunner(application, access_log=None, shutdown_timeout=1.0)
+        await runner.setup()
+        assert runner.server is not None
+        try:
+            with bound(host, port, option="--metrics") as listening:
+                server = await asyncio.get_running_loop().create_server(Patience(runner.server), sock=listening)
+                yield int(listening.getsockname()[1])
+                server.close()
+        finally:
+            await runner.cleanup()
+
+    async def _answer(self, _: web.Request) -> web.Response:
+        return web.Response(body=generate_latest(self.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})
 
     def hear(self, message: Wire) -> None:
         """Count a message of a match."""

@@ -44,8 +44,13 @@ def view(
         int, typer.Option(min=0, max=65535, help="Port to serve on.", show_default="a free one")
     ] = 0,
     password: Annotated[
-        str | None,
-        typer.Option(envvar="KHALA_VIEW_PASSWORD", help="Who has it may look, without the token.", metavar="TEXT"),
+        bool,
+        typer.Option(
+            "--password", help="Ask for a password that opens the page without the token; or set KHALA_VIEW_PASSWORD."
+        ),
+    ] = False,
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read that password from the first line of a file.", metavar="FILE")
     ] = None,
     https: Annotated[
         tuple[Path, Path] | None, typer.Option(help="Serve HTTPS with this certificate.", metavar="CERT KEY")
@@ -69,7 +74,7 @@ def view(
 
     look = Look(
         given=tuple(given or ()), connect=tuple(connect or ()), tls=tls, insecure=insecure, adviser=adviser or "",
-        host=host, port=port, password=password or "", https=https, opens=not no_open,
+        host=host, port=port, asks_password=password, password_file=password_file, https=https, opens=not no_open,
     )  # fmt: skip
     if export is not None:
         run_export(look, export, steps=steps, agents=agents or ())

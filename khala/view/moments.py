@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from khala.view.deeds import Screen, deeds
 from khala.view.digest import tag_number
+from khala.view.timeline import loop_of, whole_number
 from khala.view.wire import Asked, Decision, Deed, Letter, Moment, SideMoment, TeamMark
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
@@ -65,7 +66,7 @@ class Moments:
         if not rows or rows[0][0] != step:
             return None
         row, *before = (json.loads(data) for _, data in rows)
-        loop = row.get("loop", before[0].get("after", 0) if before else 0)
+        loop = loop_of(row, whole_number(before[0].get("after"), 0) if before else 0)
         reports = list(self._reports(episode, step))
         unasked: dict[str, Unasked] = {}
         for report in reports:

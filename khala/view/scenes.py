@@ -55,7 +55,8 @@ def from_views(
     by_step: dict[int, list[Observation]] = {}
     for found in index.at(Topic.OBSERVATION, episode, first - EARLIER, last):
         with contextlib.suppress(PeerError):
-            by_step.setdefault(found.step, []).append(decode_as(Observation, index.payload(found.spot)))
+            said = decode_as(Observation, index.payload(found.spot))
+            by_step.setdefault(found.step, []).append(said)
     for step, seen in sorted(by_step.items()):
         loop = max(said.game_loop for said in seen)
         known.begin(loop)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import signal
 import socket
 import ssl
@@ -11,28 +12,38 @@ import sys
 import tempfile
 import webbrowser
 from dataclasses import dataclass
+from getpass import getpass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aiohttp import web
 
+from khala.doors.listening import Patience, bound
+from khala.doors.rules import TOKEN
 from khala.exit_codes import SIGNALLED
 from khala.view.export import export
-from khala.view.guard import LOOPBACK, TOKEN, Guard
+from khala.view.guard import view_door
 from khala.view.server import Server, page
 from khala.view.sources import Sources, find
 from khala_orchestrator.console import stderr_console
 from khala_orchestrator.transcript import StepSelection
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
+from khala_protocol.files import read_limited
 from khala_protocol.joining import client_config
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Sequence
 
+    from khala.doors.rules import Door
+
 RUNS = Path("runs")
 EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104  # they are recognised, not listened on
+PASSWORD = "KHALA_VIEW_PASSWORD"  # noqa: S105  # the name of its variable
+MOST_PASSWORD_BYTES = 4096
+HANDSHAKE_S = 10.0
+"""Longest time for TLS to begin."""
 SWITCH_S = 0.001
 """An index is made in a thread; answers wait no longer than this for Python's lock, a fifth of the usual."""
 
@@ -48,7 +59,8 @@ class Look:
     adviser: str = ""
     host: str = "127.0.0.1"
     port: int = 0
-    password: str = ""
+    asks_password: bool = False
+    password_file: Path | None = None
     https: tuple[Path, Path] | None = None
     opens: bool = True
 
@@ -59,9 +71,10 @@ def run_view(look: Look) -> None:
     Raises:
         KhalaError: there is nothing to be seen, or it cannot be served so.
     """
-    guard, context = guard_of(look), _tls(look)
+    context = _tls(look)
+    door = door_of(look)
     sys.setswitchinterval(SWITCH_S)
-    ended = asyncio.run(cancelled_by_signal(_view(look, guard, context)))
+    ended = asyncio.run(cancelled_by_signal(_view(look, door, context)))
     if isinstance(ended, signal.Signals):
         raise SystemExit(SIGNALLED + ended)
 
@@ -78,19 +91,37 @@ def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[st
     stderr_console().print(f"{path}: {size / 1e6:.1f} MB, opens in a browser without a server", soft_wrap=True)
 
 
-def guard_of(look: Look) -> Guard:
+def door_of(look: Look) -> Door:
     """Return the rules for who may ask.
 
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near = is_near(look.host)
-    if not near and not look.password and look.https is None:
+    near, password = is_near(look.host), password_of(look)
+    if not near and not password and look.https is None:
         raise ConfigError(
             f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
             "or --https CERT KEY, or leave --host out and come by `ssh -L`"
         )
-    return Guard(password=look.password, names=LOOPBACK if near else (), secure=look.https is not None)
+    return view_door(password=password, is_near=near, is_secure=look.https is not None)
+
+
+def password_of(look: Look) -> str:
+    """Return the password of a view, "" for none. No option holds it: every user of a machine can read those.
+
+    Raises:
+        ConfigError: its file cannot be read, or there is nothing in it.
+    """
+    if look.password_file is None:
+        return getpass("Password: ") if look.asks_password else os.environ.get(PASSWORD, "")
+    try:
+        password = read_limited(look.password_file, MOST_PASSWORD_BYTES).decode().partition("\n")[0].rstrip("\r")
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        raise ConfigError(f"{look.password_file} cannot be read: {why}", source="--password-file") from None
+    if not password:
+        raise ConfigError(f"{look.password_file} is empty: its first line is the password", source="--password-file")
+    return password
 
 
 def is_near(host: str) -> bool:
@@ -110,7 +141,7 @@ def _tls(look: Look) -> ssl.SSLContext | None:
     return context
 
 
-async def _view(look: Look, guard: Guard, context: ssl.SSLContext | None) -> None:
+async def _view(look: Look, door: Door, context: ssl.SSLContext | None) -> None:
     async with contextlib.AsyncExitStack() as stack:
         sources = await stack.enter_async_context(_sources(look))
         advise = None
@@ -120,13 +151,13 @@ async def _view(look: Look, guard: Guard, context: ssl.SSLContext | None) -> Non
             advisers = Advisers(look.adviser, look.connect, look.tls, insecure=look.insecure)
             stack.push_async_callback(advisers.close)
             advise = advisers.send
-        server = Server(sources, guard, advise)
+        server = Server(sources, door, advise)
         runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
         stack.push_async_callback(runner.cleanup)
         await runner.setup()
-        await _listen(runner, look, context)
-        scheme = "https" if guard.secure else "http"
-        address = f"{scheme}://{_name(look.host)}:{runner.addresses[0][1]}/?{TOKEN}={guard.token}"
+        port = await stack.enter_async_context(_listening(runner, look, context))
+        scheme = "https" if door.is_secure else "http"
+        address = f"{scheme}://{_name(look.host)}:{port}/?{TOKEN}={door.token}"
         stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
         if look.opens:
             with contextlib.suppress(webbrowser.Error):
@@ -141,12 +172,19 @@ def _name(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-async def _listen(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> None:
+@contextlib.asynccontextmanager
+async def _listening(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> AsyncIterator[int]:
+    """Take connections for the application, and yield the port."""
+    assert runner.server is not None
+    patience, listening = Patience(runner.server), bound(look.host.strip("[]"), look.port)
+    handshake_s = None if context is None else HANDSHAKE_S
+    server = await asyncio.get_running_loop().create_server(
+        patience, sock=listening, ssl=context, ssl_handshake_timeout=handshake_s
+    )
     try:
-        await web.TCPSite(runner, look.host, look.port, ssl_context=context).start()
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise ConfigError(f"{look.host}:{look.port} cannot be served: {why}; --port names another port") from None
+        yield listening.getsockname()[1]
+    finally:
+        server.close()
 
 
 @contextlib.asynccontextmanager

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 from aiohttp import WSMsgType, web
 from pydantic import ValidationError
 
-from khala.view.guard import Guard, policy_of
+from khala.doors.pages import guarded
+from khala.view.guard import policy_of, welcoming
 from khala.view.runs import NotThere, Opened
 from khala.view.wire import MOST_SCENES, AdviceNote, Note
 from khala_protocol.errors import KhalaError
@@ -25,6 +26,7 @@ from khala_protocol.errors import KhalaError
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
 
+    from khala.doors.rules import Door
     from khala.view.sources import Sources
 
 log = logging.getLogger(__name__)
@@ -58,17 +60,17 @@ class Server:
 
     Args:
         sources: what can be opened.
-        guard: who may ask.
+        door: who may ask.
         advise: sends advice to the agents of a run; None if the view may not.
     """
 
     def __init__(
         self,
         sources: Sources,
-        guard: Guard,
+        door: Door,
         advise: Callable[[str, AdviceNote], Awaitable[None]] | None = None,
     ) -> None:
-        self._sources, self._guard, self._advise = sources, guard, advise
+        self._sources, self._door, self._advise = sources, door, advise
         self._opened: OrderedDict[str, Opened] = OrderedDict()
         self._changed: dict[str, asyncio.Event] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -77,7 +79,8 @@ class Server:
 
     def application(self) -> web.Application:
         """Return the application."""
-        application = web.Application(middlewares=[self._guard.middleware()], client_max_size=MOST_MESSAGE_BYTES)
+        middlewares = [guarded(self._door), welcoming(self._door)]
+        application = web.Application(middlewares=middlewares, client_max_size=self._door.most_body_bytes)
         episode, step = r"/api/runs/{run}/episodes/{episode:\d{1,9}}", r"/steps/{step:\d{1,9}}"
         application.add_routes([
             web.get("/", self._index),

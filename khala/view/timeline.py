@@ -104,9 +104,19 @@ def _loops(rows: Sequence[dict[str, Any]]) -> list[int]:
     loops: list[int] = []
     before = 0
     for row in rows:
-        loops.append(row.get("loop", before))
-        before = row.get("after", loops[-1])
+        loops.append(loop_of(row, before))
+        before = whole_number(row.get("after"), loops[-1])
     return loops
+
+
+def loop_of(row: dict[str, Any], before: int) -> int:
+    """Return the game loop at which a step begins; where no message says it, that at which the step before ended."""
+    return whole_number(row.get("loop"), before)
+
+
+def whole_number(value: float | None, otherwise: int) -> int:
+    """Return a number of the index as a whole one; anybody may have written null or a fraction into a recording."""
+    return otherwise if value is None else int(value)
 
 
 def _curves(rows: Sequence[dict[str, Any]]) -> Iterator[Curve]:

@@ -264,7 +264,7 @@ async def test_two_clients_play_the_two_seats_of_a_match_over_http(
     assert second[0].startswith("# Who you are\nYou are Zealots")
     async with httpx.AsyncClient() as foreign:
         refused = await foreign.post(addresses["blue/Zealots"], json={}, headers={"Host": "evil.example"})
-    assert refused.status_code == 421
+    assert refused.status_code == 403
     signal.raise_signal(signal.SIGTERM)
     with pytest.raises(typer.Exit) as ended:
         await serving

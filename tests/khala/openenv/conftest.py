@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import uvicorn
 
-from khala.openenv.server import app_of
+from khala.openenv.server import app_of, server_config
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -29,7 +29,7 @@ async def _serving(settings: Settings | None = None, **options: Any) -> AsyncIte
     """Yield the address of a server; sessions that are open at its end are closed."""
     app = app_of(settings, **options)
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        server = _Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=2, ws="websockets-sansio"))
+        server = _Server(server_config(app, timeout_graceful_shutdown=2))
         task = asyncio.create_task(server.serve(sockets=[listening]))
         try:
             yield f"http://127.0.0.1:{listening.getsockname()[1]}"

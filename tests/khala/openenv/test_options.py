@@ -77,9 +77,12 @@ def test_a_session_plays_the_first_side_unless_it_names_another_agent() -> None:
 
 async def test_http_says_what_is_wrong_with_a_status_of_its_own() -> None:
     transport = httpx.ASGITransport(app_of())
-    async with httpx.AsyncClient(transport=transport, base_url="http://khala") as client:
+    async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
         early = await client.post("/step", json={"action": {"reply": ""}})
-        assert (early.status_code, early.json()) == (409, {"detail": "there is no episode: call reset first"})
+        assert (early.status_code, early.json()) == (
+            409,
+            {"detail": "there is no episode of this client: call reset first, and give the episode_id that it returns"},
+        )
         wrong = await client.post("/reset", json={"sead": 1})
         assert wrong.status_code == 422
         assert wrong.json()["detail"].startswith("reset:1 (sead): no such field, did you mean 'seed'?")

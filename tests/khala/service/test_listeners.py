@@ -6,6 +6,7 @@ import json
 import logging
 from typing import TYPE_CHECKING
 
+import httpx
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from prometheus_client import generate_latest
@@ -114,3 +115,21 @@ def times(span: ReadableSpan) -> tuple[int, int]:
 def seconds(span: ReadableSpan) -> float:
     begins, ends = times(span)
     return (ends - begins) / 1e9
+
+
+async def test_metrics_are_for_programs_of_this_machine() -> None:
+    metrics = Metrics()
+    metrics.hear(report())
+    async with metrics.serve(0) as port, httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}") as client:
+        answer = await client.get("/metrics")
+        assert (answer.status_code, "khala_steps_total 1.0" in answer.text) == (200, True)
+        assert answer.headers["Content-Type"].startswith("text/plain; version=")
+        for headers in (
+            {"Host": "evil.example"},
+            {"Origin": "http://evil.example"},
+            {"Origin": "http://localhost:9"},
+            {"Sec-Fetch-Site": "cross-site"},
+        ):
+            assert (await client.get("/metrics", headers=headers)).status_code == 403
+        assert (await client.post("/metrics", content=b"x" * 100_000)).status_code == 413
+        assert (await client.get("/")).status_code == 404

@@ -7,6 +7,7 @@ import gzip
 import html
 import json
 import re
+import stat
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -52,6 +53,16 @@ def test_it_has_the_answers_of_the_server(tmp_path: Path) -> None:
         assert answers[f"{run}/episodes/0/steps/{step}/agents/blue/{AGENT}"] == asked
     (picture,) = (answer for name, answer in answers.items() if "/images/" in name)
     assert picture.startswith("data:image/png;base64,")
+
+
+@pytest.mark.parametrize("before", [None, 0o644])
+def test_its_user_alone_reads_it(tmp_path: Path, before: int | None) -> None:
+    out = tmp_path / "out.html"
+    if before is not None:
+        out.touch()
+        out.chmod(before)
+    write(tmp_path)
+    assert stat.S_IMODE(out.stat().st_mode) == 0o600
 
 
 def test_two_runs_are_in_one_file(tmp_path: Path) -> None:

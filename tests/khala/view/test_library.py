@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import re
 import shutil
-from typing import TYPE_CHECKING, BinaryIO
+from pathlib import Path
+from typing import BinaryIO, get_type_hints
 
 import pytest
 
-from khala.view import library
+from khala.view import library, serve
+from khala.view.cli import view
 from khala.view.library import found_in, lines, read_head, run_id
-from khala.view.serve import Look, guard_of, is_near
+from khala.view.serve import PASSWORD, Look, door_of, is_near, password_of
 from khala.view.sources import Sources, find
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording, summary
 from khala_protocol.recording.chunks import chunk_at
 from khala_protocol.recording.summary import Summary
 from tests.khala.view.made import AGENT, RUN, STEPS, make
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_a_line_says_what_a_scan_of_the_whole_file_would(tmp_path: Path) -> None:
@@ -128,10 +127,40 @@ def test_only_this_machine_may_look_without_a_password(host: str, near: bool) ->
     assert is_near(host) is near
     look = Look(given=(), host=host)
     if near:
-        assert "127.0.0.1" in guard_of(look).names
+        assert door_of(look).is_near
     else:
         with pytest.raises(ConfigError, match="--password"):
-            guard_of(look)
+            door_of(look)
+
+
+def test_a_password_comes_from_a_file_or_the_environment_or_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "password"
+    file.write_text("from a file\nnot this\n")
+    assert password_of(Look(given=())) == ""
+    assert password_of(Look(given=(), password_file=file)) == "from a file"
+    monkeypatch.setenv(PASSWORD, "from the environment")
+    assert password_of(Look(given=())) == "from the environment"
+    monkeypatch.setattr(serve, "getpass", lambda prompt: f"typed at {prompt}")
+    assert password_of(Look(given=(), asks_password=True)) == "typed at Password: "
+
+
+@pytest.mark.parametrize(
+    ("written", "says"),
+    [(b"", "is empty: its first line"), (b"\xff", "it is no text in UTF-8"), (None, "No such file or directory")],
+)
+def test_a_password_file_that_holds_none_is_refused(tmp_path: Path, written: bytes | None, says: str) -> None:
+    file = tmp_path / "password"
+    if written is not None:
+        file.write_bytes(written)
+    with pytest.raises(ConfigError, match=f"^--password-file: .*{says}"):
+        password_of(Look(given=(), password_file=file))
+
+
+def test_no_option_holds_a_password_that_others_could_read_in_the_list_of_processes() -> None:
+    options = {name: kind for name, kind in get_type_hints(view).items() if "password" in name}
+    assert options == {"password": bool, "password_file": Path | None}
 
 
 def test_agents_are_those_of_the_run_card(tmp_path: Path) -> None:
