@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import sys
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -19,6 +18,7 @@ from starlette.routing import Mount
 from khala.exit_codes import SIGNALLED
 from khala.listening import bound
 from khala.mcp.server import server_of
+from khala_protocol.commandline import say
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ async def over_http(table: Table, port: int) -> None:
     app = Starlette(routes=[Mount(f"/{seat}", app=one) for seat, one in apps.items()], lifespan=running)
     with bound(HOST, port) as listening:
         for seat in table.seats:
-            sys.stderr.write(f"{seat}: http://{HOST}:{listening.getsockname()[1]}/{seat}/mcp\n")
+            say(f"{seat}: http://{HOST}:{listening.getsockname()[1]}/{seat}/mcp", err=True)
         server = _Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=1))
         signalled = _first_signal()
         signalled.add_done_callback(lambda _: server.end())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from khala.listening import bound
 from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def run_openenv(wanted: Wanted) -> None:
         ) from None
     app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s)
     with bound(wanted.host, wanted.port) as listening:
-        sys.stderr.write(f"http://{wanted.host}:{listening.getsockname()[1]}\n")
+        say(f"http://{wanted.host}:{listening.getsockname()[1]}", err=True)
         config = uvicorn.Config(app, log_config=None, ws="websockets-sansio", timeout_graceful_shutdown=5)
         uvicorn.Server(config).run(sockets=[listening])
 

@@ -1,19 +1,26 @@
-"""Read files that others name: regular ones of a limited size, so that no pipe or device stops or fills a process.
+"""Read files that others name, and write files for their user alone.
 
-Every refusal is an `OSError` whose `strerror` is a sentence, as those of the operating system are.
+What is read is a regular file of a limited size, so that no pipe or device stops or fills a process. What is written
+holds prompts, replies or results: other users of the machine may not read it, whatever the umask says, and a file that
+could not be written whole leaves what was in its place. Every refusal is an `OSError` whose `strerror` is a sentence,
+as those of the operating system are.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import stat
-from typing import TYPE_CHECKING
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterator
 
 MB = 2**20
+_DEVICES = Path("/dev")
 
 
 def check_regular(path: Path) -> None:
@@ -40,3 +47,64 @@ def read_limited(path: Path, most_bytes: int) -> bytes:
     if len(data) > most_bytes:
         raise OSError(errno.EFBIG, f"it is larger than {most_bytes / MB:g} MB", str(path))
     return data
+
+
+def make_private(directory: Path) -> None:
+    """Create a directory, and those above it that are missing, for its user alone; one that is there stays as it is."""
+    missing = [path for path in (directory, *directory.parents) if not path.exists()]
+    for path in reversed(missing):
+        path.mkdir(mode=0o700, exist_ok=True)
+    if not directory.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(directory))
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Open a new file that takes its place under `path` when it is whole.
+
+    If writing fails, what was there stays, and nothing of the new file does. A link is replaced, not followed: it may
+    have been put there to have another file overwritten. A pipe or a device is written as it is.
+    """
+    if _is_stream(path):
+        with path.open("wb") as stream:
+            yield stream
+        return
+    with _named(path):
+        descriptor, name = tempfile.mkstemp(prefix=".part-", dir=path.parent)  # its mode is 0600
+    part = Path(name)
+    try:
+        with _named(path):
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+            part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def write_private(path: Path, content: bytes | str) -> None:
+    """Write a whole file; see `replacing`."""
+    with replacing(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
+def append_private(path: Path) -> BinaryIO:
+    """Open a file to write at its end, such as a log."""
+    return open(path, "ab", opener=_private)  # Path.open takes no opener
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
+
+
+def _is_stream(path: Path) -> bool:
+    return path.parent == _DEVICES or (path.exists() and not path.is_file() and not path.is_dir())
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Have an `OSError` name the file that is written: that of a full disk names none."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
