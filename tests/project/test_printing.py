@@ -19,10 +19,8 @@ PACKAGES = ("agents/khala_agents", "bridge/khala_bridge", "orchestrator/khala_or
 WRITERS = {"typer.echo", "typer.secho", "click.echo", "print", "sys.stdout.write", "sys.stderr.write", "rich.print"}
 HINT = re.compile(r"echo\(|\bprint\(|std(out|err)\.write|Console\(|from_markup|TextColumn|rich\.markup")
 PLACES = {
-    "protocol/khala_protocol/commandline.py": "`say` is the place",
-    "orchestrator/khala_orchestrator/console.py": "the consoles are the place",
     "simulator/khala_simulator/cli.py": "stands alone, and has a `_say` of its own",
-    "simulator/khala_simulator/process/lan.py": "its sentences hold numbers alone",
+    "simulator/khala_simulator/process/lan.py": "stands alone, and prints one sentence in ASCII",
 }
 PIPES = {
     "khala/experiment/worker.py": "JSON to its parent",
