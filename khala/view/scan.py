@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import logging
+import os
 import re
 import secrets
 import sqlite3
@@ -145,7 +146,7 @@ class Scanner:
         """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
         with contextlib.suppress(*WRONG):  # of another version, or of somebody else
             state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
-            if state["fingerprint"] == fingerprint(file, state["offset"]):
+            if state["fingerprint"] == fingerprint(file, state["offset"]) and not _has_changed(file, state["file"]):
                 keys = {int(number): key for number, key in state["keys"].items()}
                 scan = Scan(state["offset"], keys=keys, expected=state["expected"])
                 scan.ended, scan.broken = state["ended"], state["broken"]
@@ -235,6 +236,7 @@ class Scanner:
         self._note("ended", scan.ended)
         self._note("broken", scan.broken)
         self._note("fingerprint", fingerprint(file, scan.offset))
+        self._note("file", _state(file))
         if self._memory.scenes:
             self._note("scenes", "whole" if self._memory.whole else "seen")
         if newest is not None:
@@ -296,6 +298,18 @@ def fingerprint(file: BinaryIO, offset: int) -> str:
     head = file.read(min(offset, 4096))
     file.seek(max(0, offset - 4096))
     return hashlib.sha256(head + file.read(min(offset, 4096)) + str(offset).encode()).hexdigest()
+
+
+def _state(file: BinaryIO) -> list[int]:
+    """Return what changes with every write to a file, and cannot be set as its time of change can."""
+    state = os.fstat(file.fileno())
+    return [state.st_size, state.st_ino, state.st_ctime_ns]
+
+
+def _has_changed(file: BinaryIO, known: list[int]) -> bool:
+    """Return whether a file was written to since it was known, but for what a recorder adds at its end."""
+    now = _state(file)
+    return now[0] < known[0] or (now[0] == known[0] and now != known)
 
 
 @cache

@@ -76,8 +76,8 @@ def test_every_place_that_may_print_does() -> None:
     "line",
     [
         "typer.echo(text)", "typer.echo(f'{a}')", "print(text, file=sys.stderr)", "sys.stderr.write(text)",
-        "Console().print(table)", "rich.console.Console()", "Text.from_markup(text)", "TextColumn('{task.description}')",
-        "from rich.markup import escape",
+        "Console().print(table)", "rich.console.Console()", "Text.from_markup(text)",
+        "TextColumn('{task.description}')", "from rich.markup import escape",
     ],
 )  # fmt: skip
 def test_a_way_past_it_is_found(line: str) -> None:
