@@ -15,6 +15,7 @@ import contextlib
 import fcntl
 import json
 import logging
+import re
 import sqlite3
 import weakref
 from dataclasses import astuple, dataclass, replace
@@ -31,7 +32,7 @@ from khala.matches import free_recording, tries_in
 from khala.minds import spent_usd
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.files import append_private, make_private, write_private
+from khala_protocol.files import make_private, open_private, write_private
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ create table calls (
 );
 create index calls_of_match on calls(match);
 """
+_REPETITION = re.compile("[0-9]{1,9}")
 _TYPES = {"str": "text", "int": "integer", "float": "real", "bool": "integer"}
 _READ = {"str": (str,), "int": (int,), "float": (int, float, type(None)), "bool": (int,)}
 """What SQLite has for each type of a measure; nothing for a number that is none."""
@@ -129,7 +131,7 @@ class Store:
         Raises:
             ConfigError: another one is at work here.
         """
-        with append_private(self.directory / LOCK) as lock:
+        with open_private(self.directory / LOCK, "ab") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
@@ -141,7 +143,8 @@ class Store:
                 self._is_locked = False
 
     def recording_for(self, key: str) -> Path:
-        """Return an unused path for the recording of a match."""
+        """Return an unused path for the recording of a match, in a directory that is there."""
+        make_private(self.directory / MATCHES / key)
         return free_recording(self.directory / MATCHES / key)
 
     # --- the index ----------------------------------------------------------------------------------
@@ -270,6 +273,9 @@ class Store:
         except RecordingError:
             return None
         if (card := recording.run) is None:
+            return None
+        if not _REPETITION.fullmatch(card.labels.get("repetition", "0")):
+            log.warning("%s has labels that no experiment gives: it is left out", path)
             return None
         rows = measure_with_calls(recording)
         costs = [_cost_usd(other) for other in path.parent.glob("recording*.mcap") if other != path]

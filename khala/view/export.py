@@ -17,7 +17,7 @@ from khala.view.runs import NotThere
 from khala.view.scan import whole
 from khala.view.wire import SCENES_AT_ONCE
 from khala_protocol.errors import ConfigError, KhalaError
-from khala_protocol.files import MB
+from khala_protocol.files import MB, write_private
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -101,7 +101,7 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
             run.index.close()
     text = _together(page, packer.text())
     try:
-        path.write_text(text, encoding="utf-8")
+        write_private(path, text)
     except OSError as error:
         raise ConfigError(f"{path} cannot be written: {error.strerror}; choose another place") from None
     return len(text)

@@ -43,7 +43,7 @@ class _VisibleConsole(Console):
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
 
-    def render_str(self, text: str, **how: Any) -> Text:  # type: ignore[override]  # all of its options
+    def render_str(self, text: str, **how: Any) -> Text:
         """Return a text, of which every character counts when a table measures its columns."""
         return super().render_str(visible(text), **how)
 

@@ -46,10 +46,11 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
         errors: further types of such errors, in addition to `KhalaError`.
     """
     user_errors: tuple[type[Exception], ...] = (KhalaError, *errors)
+    all_errors: tuple[type[Exception], ...] = (*user_errors, OSError)
     faults: list[BaseException] = []
     try:
         command()
-    except* (*user_errors, OSError) as group:
+    except* all_errors as group:
         ours, others = group.split(lambda error: isinstance(error, user_errors) or _is_of_the_machine(error))
         if others is not None:
             raise others from None

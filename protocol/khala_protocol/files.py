@@ -11,13 +11,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 import stat
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 MB = 2**20
 _DEVICES = Path("/dev")
@@ -82,15 +83,41 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
+@contextlib.contextmanager
+def replacing_directory(path: Path) -> Iterator[Path]:
+    """Yield a new directory that takes the place of none or of an empty one under `path` when it is whole."""
+    path = path.resolve()
+    with _named(path):
+        make_private(path.parent)
+        part = Path(tempfile.mkdtemp(prefix=".part-", dir=path.parent))  # its mode is 0700
+    try:
+        yield part
+        with _named(path):
+            if path.exists():
+                path.rmdir()
+            part.rename(path)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+
+
 def write_private(path: Path, content: bytes | str) -> None:
     """Write a whole file; see `replacing`."""
-    with replacing(path) as file:
-        file.write(content.encode() if isinstance(content, str) else content)
+    write_together({path: content.encode() if isinstance(content, str) else content})
 
 
-def append_private(path: Path) -> BinaryIO:
-    """Open a file to write at its end, such as a log."""
-    return open(path, "ab", opener=_private)  # Path.open takes no opener
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write files so that either all of them are new or none is; see `replacing`."""
+    with contextlib.ExitStack() as stack:
+        for path, content in files.items():
+            file = stack.enter_context(replacing(path))
+            file.write(content)
+            file.flush()
+
+
+def open_private(path: Path, mode: Literal["ab", "wb", "xb"]) -> BinaryIO:
+    """Open a file that is written bit by bit, such as a log."""
+    return open(path, mode, opener=_private)  # Path.open takes no opener
 
 
 def _private(path: str, flags: int) -> int:

@@ -224,9 +224,14 @@ def recover(path: Path | str, new_path: Path | str) -> Recording:
         RecordingError: `path` is not a recording, or `new_path` exists or cannot be written.
     """
     old = Recording.open(path)
-    with Recorder(new_path, metadata=old.metadata) as recorder:
-        for sample in old:
-            recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    recorder = Recorder(new_path, metadata=old.metadata)
+    try:
+        with recorder:
+            for sample in old:
+                recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    except BaseException:
+        recorder.path.unlink(missing_ok=True)  # half of a copy says less than the old file
+        raise
     return Recording.open(new_path)
 
 
