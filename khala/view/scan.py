@@ -29,6 +29,7 @@ from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import MOST
 from khala_protocol.recording.chunks import Scan
 from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
+from khala_protocol.recording.speaker import fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,7 +49,7 @@ LEASE_S = 5.0
 BUSY_S = 0.5
 """Between two tries to get the lease that another viewer has."""
 _HEAD = re.compile(
-    rb'\{"v":1,"run":"[\w.-]+","kind":"\w+",(?:"agent":"[\w.-]+",)?(?:"side":"[\w.-]+",)?'
+    rb'\{"v":1,"run":"([\w.-]+)","kind":"\w+",(?:"agent":"([\w.-]+)",)?(?:"side":"([\w.-]+)",)?'
     rb'"episode":(\d{1,15}),"step":(\d{1,15}),'
 )
 """The beginning of a message of a step, as `khala_protocol.codec` writes it: most need not be read further."""
@@ -192,8 +193,10 @@ class Scanner:
         """
         head = _HEAD.match(payload) if address.topic in _PLAIN else None
         if head and not self._is_read(batch, address):
-            return int(head[1]), int(head[2])
+            _check_speaker(address, *(name and name.decode() for name in head.group(1, 3, 2)))
+            return int(head[4]), int(head[5])
         said = from_json(payload, allow_inf_nan=False, cache_strings="none")
+        _check_speaker(address, *map(said.get, ("run", "side", "agent")))
         place = _count(said.get("episode", 0)), _count(said.get("step", 0))
         match address.topic:
             case Topic.RUN:
@@ -284,6 +287,11 @@ class Scanning:
             self._index.is_broken = isinstance(error, sqlite3.DatabaseError)
             log.warning("the index %s cannot be written: %s", self._index.path, error)
             self._changed()
+
+
+def _check_speaker(address: Address, run: object, side: object, agent: object) -> None:
+    if not fits(address, run, side, agent):
+        raise ValueError(f"{side}/{agent} of {run} is named under the key of somebody else")
 
 
 def _count(value: object) -> int:

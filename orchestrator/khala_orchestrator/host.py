@@ -76,8 +76,9 @@ async def host(
         flush = _nothing
         if config.record is not None:
             recorder = stack.enter_context(_recorder(config, config.record, past))
-            bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
-            await stack.enter_async_context(Listener(bus, config.run))
+            flush = recorder.flush
+            bus = recording = RecordingBus(bus, recorder, seats)
+            await stack.enter_async_context(Listener(recording, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
         inbox = await stack.enter_async_context(AdviceInbox(bus, config.run, advisers))

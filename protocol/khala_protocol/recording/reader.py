@@ -21,6 +21,7 @@ from khala_protocol.files import MB, check_regular
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
 from khala_protocol.recording.recorder import KINDS, LEFT_OUT, LIBRARY, METADATA, Recorder
+from khala_protocol.recording.speaker import is_said_by
 from khala_protocol.recording.unpack import BROKEN, unpacked
 
 if TYPE_CHECKING:
@@ -66,13 +67,14 @@ class Recorded:
 
     @cached_property
     def message(self) -> Wire | None:
-        """The message; None if the bytes are not of this protocol, too many, or a picture."""
-        if len(self.payload) > MAX_MESSAGE_BYTES or (self.address and self.address.topic is Topic.IMAGE):
+        """The message; None if there is none: a picture, too many bytes, or words in the mouth of somebody else."""
+        if len(self.payload) > MAX_MESSAGE_BYTES or self.address is None or self.address.topic is Topic.IMAGE:
             return None
         try:
-            return decode(self.payload)
+            message = decode(self.payload)
         except PeerError:
             return None
+        return message if is_said_by(self.address, message) else None
 
 
 @dataclass(frozen=True)
