@@ -214,3 +214,20 @@ def test_messages_that_are_none_change_no_answer(tmp_path: Path) -> None:
 def test_replies_need_not_be_read_to_be_found(path: Path) -> None:
     found = opened(path).index.rows("select count(*), count(distinct step) from sample where topic = ?", Topic.REPLY)
     assert found == [(STEPS, STEPS)]
+
+
+def test_words_in_the_mouth_of_another_agent_are_found_under_no_agent(tmp_path: Path) -> None:
+    """Neither where a message is read nor where only its beginning is looked at."""
+    path = tmp_path / "foreign.mcap"
+    with Recorder(path) as recorder:
+        put(recorder, *begin())
+        put(recorder, *step_of(0))
+        for message in step_of(0):
+            key = key_of(message)
+            if key.endswith(("/reply", "/exchange", "/observation")):
+                recorder.write(key.replace("/blue/", "/red/"), encode(message))
+                recorder.write(key, encode(message).replace(b'"run":"made"', b'"run":"other"', 1))
+    with contextlib.closing(opened(path).index) as index:
+        found = index.rows("select topic, side, count(*) from sample where agent != '' group by topic, side")
+    assert {side for _, side, _ in found} == {"blue"}
+    assert {topic: count for topic, _, count in found}["reply"] == 1
