@@ -45,7 +45,7 @@ def connect(path: Path, schema: str, version: int | None = None) -> sqlite3.Conn
     Raises:
         sqlite3.DatabaseError: it is broken, or has other tables or another version.
     """
-    if path.is_symlink() or (path.exists() and not path.is_file()):  # a pipe would be waited for
+    if path.is_symlink() or not path.is_file():  # a pipe would be waited for, and a new file made
         raise sqlite3.DatabaseError("it is no file")
     db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
     try:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from bench.doors import files
+
 if TYPE_CHECKING:
     from bench.doors.rows import Row
 
-ROWS: Final[tuple[Row, ...]] = (*(),)
+ROWS: Final[tuple[Row, ...]] = (*files.ROWS,)

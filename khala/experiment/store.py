@@ -287,7 +287,8 @@ class Store:
 
     def adopt(self) -> None:
         """Take in recordings of a runner that was killed: what its matches have cost counts."""
-        known = self.played()
+        make_private(self.directory)
+        known = self._ask(_played)  # begins an index if there is none, and nothing to make it of
         for tries in self._tries():
             key = tries[0].parent.name
             if key not in known or known[key].attempts < len(tries):

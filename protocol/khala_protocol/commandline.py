@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT})
 _OF_THE_MACHINE: Final = _FULL | {
     errno.EACCES, errno.EPERM, errno.EROFS, errno.EIO, errno.EFBIG, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG,
-    errno.ELOOP, errno.EEXIST, errno.ENOENT, errno.EMFILE, errno.ENFILE,
+    errno.ELOOP, errno.EBUSY, errno.EEXIST, errno.ENOENT, errno.EMFILE, errno.ENFILE,
 }  # fmt: skip
 """Faults of a disk or of a path, which the user can mend."""
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 MB = 2**20
 _DEVICES = Path("/dev")
+_PART = ".part-"
+"""How the names of files and directories begin that are not whole yet."""
 
 
 def check_regular(path: Path) -> None:
@@ -70,8 +72,10 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         with path.open("wb") as stream:
             yield stream
         return
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     with _named(path):
-        descriptor, name = tempfile.mkstemp(prefix=".part-", dir=path.parent)  # its mode is 0600
+        descriptor, name = tempfile.mkstemp(prefix=_PART, dir=path.parent)  # its mode is 0600
     part = Path(name)
     try:
         with _named(path):
@@ -89,7 +93,7 @@ def replacing_directory(path: Path) -> Iterator[Path]:
     path = path.resolve()
     with _named(path):
         make_private(path.parent)
-        part = Path(tempfile.mkdtemp(prefix=".part-", dir=path.parent))  # its mode is 0700
+        part = Path(tempfile.mkdtemp(prefix=_PART, dir=path.parent))  # its mode is 0700
     try:
         yield part
         with _named(path):
@@ -134,4 +138,6 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        if error.filename is not None and _PART not in str(error.filename):
+            raise
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -215,7 +214,7 @@ async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBr
     assert recorded(tmp_path / "run.mcap") == [(EXCHANGE, b"at the last moment")]
 
 
-def asked(step: int = 0, **changes: Any) -> bytes:
+def asked(*, step: int = 0, **changes: Any) -> bytes:
     call = ModelCall(
         run=RUN, side="blue", agent="Stalkers", episode=0, step=step, attempt=1, model="m", endpoint="http://m/v1",
         prompt=(), completion="for Aiur", status="ok", started_s=0.0, latency_s=1.5,
@@ -223,7 +222,7 @@ def asked(step: int = 0, **changes: Any) -> bytes:
     return encode(call.but(**changes))
 
 
-def said(step: int = 0, attempts: int = 1, **changes: Any) -> bytes:
+def said(*, step: int = 0, attempts: int = 1, **changes: Any) -> bytes:
     reply = Reply(run=RUN, side="blue", agent="Stalkers", episode=0, step=step, text="", attempts=attempts)
     return encode(reply.but(**changes))
 
@@ -251,13 +250,16 @@ async def test_the_end_of_a_match_waits_for_exchanges_that_the_last_reply_announ
     exchanges = await broker.session().publisher(EXCHANGE, Delivery.LOG)
     loop = asyncio.get_running_loop()
     sending: list[asyncio.Task[None]] = []
+
+    def send_later(payload: bytes) -> None:
+        sending.append(asyncio.ensure_future(exchanges.put(payload)))
+
     async with match(broker, tmp_path / "run.mcap") as send:
         for attempt in range(1, 3 - late):
             await exchanges.put(asked(attempt=attempt))
         await send(said(attempts=2))
         for attempt in range(3 - late, 3):  # after the match has ended
-            put = partial(exchanges.put, asked(attempt=attempt))
-            loop.call_later(0.0006 * attempt, lambda put=put: sending.append(loop.create_task(put())))
+            loop.call_later(0.0006 * attempt, send_later, asked(attempt=attempt))
         began = loop.time()
     assert loop.time() - began < LAST_EXCHANGES_S / 2
     calls = list(Recording.open(tmp_path / "run.mcap").of(ModelCall))
@@ -312,7 +314,7 @@ async def test_it_waits_for_what_never_comes_only_so_long_and_not_at_all_after_a
 
 @pytest.mark.parametrize("changes", [{"agent": "Zealots"}, {"side": "red"}, {"run": "other"}])
 async def test_words_in_the_mouth_of_another_agent_are_counted_and_not_recorded(
-    broker: MemoryBroker, tmp_path: Path, changes: dict[str, str]
+    broker: MemoryBroker, tmp_path: Path, changes: dict[str, Any]
 ) -> None:
     """The host hears of them, and calls the reply malformed."""
     exchanges = await broker.session().publisher(EXCHANGE, Delivery.LOG)
