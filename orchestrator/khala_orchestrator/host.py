@@ -21,6 +21,7 @@ from khala_orchestrator.roster import Roster
 from khala_orchestrator.scenery import Scenery
 from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Turn
+from khala_protocol.errors import RecordingError
 from khala_protocol.garbage import tidy_memory
 from khala_protocol.recording import Recorder
 
@@ -169,6 +170,10 @@ class _PublishingObserver:
         if self._flushing is not None:
             self._flushing.cancel()
 
+    def _flush_early(self) -> None:
+        with contextlib.suppress(RecordingError):  # of a full disk, which the end of the step reports
+            self._flush()
+
     async def go_live(self) -> None:
         """Publish from now on, beginning with the briefings of the episode and its map."""
         self.live = True
@@ -194,7 +199,7 @@ class _PublishingObserver:
     async def scene(self, scene: Scene) -> None:
         if self.live:
             await self._announcer.scene(scene)
-            self._flushing = asyncio.get_running_loop().call_later(_LONG_STEP_S, self._flush)
+            self._flushing = asyncio.get_running_loop().call_later(_LONG_STEP_S, self._flush_early)
         else:
             self._scene = scene
 
