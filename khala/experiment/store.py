@@ -199,8 +199,9 @@ class Store:
 
     def _filled(self, index: sqlite3.Connection) -> sqlite3.Connection:
         for tries in self._tries():
-            if (found := self.read(_best(tries), attempts=len(tries))) is not None:
-                _add(index, *found)
+            best = _best(tries)
+            if (found := self.read(best, attempts=len(tries))) is not None:
+                _take(index, best, *found)
         return index
 
     def _tries(self) -> Iterator[list[Path]]:
@@ -258,7 +259,7 @@ class Store:
     def take(self, path: Path, *, attempts: int) -> None:
         """Read a recording into the index; one without a run card says nothing."""
         if (found := self.read(path, attempts=attempts)) is not None:
-            self.add(*found)
+            self._ask(lambda index: _take(index, path, *found))
 
     def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
@@ -408,6 +409,14 @@ def _created(path: Path) -> sqlite3.Connection:
 
 def _connected(path: Path) -> sqlite3.Connection:
     return indexes.connect(path, _schema(), VERSION)
+
+
+def _take(index: sqlite3.Connection, path: Path, played: Played, rows: Sequence[Row]) -> None:
+    """Note what a recording says, which may be anyone's."""
+    try:
+        _add(index, played, rows)
+    except OverflowError:
+        log.warning("%s has a number that is larger than SQLite's: it is left out", path)
 
 
 def _add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:

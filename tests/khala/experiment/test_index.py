@@ -224,5 +224,16 @@ def test_of_tries_that_all_crashed_the_one_with_the_largest_number_counts(direct
     assert Store(directory).played()[key].recording == f"{MATCHES}/{key}/recording-11.mcap"
 
 
+def test_a_recording_with_a_number_that_no_index_holds_is_left_out(
+    directory: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    match = matches()[0]
+    path = directory / MATCHES / match.key / "recording.mcap"
+    path.unlink()
+    record(path, match.config.model_copy(update={"seed": 2**70}))
+    assert Store(directory).rebuild() == 1
+    assert f"{path} has a number that is larger than SQLite's" in caplog.text
+
+
 def _full(*_: object, **__: object) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
