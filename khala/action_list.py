@@ -13,7 +13,6 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -21,6 +20,7 @@ from khala_bridge.catalogue.catalogue import GROUPS, Action, catalogue, example
 from khala_bridge.catalogue.coverage import coverage
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.knowledge import knowledge
+from khala_orchestrator.console import stdout_console
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -57,15 +57,15 @@ def print_actions(
         and (name is None or any(name.casefold() in each.casefold() for each in (action.name, *action.aliases)))
         and (wanted is None or action.function == wanted)
     ]
-    console = Console()
+    console = stdout_console()
     if as_json:
         typer.echo(json.dumps({"actions": [_plain(action) for action in found]}))
     elif not (everything or race or unit or group or name or function):
         console.print(_groups(known))
-        console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them", highlight=False)
+        console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them")
     else:
         for line in _listed(found, console.width) if found else [_none(wanted)]:
-            console.print(line, highlight=False, soft_wrap=True)
+            console.print(line, soft_wrap=True)
 
 
 def _place(action: Action) -> tuple[int, str]:

@@ -13,14 +13,13 @@ import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
-import typer
-
 from khala import local_bus
 from khala_orchestrator.console import clock, visible_message
 from khala_orchestrator.mailbox import EVERYONE
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
+from khala_protocol.commandline import say
 from khala_protocol.common_names import adviser_name
 from khala_protocol.errors import ConfigError, KhalaError, NoRouter
 from khala_protocol.joining import client_config
@@ -237,7 +236,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
 
     def show(message: Run | Report | Result) -> None:
         for line in [message.model_dump_json()] if as_json else told(message):
-            typer.echo(line)
+            say(line)
 
     async def advise_at(config: BusConfig, find_s: float) -> None:
         try:
@@ -246,7 +245,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
             what = "this machine plays no match of yours" if not connect else "the match is elsewhere, or over"
             raise NoMatch(f"{what}: {error.found}; --connect says where it is") from None
         try:
-            advising = Advising(bus, adviser, show=show, complain=lambda text: typer.echo(text, err=True))
+            advising = Advising(bus, adviser, show=show, complain=lambda text: say(text, err=True))
             await advising.play(lines_of(sys.stdin), find_s=find_s)
         finally:
             await bus.close()

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 
 from khala import environment
 from khala_protocol.errors import KhalaError
+from khala_protocol.files import open_private
 from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Spawn(Protocol):
 
 async def spawn(arguments: Sequence[str], environ: Mapping[str, str], log: Path) -> asyncio.subprocess.Process:
     """Start a new process; see `Spawn`."""
-    with log.open("ab") as stderr:
+    with open_private(log, "ab") as stderr:
         return await asyncio.create_subprocess_exec(
             sys.executable,
             "-P",  # with no module of the current directory on its path
@@ -168,5 +169,5 @@ class _Child:
         return PAUSES_S[self._failures - 1] if self._failures <= len(PAUSES_S) else None
 
     def _note(self, text: str) -> None:
-        with self._log.open("a", encoding="utf-8") as log:
-            log.write(f"{text}\n")
+        with open_private(self._log, "ab") as log:
+            log.write(f"{text}\n".encode())

@@ -63,7 +63,7 @@ from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop,
 from khala.view.cli import VIEW_EPILOG, view
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
-from khala_protocol.commandline import run_command
+from khala_protocol.commandline import run_command, say
 from khala_protocol.keys import check_name
 from khala_protocol.visible import VisibleFormatter
 
@@ -266,7 +266,7 @@ def doctor(
 def version(value: bool) -> None:  # typer calls it with the flag
     """Print the version and end."""
     if value:
-        typer.echo(f"khala {__version__}")
+        say(f"khala {__version__}")
         raise typer.Exit
 
 

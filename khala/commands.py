@@ -13,14 +13,12 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from khala.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala_orchestrator.commands import access_rules
-from khala_orchestrator.console import Progress, stderr_console
+from khala_orchestrator.console import Progress, stderr_console, stdout_console
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import cancelled_by_signal
@@ -106,9 +104,10 @@ def doctor(tls: Path | None, game: str | None, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps({"ok": not wrong, "findings": [finding.as_dict() for finding in findings]}))
     else:
-        marks = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "wrong": "[red]wrong[/]"}
+        marks = {"ok": "green", "note": "yellow", "wrong": "red"}
         table = Table(box=None, pad_edge=False, show_header=False)
         for finding in findings:
-            table.add_row(marks[finding.state], finding.name, finding.found, f"[dim]{escape(finding.advice)}[/]")
-        Console().print(table)
+            state, advice = Text(finding.state, marks[finding.state]), Text(finding.advice, "dim")
+            table.add_row(state, finding.name, finding.found, advice)
+        stdout_console().print(table)
     raise typer.Exit(FAILED if wrong else DONE)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from khala_orchestrator.cli import Json
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 
 INIT_EPILOG = """
@@ -96,9 +97,10 @@ def observer(
 @app.command()
 def show(directory: Directory, *, as_json: Json = False) -> None:
     """Show which certificates there are, and how long they are valid."""
-    from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
 
+    from khala_orchestrator.console import stdout_console  # noqa: PLC0415
     from khala_protocol.certificates import certificates  # noqa: PLC0415
 
     found = certificates(directory)
@@ -115,9 +117,9 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
     for column in ("name", "folder", "valid until", "days", "listens at"):
         table.add_column(column, overflow="fold")
     for one in found:
-        days = f"[red]{one.days_left}[/]" if one.warning else str(one.days_left)
+        days = Text(str(one.days_left), "red" if one.warning else "")
         table.add_row(one.name, one.path.parent.name, f"{one.ends:%Y-%m-%d}", days, ", ".join(one.hosts))
-    Console(highlight=False).print(table)
+    stdout_console().print(table)
 
 
 def _make(directory: Path, make: Callable[[], list[Path]]) -> None:
@@ -131,4 +133,4 @@ def _make(directory: Path, make: Callable[[], list[Path]]) -> None:
         at = f", which listens at {', '.join(made.hosts)}" if made.hosts else ""
         old = before.get(made.path)
         instead = f"; copies of the one before are good until {old.ends:%Y-%m-%d}" if old else ""
-        typer.echo(f"made {place}{at}{instead}", err=True)
+        say(f"made {place}{at}{instead}", err=True)

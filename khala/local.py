@@ -24,6 +24,7 @@ from khala.spending import ledger_of
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
+from khala_protocol.files import make_private
 from khala_protocol.messages import Report
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ async def _unless_one_dies(
 def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
     """Return the match with the name of its game, and the path of the game; create the directory."""
     try:
-        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_private(directory)
     except OSError as error:
         raise RecordingError(f"{directory} cannot be made: {error.strerror}; --out names another place") from None
     sc2path, name = games.find(game)

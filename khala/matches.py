@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import shlex
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,9 @@ RECORDED = {
 }
 """Options of what a run card holds, so that a match keeps them when it is gone on with. All others may be new: where it
 is played and recorded, how long it waits for its agents at the start, and how they decide."""
+
+
+_TRY = re.compile(r"recording(?:-([0-9]{1,9}))?\.mcap")
 
 
 def new_or_resumed(
@@ -135,13 +139,20 @@ def newest_recording(path: Path) -> Recording:
     """Return the recording at a path, or the newest one with a run card in the directory of a run."""
     if not path.is_dir():
         return Recording.open(path)
-    found = sorted(path.glob("recording*.mcap"), key=lambda file: file.stat().st_mtime)
+    found = tries_in(path)
     if not found:
         raise ConfigError(f"there is no recording in {path}: give the directory of a run, or a .mcap file")
     for file in reversed(found):
         if (recording := Recording.open(file)).run is not None:
             return recording
     return Recording.open(found[-1])
+
+
+def tries_in(directory: Path) -> list[Path]:
+    """Return the recordings of a match, as `free_recording` numbers them; when a file was copied says nothing."""
+    found = ((_TRY.fullmatch(path.name), path) for path in directory.glob("recording*.mcap"))
+    numbered = sorted((int(match[1] or 1), path) for match, path in found if match)
+    return [path for _, path in numbered]
 
 
 def free_recording(directory: Path) -> Path:

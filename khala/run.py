@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
-import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ import typer
 
 from khala.exit_codes import SIGNALLED
 from khala.spare import Spares
+from khala_protocol.commandline import say
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(wanted: Wanted, *, as_json: bool) -> None:
     results = asyncio.run(cancelled_by_signal(_played(wanted, known)))
     if not known:
         assert isinstance(results, signal.Signals)
-        sys.stderr.write("interrupted before the match began\n")
+        say("interrupted before the match began", err=True)
         raise typer.Exit(SIGNALLED + results)
     from khala.commands import end  # noqa: PLC0415  # see above
 

@@ -25,6 +25,7 @@ from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.commandline import say
 from khala_protocol.common_names import agent_name
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import BusError, ConfigError
@@ -267,7 +268,7 @@ async def _serve(endpoint: Endpoint, stop: asyncio.Event, ready_file: Path | Non
         if ready_file is not None:
             _write_whole(ready_file, ready)
         if as_json:
-            typer.echo(ready)
+            say(ready)
         await stop.wait()
         _say(f"{endpoint.requests} requests were answered")
 
@@ -295,4 +296,4 @@ def _until_signal(work: Callable[[asyncio.Event], Coroutine[Any, Any, T]]) -> T:
 
 
 def _say(text: str) -> None:
-    typer.echo(text, err=True)
+    say(text, err=True)

@@ -196,9 +196,16 @@ class Worker:
     def _is_new(self, observation: Observation) -> bool:
         """Return whether to decide; a host that goes on after it was killed asks for its open step word for word."""
         newest = self._newest
-        if newest is None or self._began_again:
+        if newest is None:
+            return True
+        here, before = ((one.episode, one.step) for one in (observation, newest))
+        if not self._began_again:
+            return here > before
+        try:
             return observation != newest
-        return (observation.episode, observation.step) > (newest.episode, newest.step)
+        except PeerError as error:  # views are read late, and a policy that looks at this one fails by itself
+            log.warning("agent %s: the view of step %d or %d cannot be read: %s", self._name, here[1], before[1], error)
+            return here != before
 
     async def _read(self, decode: Callable[[bytes], M], samples: Subscription[Sample]) -> AsyncIterator[M]:
         """Yield the messages that can be decoded, without anything else that arrives."""

@@ -10,10 +10,9 @@ import platform
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from khala import __version__
 from khala.calibrate import compare, report
@@ -26,12 +25,15 @@ from khala_bridge.calibrate.catalogue import choose
 from khala_bridge.calibrate.connection import started, version
 from khala_bridge.calibrate.record import Calibration, Values, load
 from khala_bridge.calibrate.run import play
-from khala_orchestrator.console import stderr_console
+from khala_orchestrator.console import stderr_console, stdout_console
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from rich.console import Console
 
     from khala_bridge.calibrate.probe import Probe
     from khala_bridge.calibrate.record import Measured
@@ -52,8 +54,8 @@ def show_probes(patterns: Sequence[str], *, as_json: bool) -> None:
         return
     table = Table("probe", "measures", "settles", "estimates", box=None, pad_edge=False)
     for one in probes:
-        table.add_row(one.id, escape(one.measures), escape(one.settles), str(len(waiting.get(one.id, [])) or ""))
-    Console().print(table)
+        table.add_row(one.id, one.measures, one.settles, str(len(waiting.get(one.id, [])) or ""))
+    stdout_console().print(table)
 
 
 def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:
@@ -63,7 +65,7 @@ def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(plain_value(found), default=Values.model_dump))
     else:
-        typer.echo(report.write(one, other, found), nl=False)
+        say(report.write(one, other, found).removesuffix("\n"))
 
 
 def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume: bool, as_json: bool) -> None:
@@ -106,7 +108,7 @@ def _earlier(out: Path, *, resume: bool) -> Calibration | None:
 
 
 def _progress(screen: Console) -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     return Progress(*columns, console=screen)
 
 
@@ -124,10 +126,9 @@ class _Watch:
             self._progress.update(self._bar, description=probe.id)
             return
         count = len(found.values)
-        said = (
-            f"[red]failed[/]: {escape(found.failed)}" if found.failed else f"{count} values, {found.loops} game loops"
-        )
-        self._progress.print(f"{probe.id}: {said}, {found.run_s:.1f} s", soft_wrap=True)
+        failed = Text.assemble(("failed", "red"), f": {found.failed}")
+        said = failed if found.failed else Text(f"{count} values, {found.loops} game loops")
+        self._progress.print(Text.assemble(f"{probe.id}: ", said, f", {found.run_s:.1f} s"), soft_wrap=True)
         self._progress.advance(self._bar)
 
 

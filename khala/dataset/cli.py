@@ -8,6 +8,7 @@ import typer
 
 from khala.dataset.choose import Choice, Only, Split, SplitBy
 from khala.dataset.files import Form
+from khala_protocol.commandline import say
 
 app = typer.Typer(no_args_is_help=True, help="Make data sets of recordings.")
 
@@ -77,6 +78,6 @@ def export(
         typer.echo(json.dumps(found))
         return
     parts = ", ".join(f"{name} {count}" for name, count in rows.items())
-    typer.echo(f"{contents.rows.total()} decisions are in {out}: {parts}")
+    say(f"{contents.rows.total()} decisions are in {out}: {parts}")
     if left_out:
-        typer.echo("left out: " + ", ".join(f"{reason} {count}" for reason, count in left_out.items()))
+        say("left out: " + ", ".join(f"{reason} {count}" for reason, count in left_out.items()))

@@ -9,6 +9,7 @@ from khala.dataset.card import NAME, Contents, card
 from khala.dataset.files import Files
 from khala.dataset.rows import Rows
 from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.files import replacing_directory, write_private
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recording
 
@@ -41,18 +42,19 @@ def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
     contents = Contents()
     recordings = list(_opened(sources, contents))
     try:
-        with Files(out, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
-            for recording in recordings:
-                for row in _rows(recording, recipe, contents):
-                    split = recipe.split.part(row)
-                    files.write(split, row)
-                    contents.add(split, row)
-        if not contents.rows:
-            raise ConfigError(_nothing(contents), source="--only" if recipe.choice.only else None)
-        for form in recipe.formats:
-            (out / form / NAME).write_text(card(contents, recipe, form), encoding="utf-8")
+        with replacing_directory(out) as part:
+            with Files(part, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
+                for recording in recordings:
+                    for row in _rows(recording, recipe, contents):
+                        split = recipe.split.part(row)
+                        files.write(split, row)
+                        contents.add(split, row)
+            if not contents.rows:
+                raise ConfigError(_nothing(contents), source="--only" if recipe.choice.only else None)
+            for form in recipe.formats:
+                write_private(part / form / NAME, card(contents, recipe, form))
     except OSError as error:
-        raise ConfigError(f"cannot be written: {error.strerror}", source=str(error.filename or out)) from None
+        raise ConfigError(f"cannot be written, and nothing of it is kept: {error.strerror}", source=str(out)) from None
     return contents
 
 

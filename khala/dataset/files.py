@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from enum import StrEnum
+from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from khala.dataset import forms
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.files import MB
+from khala_protocol.files import MB, make_private, open_private, write_private
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
-    from typing import TextIO
 
     from khala.dataset.row import Row
 
@@ -76,7 +76,7 @@ class Files:
             writer = self._writers.get((form, split))
             if writer is None:
                 path = self._directory / form / f"{split}.{form.suffix}"
-                path.parent.mkdir(parents=True, exist_ok=True)
+                make_private(path.parent)
                 writer = self._writers[form, split] = _WRITERS[form](path, self._images)
                 self._stack.callback(writer.close)
             writer.write(row)
@@ -86,7 +86,7 @@ class OpenAI:
     """Chats in OpenAI's form, one a line; pictures stand in them as data URLs."""
 
     def __init__(self, path: Path, images: bool) -> None:
-        self._file: TextIO = path.open("w", encoding="utf-8", newline="\n")
+        self._file = TextIOWrapper(open_private(path, "xb"), encoding="utf-8", newline="\n")
         self._images = images
 
     def write(self, row: Row) -> None:
@@ -102,17 +102,17 @@ class ShareGPT:
     """Chats in ShareGPT's form, one a line; each picture is a file of its own, written once."""
 
     def __init__(self, path: Path, images: bool) -> None:
-        self._file: TextIO = path.open("w", encoding="utf-8", newline="\n")
+        self._file = TextIOWrapper(open_private(path, "xb"), encoding="utf-8", newline="\n")
         self._images, self._pictures = images, path.with_name("images")
         if images:
-            self._pictures.mkdir(exist_ok=True)
+            make_private(self._pictures)
 
     def write(self, row: Row) -> None:
         """Write a row, and its pictures."""
         for picture in row.pictures if self._images else ():
             path = self._pictures / picture.file_name
             if not path.exists():
-                path.write_bytes(picture.data)
+                write_private(path, picture.data)
         self._file.write(json.dumps(forms.sharegpt(row, images=self._images)) + "\n")
 
     def close(self) -> None:
@@ -127,7 +127,8 @@ class Parquet:
         pa, pq = import_pyarrow()
         self._pa, self._images = pa, images
         self._schema = _schema(pa)
-        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._file = open_private(path, "xb")
+        self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
         self._rows: list[dict[str, Any]] = []
         self._bytes = 0
 
@@ -141,8 +142,8 @@ class Parquet:
 
     def close(self) -> None:
         """Write the last group, and end the file."""
-        self._flush()
-        self._writer.close()
+        with self._file, closing(self._writer):
+            self._flush()
 
     def _flush(self) -> None:
         rows, self._rows, self._bytes = self._rows, [], 0

@@ -17,6 +17,7 @@ import psutil
 from pydantic import ValidationError
 
 from khala.experiment.job import Done
+from khala_protocol.files import make_private, open_private
 from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Local:
         self._started = 0
 
     async def __aenter__(self) -> Self:
-        self._logs.mkdir(parents=True, exist_ok=True)
+        make_private(self._logs)
         return self
 
     async def __aexit__(
@@ -108,7 +109,7 @@ class _Process:
 
     @classmethod
     async def start(cls, game: str, log: Path) -> Self:
-        with log.open("ab") as stderr:
+        with open_private(log, "ab") as stderr:
             process = await asyncio.create_subprocess_exec(
                 sys.executable, "-P", "-m", "khala.experiment.worker", "--game", game,
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 from typing import TYPE_CHECKING, Any
 
 from khala.experiment.measures import Measures
 from khala.experiment.plan import FACTOR
 from khala.experiment.selection import factors_of
 from khala_protocol.errors import ConfigError
+from khala_protocol.files import replacing, write_private
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,10 +23,11 @@ Columns = dict[str, type]
 def write_csv(store: Store, path: Path) -> int:
     """Write the rows as CSV, an empty cell for nothing, and return their number."""
     columns, rows = table(store)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(columns))
-        writer.writeheader()
-        writer.writerows(rows)
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(columns))
+    writer.writeheader()
+    writer.writerows(rows)
+    write_private(path, text.getvalue())
     return len(rows)
 
 
@@ -42,7 +45,8 @@ def write_parquet(store: Store, path: Path) -> int:
     columns, rows = table(store)
     kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
     schema = pa.schema([(name, kinds[kind]) for name, kind in columns.items()])
-    parquet.write_table(pa.Table.from_pylist(rows, schema=schema), path)
+    with replacing(path) as file:
+        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), file)
     return len(rows)
 
 

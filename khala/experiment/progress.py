@@ -34,8 +34,18 @@ class Watcher:
         self._total = len(matches)
         left = len(list(missing(matches, runner.store.played())))
         self._counts["before"] = self._total - left
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                   TextColumn("ends in"), TimeRemainingColumn(), TextColumn("{task.fields[words]}"))  # fmt: skip
+        title_of, until, words = (
+            TextColumn(text, markup=False) for text in ("{task.description}", "ends in", "{task.fields[words]}")
+        )
+        columns = (
+            title_of,
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            until,
+            TimeRemainingColumn(),
+            words,
+        )
         self._bar = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
         self._task = self._bar.add_task(title, total=left, words="")
 

@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from khala_orchestrator.console import stderr_console, stdout_console
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 from khala_protocol.visible import visible_line
 
@@ -63,7 +64,7 @@ def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Pa
         typer.echo(json.dumps(plain(made.data()) | {"files": list(map(str, files))}))
         return
     for path in files:
-        typer.echo(path)
+        say(str(path))
 
 
 def export(directory: Path, *, parquet: Path | None, csv: Path | None, out: Path) -> None:

@@ -130,7 +130,6 @@ class Runner:
         self.spent.held_usd += part_usd or 0.0
         self._tries[match.key] += 1
         record = self.store.recording_for(match.key)
-        record.parent.mkdir(parents=True, exist_ok=True)
         self.see(Event("begins", match))
         minds = {
             side: replace(mind, budget_usd=None if part_usd is None else part_usd / len(match.minds))

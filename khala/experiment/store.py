@@ -4,8 +4,9 @@
     NAME/matches/KEY/recording.mcap         one directory for each match, under the hash of what it plays
     NAME/index.sqlite                       tables `matches`, `results` and `calls`
 
-The recordings are the truth: `rebuild` makes the index of them. A recording without a result is of a match that was
-interrupted or crashed, and stays beside the one of the next try.
+The recordings are the truth. The index is made of them, and made again when it is missing, broken or of another
+version: see `khala.indexes`. A recording without a result is of a match that was interrupted or crashed, and stays
+beside the one of the next try.
 """
 
 from __future__ import annotations
@@ -13,31 +14,39 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
-import shutil
+import logging
+import re
 import sqlite3
 import weakref
 from collections import defaultdict
 from dataclasses import astuple, dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from pydantic import TypeAdapter
+
+from khala import indexes
 from khala.experiment.measures import CallCount, Measures, measure_with_calls
 from khala.experiment.plan import FACTOR
 from khala.experiment.spec import Experiment
-from khala.matches import free_recording
+from khala.matches import free_recording, tries_in
 from khala.spending import paid_usd
 from khala_agents.llm.money import SUFFIX, Ledger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.files import make_private, open_private, write_private
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from khala.experiment.plan import PlannedMatch
     from khala_protocol.messages import Run
 
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
 Row = tuple[Measures, list[CallCount]]
 State = Literal["done", "invalid", "crashed"]
 """`invalid`: it was played, and says nothing about its agents; `crashed`: it was not played to its end."""
@@ -55,7 +64,10 @@ create table calls (
 );
 create index calls_of_match on calls(match);
 """
+_REPETITION = re.compile("[0-9]{1,9}")
 _TYPES = {"str": "text", "int": "integer", "float": "real", "bool": "integer"}
+_READ = {"str": (str,), "int": (int,), "float": (int, float, type(None)), "bool": (int,)}
+"""What SQLite has for each type of a measure; nothing for a number that is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +97,8 @@ class Store:
     def __init__(self, directory: Path) -> None:
         """Open the directory, which need not be there yet."""
         self.directory = directory
+        self._open: sqlite3.Connection | None = None
+        self._is_locked = False
 
     @classmethod
     def opened(cls, directory: Path) -> Store:
@@ -108,9 +122,9 @@ class Store:
 
     def begin(self, file: Path) -> None:
         """Create the directory, and keep the file of the experiment; a newer one replaces it."""
-        self.directory.mkdir(parents=True, exist_ok=True)
+        make_private(self.directory)
         if file.resolve() != (self.directory / FILE).resolve():
-            shutil.copyfile(file, self.directory / FILE)
+            write_private(self.directory / FILE, file.read_bytes())
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -119,87 +133,135 @@ class Store:
         Raises:
             ConfigError: another one is at work here.
         """
-        with (self.directory / LOCK).open("w") as lock:
+        with open_private(self.directory / LOCK, "ab") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise ConfigError(f"another process plays the experiment in {self.directory}: wait for it") from None
-            yield
+            self._is_locked = True
+            try:
+                yield
+            finally:
+                self._is_locked = False
 
     def recording_for(self, key: str) -> Path:
-        """Return an unused path for the recording of a match."""
+        """Return an unused path for the recording of a match, in a directory that is there."""
+        make_private(self.directory / MATCHES / key)
         return free_recording(self.directory / MATCHES / key)
 
     # --- the index ----------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _index(self) -> sqlite3.Connection:
-        path = self.directory / INDEX
-        new = not path.exists()
-        index = sqlite3.connect(path, timeout=30, check_same_thread=False)  # whichever thread drops the store closes it
-        weakref.finalize(self, index.close)
-        index.row_factory = sqlite3.Row
-        if new:
-            self._create(index)
-        elif index.execute("pragma user_version").fetchone()[0] != VERSION or not _has_columns(index):
-            index.close()
-            raise ConfigError(f"{path} is of another version of Khala: `khala experiment index {self.directory}`")
+        return self._open or self._keep(self._opened_index())
+
+    def _keep(self, index: sqlite3.Connection) -> sqlite3.Connection:
+        self._open = index
+        weakref.finalize(self, index.close)  # by whichever thread drops the store
         return index
 
-    def _create(self, index: sqlite3.Connection) -> None:
-        columns = ", ".join(f'"{name}" {kind}' for name, kind in result_columns().items())
-        index.executescript(f"{SCHEMA} create table results (match text not null, {columns}); create index of_match on "
-                            f"results(match); pragma user_version = {VERSION};")  # fmt: skip
-        index.commit()
+    def _opened_index(self) -> sqlite3.Connection:
+        path = self.directory / INDEX
+        if not path.exists() and not any(self._tries()):
+            return _created(path)
+        try:
+            with indexes.faults(path):
+                return _connected(path)
+        except sqlite3.DatabaseError as error:
+            return self._remade(error if path.exists() else None)
+
+    def _remade(self, error: Exception | None) -> sqlite3.Connection:
+        """Return the index after it was made again; in memory, where the directory takes nothing."""
+        path = self.directory / INDEX
+        log.warning(
+            "%s %s: it is made again of the recordings", path, f"is broken ({error})" if error else "is missing"
+        )
+        try:
+            with contextlib.nullcontext() if self._is_locked else self.locked():
+                return self._written()
+        except (ConfigError, OSError) as why:
+            log.warning("%s is kept in memory for now, and nothing is lost: %s", path, why)
+            index = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
+            index.executescript(_schema())
+            return self._filled(index)
+
+    def _written(self) -> sqlite3.Connection:
+        """Make a new index, and put it in the place of the old one when it is whole."""
+        path = self.directory / INDEX
+        part = path.with_name(f".{INDEX}.part")
+        indexes.remove(part)
+        try:
+            with contextlib.closing(_created(part)) as index, indexes.faults(part):
+                self._filled(index)
+            indexes.remove(path)
+            part.replace(path)
+        finally:
+            indexes.remove(part)
+        return _connected(path)
+
+    def _filled(self, index: sqlite3.Connection) -> sqlite3.Connection:
+        for tries in self._tries():
+            best = _best(tries)
+            if (found := self.read(best, attempts=len(tries))) is not None:
+                _take(index, best, *found)
+        return index
+
+    def _tries(self) -> Iterator[list[Path]]:
+        """Yield the recordings of each match that has any, the newest last."""
+        return filter(None, map(tries_in, sorted((self.directory / MATCHES).glob("*"))))
+
+    def _ask(self, read: Callable[[sqlite3.Connection], T]) -> T:
+        """Return what is read of the index; it is made again if that shows that it is broken."""
+        index = self._index
+        try:
+            with indexes.faults(self.directory / INDEX):
+                return read(index)
+        except (sqlite3.DatabaseError, ValueError, LookupError) as error:
+            index.close()
+            return read(self._keep(self._remade(error)))
 
     def add(self, played: Played, rows: Sequence[Row]) -> None:
-        """Note what became of a match; it replaces what was known of it."""
-        values = [getattr(played, name) for name in Played.__slots__]
-        plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
-        names = list(result_columns())
-        with self._index as index:
-            for table in ("results", "calls"):
-                index.execute(f"delete from {table} where match = ?", (played.key,))  # noqa: S608
-            index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks
-            for row, calls in rows:
-                place = played.key, row.episode, row.side
-                counts = [(*place, *astuple(call)) for call in calls]
-                index.executemany("insert into calls values (?, ?, ?, ?, ?, ?, ?)", counts)
-                values = [played.key, *(getattr(row, name) for name in names)]
-                index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
+        """Note what became of a match; it replaces what was known of it.
+
+        Raises:
+            OSError: the disk is full, or takes nothing.
+        """
+        self._ask(lambda index: _add(index, played, rows))
 
     def played(self) -> dict[str, Played]:
         """Return what is known of each match, by its key."""
-        if not (self.directory / INDEX).exists():
+        if not (self.directory / INDEX).exists() and not any(self._tries()):
             return {}
-        found = self._index.execute("select * from matches order by rowid")
-        return {row["key"]: _played(row) for row in found}
+        return self._ask(_played)
 
     def results(self) -> list[dict[str, Any]]:
         """Return a row for each episode and side: its measures, and what is known of its match."""
-        matches = self.played()
-        rows = [dict(row) for row in self._index.execute("select * from results order by rowid")]
-        return [_joined(matches[row.pop("match")], row) for row in rows]
+        return self._ask(_results)
 
     def calls(self) -> list[dict[str, Any]]:
         """Return what became of calls, by match, episode, side, agent and action."""
-        return [dict(row) for row in self._index.execute("select * from calls order by rowid")]
+        return self._ask(lambda index: [dict(zip(_CALLS, row, strict=True)) for row in index.execute(
+            "select match, episode, side, agent, action, became, count from calls order by rowid"
+        )])  # fmt: skip
 
     def rebuild(self) -> int:
-        """Make the index anew of the recordings, and return the number of matches."""
-        if "_index" in self.__dict__:
-            self._index.close()
-            del self.__dict__["_index"]
-        (self.directory / INDEX).unlink(missing_ok=True)
-        for directory in sorted((self.directory / MATCHES).glob("*")):
-            if tries := _tries(directory):
-                self.take(tries[-1], attempts=len(tries))
+        """Make the index anew of the recordings, and return the number of matches.
+
+        Raises:
+            ConfigError: another process plays the experiment.
+            OSError: the disk is full, or takes nothing; the index stays as it was.
+        """
+        if self._open is not None:
+            self._open.close()
+            self._open = None
+        with self.locked():
+            self._keep(self._written())
         return len(self.played())
 
     def take(self, path: Path, *, attempts: int) -> None:
         """Read a recording into the index; one without a run card says nothing."""
         if (found := self.read(path, attempts=attempts)) is not None:
-            self.add(*found)
+            self._ask(lambda index: _take(index, path, *found))
 
     def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
@@ -215,10 +277,13 @@ class Store:
             return None
         if (card := recording.run) is None:
             return None
+        if not _REPETITION.fullmatch(card.labels.get("repetition", "0")):
+            log.warning("%s has labels that no experiment gives: it is left out", path)
+            return None
         rows = measure_with_calls(recording)
         played = _judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
         is_priced = any(row.paid_usd is not None for row, _ in rows)
-        cost_usd = sum(_paid_usd(one) for one in path.parent.glob("recording*.mcap"))
+        cost_usd = sum(map(_paid_usd, tries_in(path.parent)))
         return replace(played, cost_usd=cost_usd if cost_usd or is_priced else None), rows
 
     def booked_usd(self) -> dict[str, float]:
@@ -231,11 +296,12 @@ class Store:
 
     def adopt(self) -> None:
         """Take in recordings of a runner that was killed: what its matches have cost counts."""
-        known = self.played()
-        for directory in (self.directory / MATCHES).glob("*"):
-            tries = _tries(directory)
-            if tries and (directory.name not in known or known[directory.name].attempts < len(tries)):
-                self.take(tries[-1], attempts=len(tries))
+        make_private(self.directory)
+        known = self._ask(_played)  # begins an index if there is none, and nothing to make it of
+        for tries in self._tries():
+            key = tries[0].parent.name
+            if key not in known or known[key].attempts < len(tries):
+                self.take(_best(tries), attempts=len(tries))
 
 
 def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | None) -> Played:
@@ -260,14 +326,20 @@ def _places(values: list[Any]) -> str:
     return f"({', '.join('?' * len(values))})"
 
 
-def _has_columns(index: sqlite3.Connection) -> bool:
-    there = [row[1] for row in index.execute("pragma table_info(results)")]
-    return there == ["match", *result_columns()]
+def _best(tries: Sequence[Path]) -> Path:
+    """Return the newest recording that has the result of every episode, or else the newest with a run card."""
+    if len(tries) == 1:
+        return tries[0]
+    found = [recording for path in reversed(tries) if (recording := _opened(path)) and recording.run]
+    whole = (one for one in found if one.run and len({result.episode for result in one.results}) >= one.run.episodes)
+    best = next(whole, found[0] if found else None)
+    return best.path if best else tries[-1]
 
 
-def _tries(directory: Path) -> list[Path]:
-    """Return the recordings of a match, the newest last."""
-    return sorted(directory.glob("recording*.mcap"), key=lambda path: path.stat().st_mtime)
+def _opened(path: Path) -> Recording | None:
+    with contextlib.suppress(RecordingError):
+        return Recording.open(path)
+    return None
 
 
 def _paid_usd(path: Path) -> float:
@@ -326,9 +398,78 @@ def comparable(card: Run) -> dict[str, Any]:
     }
 
 
-def _played(row: sqlite3.Row) -> Played:
-    values = {name: row[name] for name in Played.__slots__}
-    return Played(**values | {"cell": json.loads(values["cell"]), "card": json.loads(values["card"])})
+# --- rows of the index -----------------------------------------------------------------------------------
+
+_CALLS = ("match", "episode", "side", "agent", "action", "became", "count")
+
+
+def _schema() -> str:
+    columns = ", ".join(f'"{name}" {kind}' for name, kind in result_columns().items())
+    return f"{SCHEMA} create table results (match text not null, {columns}); create index of_match on results(match)"
+
+
+def _created(path: Path) -> sqlite3.Connection:
+    indexes.create(path, _schema(), VERSION)
+    return _connected(path)
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    return indexes.connect(path, _schema(), VERSION)
+
+
+def _take(index: sqlite3.Connection, path: Path, played: Played, rows: Sequence[Row]) -> None:
+    """Note what a recording says, which may be anyone's."""
+    try:
+        _add(index, played, rows)
+    except OverflowError:
+        log.warning("%s has a number that is larger than SQLite's: it is left out", path)
+
+
+def _add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
+    values = [getattr(played, name) for name in Played.__slots__]
+    plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
+    names = list(result_columns())
+    with indexes.transaction(index):
+        for table in ("results", "calls"):
+            index.execute(f"delete from {table} where match = ?", (played.key,))  # noqa: S608
+        index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks
+        for row, calls in rows:
+            place = played.key, row.episode, row.side
+            counts = [(*place, *astuple(call)) for call in calls]
+            index.executemany("insert into calls values (?, ?, ?, ?, ?, ?, ?)", counts)
+            values = [played.key, *(getattr(row, name) for name in names)]
+            index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
+
+
+def _played(index: sqlite3.Connection) -> dict[str, Played]:
+    """Return the matches; raise `ValueError` if one is not as we write it."""
+    names, columns = Played.__slots__, ", ".join(Played.__slots__)
+    found = index.execute(f"select {columns} from matches order by rowid")  # noqa: S608  # our own names
+    rows = (dict(zip(names, row, strict=True)) for row in found)
+    plain = (row | {name: json.loads(row[name]) for name in ("cell", "card")} for row in rows)
+    return {played.key: played for played in map(_match().validate_python, plain)}
+
+
+@cache
+def _match() -> TypeAdapter[Played]:
+    return TypeAdapter(Played)
+
+
+def _results(index: sqlite3.Connection) -> list[dict[str, Any]]:
+    """Return the rows; raise `ValueError` or `LookupError` if one is not as we write it."""
+    matches, kinds = _played(index), _annotations()
+    columns = ", ".join(f'"{name}"' for name in kinds)
+    found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
+    return [_joined(matches[key], _checked(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
+
+
+def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
+    """Return a row; raise `ValueError` if a value is of another type than its column: SQLite takes any."""
+    for name, kind in kinds.items():
+        types, _, nothing = str(kind).partition(" | ")
+        if not isinstance(row[name], _READ[types]) and not (nothing and row[name] is None):
+            raise ValueError(f"{name} is {row[name]!r:.40}")
+    return row
 
 
 def _joined(match: Played, row: dict[str, Any]) -> dict[str, Any]:

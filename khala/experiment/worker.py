@@ -24,6 +24,7 @@ from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
 from khala_protocol.recording import Recording
 from khala_protocol.signals import cancelled_by_signal
+from khala_protocol.visible import VisibleFormatter
 
 if TYPE_CHECKING:
     from khala_agents.llm.limits import Gates
@@ -42,7 +43,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 def log_quietly() -> None:
     """Log what a person should know."""
-    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
 
 

@@ -113,8 +113,8 @@ def _played(
 def _progress(forks: int) -> Iterator[Callable[[Future], None]]:
     """Show a bar on a terminal, a line for each fork elsewhere; yield what is called with each that is over."""
     screen = stderr_console()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-               TextColumn("ends in"), TimeRemainingColumn())  # fmt: skip
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+               TextColumn("ends in", markup=False), TimeRemainingColumn())  # fmt: skip
     bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
     task = bar.add_task("forks", total=forks)
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from khala_orchestrator.cli import Json
+from khala_protocol.commandline import say
 from khala_protocol.errors import KhalaError
 
 SHOW_EPILOG = """
@@ -50,7 +51,7 @@ def show(
     if as_json:
         typer.echo(json.dumps([one.model_dump(mode="json", exclude_defaults=True) for one in found]))
     else:
-        typer.echo("\n".join(long(one, version) for one in found), nl=False)
+        say("\n".join(long(one, version) for one in found).removesuffix("\n"))
 
 
 @app.command(epilog=WRITE_EPILOG)
@@ -72,7 +73,7 @@ def write(
     versions = [version] if version else VERSIONS
     if not check:
         for path in (path for one in versions for path in files.write(one)):
-            typer.echo(f"wrote {path}")
+            say(f"wrote {path}")
     elif old := [f"{one}/{name}" for one in versions for name in files.outdated(one)]:
         names = ", ".join(old)
         raise OutOfDate(

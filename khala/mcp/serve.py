@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import os
 import secrets
-import sys
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -25,6 +24,7 @@ from khala.doors.serving import uvicorn_config
 from khala.exit_codes import SIGNALLED
 from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
+from khala_protocol.commandline import say
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ async def over_http(table: Table, port: int) -> None:
     app = Starlette(routes=routes_of(seats), lifespan=running)
     with bound(HOST, port) as listening:
         for seat in seats:
-            sys.stderr.write(f"{seat.seat}: {seat.address(listening.getsockname()[1])}\n")
+            say(f"{seat.seat}: {seat.address(listening.getsockname()[1])}", err=True)
         server = _Server(uvicorn_config(app, timeout_graceful_shutdown=1))
         signalled = _first_signal()
         signalled.add_done_callback(lambda _: server.end())

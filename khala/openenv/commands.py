@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from khala.doors.listening import bound
 from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import trust_named
 
@@ -58,7 +58,7 @@ def run_openenv(wanted: Wanted) -> None:
     app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s, door=door)
     with bound(wanted.host, wanted.port) as listening:
         login = f"khala:{door.token}@" if door.token else ""
-        sys.stderr.write(f"http://{login}{wanted.host}:{listening.getsockname()[1]}\n")
+        say(f"http://{login}{wanted.host}:{listening.getsockname()[1]}", err=True)
         uvicorn.Server(server_config(app, sessions=wanted.sessions, timeout_graceful_shutdown=5)).run(
             sockets=[listening]
         )

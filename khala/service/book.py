@@ -1,6 +1,8 @@
 """Which matches the service has, what became of them, and whose turn it is. It knows no process and no bus.
 
-Matches of different owners take turns: the next one is of the owner with the fewest running, the oldest of these first.
+Matches of different owners take turns: the next one is of the owner with the fewest running, then of the one that has
+waited longest for a turn, the oldest of these first. Owners name themselves, so those of whom no match was begun yet
+count as one owner together: any number of new names gets one turn, and one part of the queue.
 """
 
 from __future__ import annotations
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
     from khala_protocol.service import MatchState, Submit
 
 KEPT = 100
-"""Matches that are over and still listed."""
+"""Matches that are over and still listed, and as many that were refused."""
+KNOWN_OWNERS = 1000
+STRANGERS = ""
+"""All owners of whom no match was begun yet."""
 MAX_NAME = 64
 """Of the name of a match that is refused, perhaps for its name."""
 USUAL_MB = 700
@@ -71,6 +76,9 @@ class Book:
     _entries: dict[str, Entry] = field(default_factory=dict)
     """By the number of the order."""
     _largest_mb: int = 0
+    _turns: dict[str, int] = field(default_factory=dict)
+    """By owner, the number of the last turn it had; the newest last."""
+    _last_turn: int = 0
 
     def entry(self, run: str) -> Entry | None:
         """Return the newest match of this name that was taken."""
@@ -80,12 +88,24 @@ class Book:
         """Return whether this order came before."""
         return number in self._entries
 
-    def why_not(self, run: str) -> str:
-        """Return why a match of this name is not taken now, as a sentence; empty if it is."""
+    def why_not(self, run: str, owner: str) -> str:
+        """Return why a match of this name is not taken now, as a sentence; empty if it is.
+
+        An owner may have as many matches waiting as there are free places left. So one has half of the queue at most,
+        and there is always a place for the first match of another.
+        """
         if self.draining:
             return "the service is ending, and takes no more matches"
-        if len(self.of("queued")) >= self.limits.queued:
+        waiting, party = self.of("queued"), self._party(owner)
+        if len(waiting) >= self.limits.queued:
             return f"{self.limits.queued} matches are waiting already: try again when some are over"
+        if (mine := sum(self._party(entry.card.owner) == party for entry in waiting)) >= self.limits.queued - len(
+            waiting
+        ):
+            whose = f"of {party}" if party else "of owners that this service has not played for yet"
+            return (
+                f"{mine} matches {whose} are waiting already, and the other places are kept for others: try again later"
+            )
         if (entry := self.entry(run)) is not None and entry.card.state in OPEN:
             return f"a match called {run} is {entry.card.state} already: give another --run"
         return ""
@@ -119,8 +139,26 @@ class Book:
             return None
         if running and used_mb + max(self._largest_mb, USUAL_MB) > self.limits.memory_mb:
             return None
-        busy = Counter(entry.card.owner for entry in running)
-        return min(waiting, key=lambda entry: busy[entry.card.owner])
+        busy = Counter(self._party(entry.card.owner) for entry in running)
+
+        def place(entry: Entry) -> tuple[int, int]:
+            party = self._party(entry.card.owner)
+            return busy[party], self._turns.get(party, 0)
+
+        return min(waiting, key=place)
+
+    def begin(self, entry: Entry) -> None:
+        """Note that a match is begun: its owner has had its turn, and is known from now on."""
+        entry.update(state="running")
+        self._last_turn += 1
+        for party in {self._party(entry.card.owner), entry.card.owner}:
+            self._turns.pop(party, None)
+            self._turns[party] = self._last_turn
+        while len(self._turns) > KNOWN_OWNERS:
+            del self._turns[next(iter(self._turns))]
+
+    def _party(self, owner: str) -> str:
+        return owner if owner in self._turns else STRANGERS
 
     def measured(self, entry: Entry, rss_mb: int) -> None:
         """Take what a match takes in memory."""
@@ -151,8 +189,13 @@ class Book:
     def ended(self, entry: Entry, state: MatchState, reason: str = "") -> None:
         """Close a match; the oldest of those that are over are forgotten."""
         entry.update(state=state, reason=reason[:MAX_WORDS], rss_mb=0)
-        over = [number for number, entry in self._entries.items() if entry.card.state not in OPEN]
-        for number in over[: max(0, len(over) - KEPT)]:
+        refused = state == "refused"  # a flood of these must not push out what was played
+        alike = [
+            number
+            for number, entry in self._entries.items()
+            if entry.card.state not in OPEN and (entry.card.state == "refused") == refused
+        ]
+        for number in alike[: max(0, len(alike) - KEPT)]:
             del self._entries[number]
 
     def of(self, *states: MatchState) -> list[Entry]:

@@ -37,6 +37,7 @@ from khala.options import (
 )
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 
 SERVE_EPILOG = """
@@ -175,7 +176,7 @@ def submit(
         resume=resume is not None,
     )
     card = commands.ask(connect, tls, insecure, ("host",), lambda bus: client.submit(bus, order))
-    typer.echo(json.dumps(card.model_dump(mode="json")) if as_json else card.run)
+    say(json.dumps(card.model_dump(mode="json")) if as_json else card.run)
 
 
 def matches(*, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False) -> None:

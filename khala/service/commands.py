@@ -141,7 +141,7 @@ def matches(connect: list[str] | None, *, tls: Path | None, insecure: bool, as_j
         progress = f"step {card.step} of episode {card.episode + 1}/{card.episodes}" if card.step else ""
         result = ", ".join(card.outcomes) or card.reason
         state = Text(card.state, STATES.get(card.state, ""))
-        table.add_row(*map(Text, (card.run, card.task, card.owner)), state, progress, Text(result))
+        table.add_row(card.run, card.task, card.owner, state, progress, result)
     stdout_console().print(table)
 
 

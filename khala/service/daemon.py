@@ -141,9 +141,9 @@ class Service:
 
     async def _submit(self, order: Submit) -> None:
         try:
-            match = None if self.book.why_not(order.run) else await self._match(order)
+            match = None if self.book.why_not(order.run, order.owner) else await self._match(order)
             if match is None or self.book.draining:  # it may have begun meanwhile
-                self.book.refuse(order, self.book.why_not(order.run))
+                self.book.refuse(order, self.book.why_not(order.run, order.owner))
                 return
             entry = self.book.add(order, *match)
             log.info("match taken: %s for %s", entry.card.task, order.owner or "nobody", extra={"run": order.run})
@@ -171,7 +171,7 @@ class Service:
         """Begin matches when there is room."""
         while True:
             while (entry := self.book.next(self.used_mb())) is not None:
-                entry.update(state="running")
+                self.book.begin(entry)
                 task = asyncio.create_task(self._play(entry), name=f"match {entry.card.run}")
                 self._playing.add(task)
                 task.add_done_callback(self._playing.discard)

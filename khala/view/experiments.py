@@ -26,10 +26,11 @@ def listed(directories: Sequence[Path]) -> list[ExperimentLine]:
 
 def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | None:
     try:
-        changed, key = (directory / EXPERIMENT).stat().st_mtime_ns, str(directory.absolute())
+        changed, key = (directory / EXPERIMENT).stat().st_ctime_ns, str(directory.absolute())
         known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
-        if known:
-            return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
+        with contextlib.suppress(sqlite3.Error):  # an index that is broken is made again below
+            if known:
+                return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
         from khala.view.table import line_of  # noqa: PLC0415  # it loads all that experiments need
 
         line = line_of(directory)
@@ -43,6 +44,10 @@ def _played(directory: Path) -> int:
     path = directory / "index.sqlite"
     if not path.exists():
         return 0
+    if not path.is_file():  # a pipe would be waited for
+        raise sqlite3.DatabaseError("it is no file")
     with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        if db.execute("select type from sqlite_master where name = 'matches'").fetchone() != ("table",):
+            raise sqlite3.DatabaseError("it is of somebody else, and a view may count for ever")
         count: int = db.execute("select count(*) from matches").fetchone()[0]
         return count

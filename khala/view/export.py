@@ -9,8 +9,6 @@ from __future__ import annotations
 import base64
 import html
 import json
-import os
-import stat
 import zlib
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +17,7 @@ from khala.view.runs import NotThere
 from khala.view.scan import whole
 from khala.view.wire import SCENES_AT_ONCE
 from khala_protocol.errors import ConfigError, KhalaError
-from khala_protocol.files import MB
+from khala_protocol.files import MB, write_private
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -103,19 +101,10 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
             run.index.close()
     text = _together(page, packer.text())
     try:
-        _write_privately(path, text)
+        write_private(path, text)
     except OSError as error:
         raise ConfigError(f"{path} cannot be written: {error.strerror}; choose another place") from None
     return len(text)
-
-
-def _write_privately(path: Path, text: str) -> None:
-    """Write a file that its user alone can read, also over one that others could."""
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)  # it holds prompts and replies
-    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        if stat.S_ISREG(os.fstat(descriptor).st_mode):
-            path.chmod(0o600)
-        file.write(text)
 
 
 def _answers(run: Opened, part: StepSelection, agents: Collection[str]) -> Iterator[tuple[str, bytes]]:

@@ -1,10 +1,11 @@
-"""The index of a recording: where each sample lies, and what the time line is drawn from, in SQLite beside the file.
+"""The index of a recording: where each sample lies, and what the time line is drawn from, in SQLite.
 
 `khala.view.scan` writes it while it reads the recording; answers read it and then only the chunks that they need. It
 holds nothing that the recording does not: an index that is broken, or of another file, is made again. Two viewers of
 one recording share it: one of them writes, the other waits until that one stops.
 
-A recording in a directory that cannot be written has its index in the user's cache directory.
+It is in the user's cache directory, under the hash of the recording's path, and never beside the recording: whoever
+made a recording could put an index there that says something else, and no check of the two could tell.
 """
 
 from __future__ import annotations
@@ -13,18 +14,18 @@ import contextlib
 import hashlib
 import json
 import os
-import re
 import sqlite3
 import threading
+import time
 import weakref
 import zlib
 from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from khala import games
+from khala import games, indexes
 from khala_protocol.errors import RecordingError
-from khala_protocol.files import MB
+from khala_protocol.files import MB, make_private
 from khala_protocol.recording.chunks import chunk_at, payload_at
 from khala_protocol.recording.unpack import BROKEN
 
@@ -63,7 +64,8 @@ create table model(side text not null, agent text not null, name text not null, 
 """
 MOST_CACHED_BYTES = 64 * MB
 """Unpacked chunks that are kept: a hundred steps of a large match."""
-BUSY_S = 30.0
+KEPT_S = 30 * 86_400.0
+"""An index that nobody has looked at for this long is removed when another is made."""
 
 
 class Spot(NamedTuple):
@@ -110,7 +112,7 @@ class Index:
         with self._lock:
             self._db.close()
         if self.is_broken:
-            remove(self.path)
+            indexes.remove(self.path)
 
     def rows(self, query: str, *values: object) -> list[tuple[Any, ...]]:
         """Return the rows of a query.
@@ -186,60 +188,46 @@ class Index:
 
 
 def index_path(recording: Path) -> Path:
-    """Return where the index of a recording is: beside it, or in the user's cache directory."""
-    if os.access(recording.parent, os.W_OK):
-        return recording.with_name(f".{recording.name}.index")
+    """Return where the index of a recording is."""
     return cache_directory() / f"{hashlib.sha256(os.fsencode(recording.resolve())).hexdigest()[:32]}.index"
 
 
 def cache_directory() -> Path:
     """Return the directory for what can be made again, and make it."""
     path = games.cache() / "view"
-    path.mkdir(parents=True, exist_ok=True)
+    make_private(path)
     return path
 
 
+def prepare(path: Path, schema: str = SCHEMA, version: int = VERSION) -> None:
+    """Make an empty index, unless there is a good one; those that nobody has looked at for long make room for it."""
+    try:
+        with contextlib.suppress(sqlite3.DatabaseError), indexes.faults(path):
+            indexes.connect(path, schema, version).close()
+            os.utime(path)
+            return
+        indexes.remove(path)
+        _forget_old(path.parent)
+        indexes.create(path, schema, version, journal="wal")
+    except OSError as error:
+        raise RecordingError(
+            f"the index {path} cannot be written: {error.strerror}; KHALA_CACHE names another place"
+        ) from None
+
+
+def _forget_old(directory: Path) -> None:
+    for path in directory.glob("*.index"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > KEPT_S:
+                indexes.remove(path)
+
+
 def connect(path: Path, schema: str = SCHEMA) -> sqlite3.Connection:
-    """Return a connection to an index; what a file of somebody else may hold does not run.
+    """Return a connection to an index; one that is lost with the power is made again.
 
     Raises:
         sqlite3.DatabaseError: it is broken, or has other tables.
     """
-    db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
-    try:
-        db.executescript("pragma trusted_schema = off; pragma cell_size_check = on; pragma synchronous = off;")
-        tables = _tables(db)
-    except BaseException:
-        db.close()
-        raise
-    if tables != [line.strip() for line in schema.split(";") if line.strip()]:
-        db.close()
-        raise sqlite3.DatabaseError("it has other tables")
+    db = indexes.connect(path, schema)
+    db.execute("pragma synchronous = off")
     return db
-
-
-def prepare(path: Path, schema: str = SCHEMA, version: int = VERSION) -> None:
-    """Make an empty index, unless there is a good one."""
-    with contextlib.suppress(sqlite3.DatabaseError):
-        if path.is_file() and not path.is_symlink():  # who made the recording may have put anything there
-            with contextlib.closing(connect(path, schema)) as db:
-                if db.execute("pragma user_version").fetchone()[0] == version:
-                    return
-    remove(path)
-    descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)  # prompts and replies are for its user alone
-    os.close(descriptor)
-    with contextlib.closing(sqlite3.connect(path, timeout=BUSY_S)) as db:
-        script = f"begin immediate; {schema}; pragma user_version = {version}; commit; pragma journal_mode = wal;"
-        with contextlib.suppress(sqlite3.OperationalError):  # another viewer was quicker
-            db.executescript(script)
-
-
-def remove(path: Path) -> None:
-    """Remove an index, and what SQLite keeps beside it."""
-    for name in (path, path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")):
-        name.unlink(missing_ok=True)
-
-
-def _tables(db: sqlite3.Connection) -> list[str]:
-    found = db.execute("select sql from sqlite_master where sql is not null order by rowid")
-    return [re.sub("^CREATE (TABLE|INDEX)", lambda match: match[0].lower(), sql).strip() for (sql,) in found]

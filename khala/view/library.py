@@ -1,7 +1,7 @@
 """The recordings and experiments of a directory, without a look into more of each than its begin and its end.
 
-What was found of a recording stays in an index in the user's cache directory, by its path, size and time of change, so
-that thousands of them are listed at once.
+What was found of a recording stays in an index in the user's cache directory, by its path, its size and the time at
+which the system last changed it, so that thousands of them are listed at once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LIVE_S = 60.0
 MOST_FILES = 20_000
 DEEPEST = 8
 """Directories below the one that was opened."""
-VERSION = 1
+VERSION = 2
 SCHEMA = "create table line(path text primary key, size integer not null, changed_ns integer not null, line text not null) without rowid"  # noqa: E501  # as SQLite keeps it
 PLAYERS = ("factor.model", "factor.player", "factor.policy")
 """Labels of an experiment that say who decided, if no model was asked."""
@@ -190,13 +190,13 @@ def _line(
         state = path.stat()
         key, name = str(path.absolute()), shown(path, below)
         size, changed, line = known.get(key, (-1, -1, ""))
-        if (size, changed) == (state.st_size, state.st_mtime_ns):
+        if (size, changed) == (state.st_size, state.st_ctime_ns):  # no program can set this one
             return RunLine.model_validate_json(line).but(path=name)
         made = line_of(read_head(path), run_id(path), name)
     except (KhalaError, OSError, ValueError):
         return None
     if made.complete:
-        new.append((key, state.st_size, state.st_mtime_ns, made.model_dump_json()))
+        new.append((key, state.st_size, state.st_ctime_ns, made.model_dump_json()))
     return made
 
 

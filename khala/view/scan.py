@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import logging
+import os
 import re
 import secrets
 import sqlite3
@@ -28,6 +29,7 @@ from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import MOST
 from khala_protocol.recording.chunks import Scan
 from khala_protocol.recording.reader import MAX_MESSAGE_BYTES
+from khala_protocol.recording.speaker import fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +49,7 @@ LEASE_S = 5.0
 BUSY_S = 0.5
 """Between two tries to get the lease that another viewer has."""
 _HEAD = re.compile(
-    rb'\{"v":1,"run":"[\w.-]+","kind":"\w+",(?:"agent":"[\w.-]+",)?(?:"side":"[\w.-]+",)?'
+    rb'\{"v":1,"run":"([\w.-]+)","kind":"\w+",(?:"agent":"([\w.-]+)",)?(?:"side":"([\w.-]+)",)?'
     rb'"episode":(\d{1,15}),"step":(\d{1,15}),'
 )
 """The beginning of a message of a step, as `khala_protocol.codec` writes it: most need not be read further."""
@@ -145,7 +147,7 @@ class Scanner:
         """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
         with contextlib.suppress(*WRONG):  # of another version, or of somebody else
             state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
-            if state["fingerprint"] == fingerprint(file, state["offset"]):
+            if state["fingerprint"] == fingerprint(file, state["offset"]) and not _has_changed(file, state["file"]):
                 keys = {int(number): key for number, key in state["keys"].items()}
                 scan = Scan(state["offset"], keys=keys, expected=state["expected"])
                 scan.ended, scan.broken = state["ended"], state["broken"]
@@ -191,8 +193,10 @@ class Scanner:
         """
         head = _HEAD.match(payload) if address.topic in _PLAIN else None
         if head and not self._is_read(batch, address):
-            return int(head[1]), int(head[2])
+            _check_speaker(address, *(name and name.decode() for name in head.group(1, 3, 2)))
+            return int(head[4]), int(head[5])
         said = from_json(payload, allow_inf_nan=False, cache_strings="none")
+        _check_speaker(address, *map(said.get, ("run", "side", "agent")))
         place = _count(said.get("episode", 0)), _count(said.get("step", 0))
         match address.topic:
             case Topic.RUN:
@@ -235,6 +239,7 @@ class Scanner:
         self._note("ended", scan.ended)
         self._note("broken", scan.broken)
         self._note("fingerprint", fingerprint(file, scan.offset))
+        self._note("file", _state(file))
         if self._memory.scenes:
             self._note("scenes", "whole" if self._memory.whole else "seen")
         if newest is not None:
@@ -284,6 +289,11 @@ class Scanning:
             self._changed()
 
 
+def _check_speaker(address: Address, run: object, side: object, agent: object) -> None:
+    if not fits(address, run, side, agent):
+        raise ValueError(f"{side}/{agent} of {run} is named under the key of somebody else")
+
+
 def _count(value: object) -> int:
     if not isinstance(value, int) or not 0 <= value <= MOST:
         raise ValueError(f"{value} counts nothing")
@@ -296,6 +306,18 @@ def fingerprint(file: BinaryIO, offset: int) -> str:
     head = file.read(min(offset, 4096))
     file.seek(max(0, offset - 4096))
     return hashlib.sha256(head + file.read(min(offset, 4096)) + str(offset).encode()).hexdigest()
+
+
+def _state(file: BinaryIO) -> list[int]:
+    """Return what changes with every write to a file, and cannot be set as its time of change can."""
+    state = os.fstat(file.fileno())
+    return [state.st_size, state.st_ino, state.st_ctime_ns]
+
+
+def _has_changed(file: BinaryIO, known: list[int]) -> bool:
+    """Return whether a file was written to since it was known, but for what a recorder adds at its end."""
+    now = _state(file)
+    return now[0] < known[0] or (now[0] == known[0] and now != known)
 
 
 @cache

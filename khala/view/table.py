@@ -47,7 +47,11 @@ def experiment_view(directory: Path, below: Path) -> ExperimentView:
     Raises:
         KhalaError: it cannot be read, or no match of it was played.
     """
-    return _view(directory, below, *((directory / name).stat().st_mtime_ns for name in (FILE, INDEX)))
+    return _view(directory, below, *(_changed_ns(directory / name) for name in (FILE, INDEX)))
+
+
+def _changed_ns(path: Path) -> int:
+    return path.stat().st_mtime_ns if path.exists() else 0
 
 
 @lru_cache(maxsize=8)

@@ -47,5 +47,5 @@ class Allowance:
         return False
 
     def left_out(self, key: str) -> str:
-        """Return what did not fit, in words."""
-        return f"{self._samples[key]} samples of {self._bytes[key]} bytes"
+        """Return what did not fit, in words; "" if all did."""
+        return "" if not self._samples[key] else f"{self._samples[key]} samples of {self._bytes[key]} bytes"

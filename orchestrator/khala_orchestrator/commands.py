@@ -18,6 +18,7 @@ from khala_orchestrator.config import all_tasks, load_task
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
 from khala_protocol.bus.zenoh import open_bus, probe
+from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.messages import ModelCall
@@ -151,7 +152,7 @@ def _paces(recording: Recording, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps({"paces": [one._asdict() | {"pace": one.pace.model_dump()} for one in found]}))
         return
-    typer.echo("\n".join(map(yaml, found)), nl=False)
+    say("\n".join(map(yaml, found)).removesuffix("\n"))
 
 
 async def _probe(config: BusConfig) -> list[str]:
@@ -177,4 +178,4 @@ def _out(data: dict[str, Any], sentence: str, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(data))
     else:
-        stderr_console().print(sentence)
+        stderr_console().print(sentence, soft_wrap=True)

@@ -1,6 +1,7 @@
 """What a person sees of a match: a live line per agent while it runs, and a table at the end.
 
-It gets the same messages that go over the bus, and prints to stderr, so that stdout stays free for JSON.
+It gets the same messages that go over the bus, and prints to stderr, so that stdout stays free for JSON. The consoles
+here are the only ones: whatever is printed on them, no character of it does anything to the terminal.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from rich import box
 from rich.console import Console, Group
 from rich.live import Live
 from rich.panel import Panel
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from pathlib import Path
     from types import TracebackType
 
+    from rich.console import ConsoleOptions, RenderableType
+
     from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
@@ -33,14 +37,30 @@ SIDE = {"blue": "bold blue", "red": "bold red"}
 M = TypeVar("M", bound=Frozen)
 
 
+class _VisibleConsole(Console):
+    """A console for foreign words: `[red]` in them is no markup, and an escape sequence is shown instead of obeyed."""
+
+    def __init__(self, *, stderr: bool = False) -> None:
+        super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
+
+    def render_str(self, text: str, **how: Any) -> Text:
+        """Return a text, of which every character counts when a table measures its columns."""
+        return super().render_str(visible(text), **how)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the segments of anything that is printed, texts with a style of their own among them."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(visible(segment.text), segment.style)
+
+
 def stderr_console() -> Console:
-    """Return a console on stderr, where a person reads; it prints words as they are, `[red]` is no markup."""
-    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+    """Return a console on stderr, where a person reads."""
+    return _VisibleConsole(stderr=True)
 
 
 def stdout_console() -> Console:
     """Return a console on stdout."""
-    return Console(highlight=False, markup=False, emoji=False)
+    return _VisibleConsole()
 
 
 class Progress:

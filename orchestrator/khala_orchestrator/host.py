@@ -21,6 +21,7 @@ from khala_orchestrator.roster import Roster
 from khala_orchestrator.scenery import Scenery
 from khala_orchestrator.side import sides_of
 from khala_orchestrator.turn import Turn
+from khala_protocol.errors import RecordingError
 from khala_protocol.garbage import tidy_memory
 from khala_protocol.recording import Recorder
 
@@ -76,8 +77,9 @@ async def host(
         flush = _nothing
         if config.record is not None:
             recorder = stack.enter_context(_recorder(config, config.record, past))
-            bus, flush = RecordingBus(bus, recorder, seats), recorder.flush
-            await stack.enter_async_context(Listener(bus, config.run))
+            flush = recorder.flush
+            bus = recording = RecordingBus(bus, recorder, seats)
+            await stack.enter_async_context(Listener(recording, config.run))
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
         inbox = await stack.enter_async_context(AdviceInbox(bus, config.run, advisers))
@@ -168,6 +170,10 @@ class _PublishingObserver:
         if self._flushing is not None:
             self._flushing.cancel()
 
+    def _flush_early(self) -> None:
+        with contextlib.suppress(RecordingError):  # of a full disk, which the end of the step reports
+            self._flush()
+
     async def go_live(self) -> None:
         """Publish from now on, beginning with the briefings of the episode and its map."""
         self.live = True
@@ -193,7 +199,7 @@ class _PublishingObserver:
     async def scene(self, scene: Scene) -> None:
         if self.live:
             await self._announcer.scene(scene)
-            self._flushing = asyncio.get_running_loop().call_later(_LONG_STEP_S, self._flush)
+            self._flushing = asyncio.get_running_loop().call_later(_LONG_STEP_S, self._flush_early)
         else:
             self._scene = scene
 

@@ -15,6 +15,7 @@ from rich.text import Text
 from khala_orchestrator.console import card, clock, side, speaker, style_of, table, two_sides, visible_message
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.files import make_private, write_private
 from khala_protocol.messages import (
     AgentReport,
     ImageRef,
@@ -181,7 +182,7 @@ def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list
     pictures = dict(recording.images())
     saved = []
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        make_private(directory)
         for seen in recording.of(Observation):
             if not selection.holds(seen.step, _seat(seen)):
                 continue
@@ -191,7 +192,7 @@ def save_pictures(path: Path, selection: StepSelection, directory: Path) -> list
                     kind = image.media_type.partition("/")[2]
                     name = f"{seen.episode}-{seen.step:04}-{agent}-{image.name}"
                     saved.append(directory / f"{_NOT_IN_FILE_NAMES.sub('_', name)[:200]}.{kind}")
-                    saved[-1].write_bytes(pictures[image.sha256])
+                    write_private(saved[-1], pictures[image.sha256])
     except OSError as error:
         raise RecordingError(f"{directory} cannot be written: {error.strerror}") from None
     return saved

@@ -5,10 +5,10 @@ Above: the command lines of host, router and agent, which have the same options 
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 from khala_protocol.bus.config import BusConfig, TlsFiles, check
+from khala_protocol.commandline import say
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -76,4 +76,4 @@ def _loudly(config: BusConfig) -> BusConfig:
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
+    say(text, err=True)

@@ -50,7 +50,7 @@ def install_command(
         root = install(directory, version)
         own = [] if maps is None else link_maps(root, maps)
     except InstallError as error:
-        typer.echo(f"Not installed: {error}.", err=True)
+        _say(f"Not installed: {error}.", err=True)
         raise typer.Exit(1) from error
     from khala_simulator.maps.game_map import map_names  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
@@ -62,9 +62,9 @@ def install_command(
         return
     for entry in own:
         if entry.trouble:
-            typer.echo(f"Left out {entry.source}: {entry.trouble}.", err=True)
+            _say(f"Left out {entry.source}: {entry.trouble}.", err=True)
     and_yours = f" and {len(linked)} of yours" if maps is not None else ""
-    typer.echo(f"Installed version {version} with {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
+    _say(f"Installed version {version} with {len(map_names())} maps{and_yours}. Now: export SC2PATH={root}")
 
 
 @app.command()
@@ -74,10 +74,15 @@ def info(as_json: Json = False) -> None:
     if as_json:
         typer.echo(json.dumps(facts))
         return
-    typer.echo(f"StarCraft II {facts['version']} (build {facts['build']}), simulated")
-    typer.echo(f"SC2PATH: {facts['sc2path'] or 'not set'} ({facts['sc2path_is']})")
+    _say(f"StarCraft II {facts['version']} (build {facts['build']}), simulated")
+    _say(f"SC2PATH: {facts['sc2path'] or 'not set'} ({facts['sc2path_is']})")
     for entry in facts["maps"]:
-        typer.echo(f"  {entry['name']:<40} {entry['title']}")
+        _say(f"  {entry['name']:<40} {entry['title']}")
+
+
+def _say(text: str, *, err: bool = False) -> None:
+    """Print a line; names and titles of map files come from anywhere, and none of their characters is obeyed."""
+    typer.echo("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text), err=err)
 
 
 def _facts() -> dict[str, Any]:
@@ -110,5 +115,5 @@ def serve(
     """
     from khala_simulator.__main__ import main  # noqa: PLC0415  # it takes over signals and sockets
 
-    typer.echo(f"Listening on ws://{host}:{port}/sc2api", err=True)
+    _say(f"Listening on ws://{host}:{port}/sc2api", err=True)
     main(["-listen", host, "-port", str(port), "-dataDir", str(data_dir)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import json
 import logging
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Decision, FunctionPolicy, Policy
 from khala_agents.scripted.policies import Fixed
 from khala_agents.worker import WorkerTally, run_worker, run_workers
+from khala_protocol.codec import encode
 from khala_protocol.errors import BusError
 from khala_protocol.keys import Topic, every_agent
 from khala_protocol.messages import MemoryRule, ModelCall, Reply, Usage
@@ -221,6 +223,47 @@ async def test_what_is_no_observation_is_dropped_and_the_next_one_answered(
 
 
 # --- deadlines --------------------------------------------------------------------------------------------
+
+
+def with_broken_view(observation: Observation) -> bytes:
+    fields = observation.model_dump(mode="json") | {"view": {"teams": 7}}
+    return json.dumps(fields).encode()
+
+
+async def test_an_observation_whose_view_is_broken_costs_its_step_and_not_the_worker(
+    host: Any, players: Players, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    async def look(told: Briefing, shown: Observation) -> str:
+        return f"{len(shown.view.teams)} teams"
+
+    await players.start(FunctionPolicy(look))
+    await host.say(briefing())
+    await host.raw(with_broken_view(observation(step=0)))  # the first of a run, which is compared with nothing
+    (first,) = await host.replies(1)
+    await host.say(observation(step=1))
+    (second,) = (await host.replies(2))[1:]
+    assert (first.step, first.status == "ok", second.step, second.text) == (0, False, 1, "0 teams")
+
+
+@pytest.mark.parametrize("broken", ["before", "after", "both"])
+async def test_a_host_that_begins_anew_is_answered_although_a_view_is_broken(
+    host: Any,
+    players: Players,
+    caplog: pytest.LogCaptureFixture,
+    briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
+    broken: str,
+) -> None:
+    await players.start(Fixed(ATTACK))
+    await host.say(briefing())
+    steps = {"before": observation(step=5), "after": observation(step=0)}
+    for name, seen in steps.items():
+        if name == "after":
+            await host.say(briefing(role="of another host"))
+        await host.raw(with_broken_view(seen) if broken in (name, "both") else encode(seen))
+        await asyncio.sleep(0.001)
+    assert [reply.step for reply in await host.replies(2)] == [5, 0]
+    assert "the view of step 0 or 5 cannot be read" in caplog.text
 
 
 async def test_an_empty_reply_is_sent_before_the_deadline_when_the_policy_is_late(

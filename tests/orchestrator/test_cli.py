@@ -160,16 +160,16 @@ def test_pictures_stay_in_their_directory_whatever_they_are_called(tmp_path: Pat
         name="/../../out", media_type="image/png", sha256=hashlib.sha256(data).hexdigest(), width=1, height=1, bytes=4
     )
     directory = tmp_path / "below" / "pictures"
-    (directory / "0-0000-..").mkdir(parents=True)
+    (directory / "0-0000-A-").mkdir(parents=True)
     with Recorder(tmp_path / "run.mcap") as recorder:
         seen = Observation(
-            run="test", side="blue", agent="..", episode=0, step=0, game_loop=0, answer_within_s=None, text="",
+            run="test", side="blue", agent="A", episode=0, step=0, game_loop=0, answer_within_s=None, text="",
             view=View(time_s=0.0), images=(picture,),
         )  # fmt: skip
         recorder.write("khala/test/blue/A/image/0", data)
         recorder.write("khala/test/blue/A/observation", encode(seen))
     replay(tmp_path / "run.mcap", images=directory)
-    assert [path.name for path in tmp_path.rglob("*.png")] == ["0-0000-..-_.._.._out.png"]
+    assert [path.name for path in tmp_path.rglob("*.png")] == ["0-0000-A-_.._.._out.png"]
     assert len(list(directory.glob("*.png"))) == 1
 
 

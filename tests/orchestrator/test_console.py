@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from rich.console import Console
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
 
-from khala_orchestrator.console import Progress, card, clock, rule, stderr_console, table
+from khala_orchestrator.console import Progress, card, clock, rule, stderr_console, stdout_console, table
 from khala_protocol.messages import AgentReport, Casualties, Clock, Rejection, Report, Result, Usage
+from khala_protocol.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -244,3 +248,34 @@ def make_run(card: MakeRun) -> MakeRun:
 @pytest.fixture
 def card_of_run(card: MakeRun) -> Run:
     return card()
+
+
+EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e[red][link=http://e]"
+
+
+@pytest.mark.parametrize("wrap", [lambda text: text, Text, lambda text: Text.assemble("a ", (text, "red")), Panel])
+@pytest.mark.parametrize("make", [stdout_console, stderr_console])
+def test_foreign_words_are_printed_and_not_obeyed(
+    capsys: pytest.CaptureFixture[str], make: Callable[[], Console], wrap: Callable[[str], Any]
+) -> None:
+    """Whatever renders them."""
+    rows = Table("heading", title=EVIL)
+    rows.add_row(wrap(EVIL))
+    console = make()
+    console.width = 200
+    for what in (wrap(EVIL), rows):
+        console.print(what, style="bold")
+    said = capsys.readouterr()
+    text = said.out + said.err
+    assert not [character for character in text if not (character.isprintable() or character == "\n")]
+    assert text.count(r"\x1b]0;owned") == 3
+    assert "[red][link=http://e]" in text
+
+
+def test_a_column_is_as_wide_as_what_is_shown_of_foreign_words(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = Table("heading")
+    rows.add_row(EVIL)
+    console = stdout_console()
+    console.width = 200
+    console.print(rows)
+    assert visible(EVIL) in capsys.readouterr().out

@@ -17,7 +17,7 @@ from khala_protocol.codec import decode, decode_as, encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic, agent_key
 from khala_protocol.messages import Briefing, Message, ModelCall, Observation, Reply, Report, Result, Run
-from khala_protocol.recording import Recording
+from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -302,6 +302,25 @@ async def test_the_recording_is_safe_up_to_each_report(hall: Hall, config: MakeC
 
     await hall.play(config(max_steps=2, record=path), watch=look)
     assert [(reports, results) for _, reports, results in safe] == [(1, 0), (2, 0), (2, 1)]
+
+
+async def test_a_disk_that_fills_up_within_a_step_ends_the_match_with_one_sentence(
+    hall: Hall, config: MakeConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What is flushed in the middle of a step belongs to no task that could report an error."""
+    flushed = 0
+
+    def flush(recorder: Recorder) -> None:
+        nonlocal flushed
+        flushed += 1
+        if flushed > 1:
+            raise RecordingError("no space left on device")
+
+    monkeypatch.setattr(Recorder, "flush", flush)
+    with pytest.raises(RecordingError, match="no space left on device"):
+        await hall.play(config(record=tmp_path / "run.mcap"), Stalkers=thinking(2.0))
+    assert flushed == 3, "the one within the step, and the one at its end"
+    assert "Exception in callback" not in caplog.text
 
 
 async def test_a_recording_is_not_overwritten(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:

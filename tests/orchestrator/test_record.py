@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+import contextlib
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from khala_orchestrator.allowance import STEP_BYTES
-from khala_orchestrator.record import BestEffort, Listener, RecordingBus
+from khala_orchestrator.record import LAST_EXCHANGES_S, BestEffort, Listener, RecordingBus
 from khala_orchestrator.roster import Seat
 from khala_protocol.access import EXCHANGE_BYTES
 from khala_protocol.bus import Delivery, Sample
@@ -19,6 +20,7 @@ from khala_protocol.messages import ModelCall, Reply
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Awaitable, Callable
     from pathlib import Path
 
     from khala_protocol.bus.memory import MemoryBroker
@@ -191,21 +193,16 @@ async def test_a_sample_that_cannot_be_recorded_is_not_sent(broker: MemoryBroker
 
 
 async def test_a_listener_takes_what_agents_asked_their_models(broker: MemoryBroker, tmp_path: Path) -> None:
-    asked = ModelCall(
-        run=RUN, side="blue", agent="Stalkers", episode=0, step=0, attempt=1, model="m", endpoint="http://m/v1",
-        prompt=(), completion="for Aiur", status="ok", started_s=0.0, latency_s=1.5,
-    )  # fmt: skip
     agent = broker.session()
     with Recorder(tmp_path / "run.mcap") as recorder:
         bus = RecordingBus(broker.session(), recorder, SEATS)
         async with Listener(bus, RUN):
-            await (await agent.publisher(EXCHANGE, Delivery.LOG)).put(encode(asked))
-            said = Reply(run=RUN, side="blue", agent="Stalkers", episode=0, step=0, text="")
-            await (await agent.publisher(REPLY, Delivery.SPEECH)).put(encode(said))
+            await (await agent.publisher(EXCHANGE, Delivery.LOG)).put(asked())
+            await (await agent.publisher(REPLY, Delivery.SPEECH)).put(said())
             await asyncio.sleep(0.001)
             recorder.flush()
             assert Recording.open(tmp_path / "run.mcap").counts == {EXCHANGE: 1}
-    assert list(Recording.open(tmp_path / "run.mcap").of(ModelCall)) == [asked]
+    assert recorded(tmp_path / "run.mcap") == [(EXCHANGE, asked())]
 
 
 async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBroker, tmp_path: Path) -> None:
@@ -215,6 +212,120 @@ async def test_a_listener_takes_what_had_arrived_before_it_ends(broker: MemoryBr
             await agent.put(b"at the last moment")
         await agent.put(b"after the end")
     assert recorded(tmp_path / "run.mcap") == [(EXCHANGE, b"at the last moment")]
+
+
+def asked(*, step: int = 0, **changes: Any) -> bytes:
+    call = ModelCall(
+        run=RUN, side="blue", agent="Stalkers", episode=0, step=step, attempt=1, model="m", endpoint="http://m/v1",
+        prompt=(), completion="for Aiur", status="ok", started_s=0.0, latency_s=1.5,
+    )  # fmt: skip
+    return encode(call.but(**changes))
+
+
+def said(*, step: int = 0, attempts: int = 1, **changes: Any) -> bytes:
+    reply = Reply(run=RUN, side="blue", agent="Stalkers", episode=0, step=step, text="", attempts=attempts)
+    return encode(reply.but(**changes))
+
+
+@contextlib.asynccontextmanager
+async def match(broker: MemoryBroker, path: Path) -> AsyncIterator[Callable[[bytes], Awaitable[None]]]:
+    """Yield what sends a reply that the host takes; leaving it is the end of the match."""
+    agent = await broker.session().publisher(REPLY, Delivery.SPEECH)
+    with Recorder(path) as recorder:
+        bus = RecordingBus(broker.session(), recorder, SEATS)
+        async with Listener(bus, RUN):
+            replies = await bus.subscribe(REPLIES, Delivery.SPEECH)
+
+            async def send(payload: bytes) -> None:
+                await agent.put(payload)
+                await anext(replies)
+
+            yield send
+
+
+@pytest.mark.parametrize("late", [1, 2])
+async def test_the_end_of_a_match_waits_for_exchanges_that_the_last_reply_announced(
+    broker: MemoryBroker, tmp_path: Path, late: int
+) -> None:
+    exchanges = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+    loop = asyncio.get_running_loop()
+    sending: list[asyncio.Task[None]] = []
+
+    def send_later(payload: bytes) -> None:
+        sending.append(asyncio.ensure_future(exchanges.put(payload)))
+
+    async with match(broker, tmp_path / "run.mcap") as send:
+        for attempt in range(1, 3 - late):
+            await exchanges.put(asked(attempt=attempt))
+        await send(said(attempts=2))
+        for attempt in range(3 - late, 3):  # after the match has ended
+            loop.call_later(0.0006 * attempt, send_later, asked(attempt=attempt))
+        began = loop.time()
+    assert loop.time() - began < LAST_EXCHANGES_S / 2
+    calls = list(Recording.open(tmp_path / "run.mcap").of(ModelCall))
+    assert [call.attempt for call in calls] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("replies", "exchanges"),
+    [
+        ([said(attempts=0)], []),
+        ([said()], [asked()]),
+        ([said(step=0, attempts=2), said(step=1, attempts=1)], [asked(step=1)]),
+        ([said(step=0), said(step=1)], []),  # a policy that counts what it asks and sends none
+        ([said()], [asked(step=1)]),
+        ([b"garbage", b"[]", b'{"episode": "x", "step": null}'], [b"garbage"]),
+    ],
+    ids=["nothing asked", "all there", "an older step", "never sent", "a later step", "no messages"],
+)
+async def test_it_does_not_wait_where_nothing_is_missing(
+    broker: MemoryBroker, tmp_path: Path, replies: list[bytes], exchanges: list[bytes]
+) -> None:
+    agent = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+    loop = asyncio.get_running_loop()
+    async with match(broker, tmp_path / "run.mcap") as send:
+        for payload in exchanges:
+            await agent.put(payload)
+        for payload in replies:
+            await send(payload)
+        began = loop.time()
+    assert loop.time() == began
+
+
+async def test_it_waits_for_what_never_comes_only_so_long_and_not_at_all_after_an_error(
+    broker: MemoryBroker, tmp_path: Path
+) -> None:
+    """A summary, or an exchange of an older step, is not what the reply announced."""
+    agent = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+    loop = asyncio.get_running_loop()
+    async with match(broker, tmp_path / "run.mcap") as send:
+        await agent.put(asked(step=1))
+        await agent.put(asked(step=2, purpose="summary"))
+        await send(said(step=2))
+        began = loop.time()
+    assert loop.time() - began == pytest.approx(LAST_EXCHANGES_S)
+    with contextlib.suppress(RuntimeError):
+        async with match(broker, tmp_path / "other.mcap") as send:
+            await send(said())
+            began = loop.time()
+            raise RuntimeError
+    assert loop.time() == began
+
+
+@pytest.mark.parametrize("changes", [{"agent": "Zealots"}, {"side": "red"}, {"run": "other"}])
+async def test_words_in_the_mouth_of_another_agent_are_counted_and_not_recorded(
+    broker: MemoryBroker, tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    """The host hears of them, and calls the reply malformed."""
+    exchanges = await broker.session().publisher(EXCHANGE, Delivery.LOG)
+    async with match(broker, tmp_path / "run.mcap") as send:
+        await send(said(**changes))
+        await exchanges.put(asked(**changes))
+        await exchanges.put(asked())
+        await send(said())
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert recording.counts == {EXCHANGE: 1, REPLY: 1}
+    assert recording.left_out == dict.fromkeys((EXCHANGE, REPLY), "1 samples that name somebody else")
 
 
 def test_a_match_may_go_on_without_its_recording(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -89,7 +89,9 @@ def changed(recording: Recording, path: Path, change: Callable[[Wire], Wire | No
         for sample in recording:
             message = sample.message and change(sample.message)
             if message is not None or sample.message is None:
-                recorder.write(sample.key, encode(message) if message else sample.payload)
+                before, after = (getattr(one, "agent", None) for one in (sample.message, message))
+                key = sample.key.replace(f"/{before}/", f"/{after}/")  # it says who an agent is, as the message does
+                recorder.write(key, encode(message) if message else sample.payload)
     return Recording.open(path)
 
 

@@ -324,4 +324,4 @@ def test_a_directory_that_cannot_be_made_is_named(path: Path, tmp_path: Path) ->
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError) as raised:
         save_pictures(path, StepSelection(), tmp_path / "file")
-    assert str(raised.value) == f"{tmp_path / 'file'} cannot be written: File exists"
+    assert str(raised.value) == f"{tmp_path / 'file'} cannot be written: Not a directory"

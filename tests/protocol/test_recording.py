@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import json
+import os
 import random
 import signal
 import struct
@@ -452,3 +454,46 @@ def test_a_file_that_is_no_recording_is_named(tmp_path: Path, kind: str, text: s
     with pytest.raises(RecordingError) as raised:
         reading(target)
     assert str(raised.value) == text.format(path=target)
+
+
+# --- who spoke ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        agent_key("r1", "p1", "B", Topic.REPLY),
+        agent_key("r1", "p2", "A", Topic.REPLY),
+        agent_key("r2", "p1", "A", Topic.REPLY),
+        agent_key("r1", "p1", "A", Topic.EXCHANGE),
+        run_key("r1", Topic.REPORT),
+        "no/key/of/ours",
+    ],
+    ids=["another agent", "another side", "another run", "another topic", "of the host", "no key"],
+)
+def test_words_under_a_key_that_says_something_else_are_nobodys(tmp_path: Path, key: str) -> None:
+    """Old recordings hold them: `recover`, transcripts, data sets and measures all read them as nothing."""
+    (reply,) = (message for message in agent_messages("A", 0) if isinstance(message, Reply))
+    right = agent_key("r1", "p1", "A", Topic.REPLY)
+    with Recorder(tmp_path / "a.mcap") as recorder:
+        for place in (right, key):
+            recorder.write(place, encode(reply))
+    recording = Recording.open(tmp_path / "a.mcap")
+    assert [sample.message for sample in recording] == [reply, None]
+    assert list(recording.of(Reply)) == [reply]
+    assert recording.replies(0) == (reply,)
+    assert recording.samples == 2, "the bytes stay, as evidence"
+
+
+def test_a_copy_for_which_the_disk_has_no_room_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with Recorder(tmp_path / "a.mcap") as recorder:
+        for key, payload in samples():
+            recorder.write(key, payload)
+    before = (tmp_path / "a.mcap").read_bytes()
+    monkeypatch.setattr("mcap.writer.Writer.add_message", full)
+    with pytest.raises(RecordingError, match="No space left on device"):
+        recover(tmp_path / "a.mcap", tmp_path / "b.mcap")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a.mcap", before)]

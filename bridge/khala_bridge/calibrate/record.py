@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from pydantic import Field, ValidationError
 
 from khala_protocol.errors import ConfigError
-from khala_protocol.files import read_limited
+from khala_protocol.files import read_limited, write_private
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
@@ -88,9 +88,7 @@ class Calibration(Frozen):
 
     def save(self, path: Path) -> None:
         """Write it in one step: whoever interrupts finds the file of before or of now."""
-        fresh = path.with_name(f"{path.name}.new")
-        fresh.write_text(json.dumps(self.model_dump(mode="json"), indent=1) + "\n", encoding="utf-8")
-        fresh.replace(path)
+        write_private(path, json.dumps(self.model_dump(mode="json"), indent=1) + "\n")
 
 
 def load(path: Path) -> Calibration:

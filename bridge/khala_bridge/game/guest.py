@@ -24,6 +24,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.errors import GameError
 from khala_bridge.game.manners import Manners
+from khala_protocol.files import open_private
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -217,7 +218,7 @@ def _started(
 ) -> subprocess.Popen[bytes]:
     try:
         with contextlib.ExitStack() as stack:
-            out = stack.enter_context(log.open("wb")) if log else subprocess.DEVNULL
+            out = stack.enter_context(open_private(log, "wb")) if log else subprocess.DEVNULL
             return subprocess.Popen(  # noqa: S603  # the user names it
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment,
                 start_new_session=True,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+from khala_protocol.commandline import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def _print(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)  # noqa: T201  # one line to copy, which a console would break
+    say(text, err=True)  # one line to copy, which a console would break
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from khala.experiment.report.summary import cells, summary
 from khala.experiment.report.tables import beside, not_counted, overview, tables
 from khala.experiment.selection import factors_of
 from khala_protocol.errors import ConfigError
+from khala_protocol.files import make_private, write_together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -84,7 +85,7 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
 
 def write(document: Document, directory: Path, formats: Sequence[str]) -> list[Path]:
     """Write a document, and its pictures beside it; return the files, the documents first."""
-    directory.mkdir(parents=True, exist_ok=True)
+    make_private(directory)
     texts: dict[Path, bytes] = {}
     pictures: dict[Path, bytes] = {}
     for one in (FORMATS[name] for name in formats):
@@ -92,8 +93,7 @@ def write(document: Document, directory: Path, formats: Sequence[str]) -> list[P
         if one.picture:
             found = (figure for section in document.sections for figure in section.figures)
             pictures |= {directory / f"{figure.name}.{one.picture}": figure.draw(one.picture) for figure in found}
-    for path, content in (texts | pictures).items():
-        path.write_bytes(content)
+    write_together(texts | pictures)
     return [*texts, *pictures]
 
 

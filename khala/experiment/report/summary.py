@@ -119,7 +119,7 @@ def _names(factors: tuple[str, ...], rows: Sequence[Row], by: Sequence[str]) -> 
     for name in by:
         if name not in known:
             raise ConfigError(f"there is no factor {name!r}: there are {', '.join(known)}", source="--by")
-    return list(by) or known
+    return list(by) or known or ["task"]  # recordings that no experiment has labelled have no factors
 
 
 def _in_order(found: list[Cell], names: Sequence[str]) -> list[Cell]:

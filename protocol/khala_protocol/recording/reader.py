@@ -21,6 +21,7 @@ from khala_protocol.files import MB, check_regular
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
 from khala_protocol.recording.recorder import KINDS, LEFT_OUT, LIBRARY, METADATA, Recorder
+from khala_protocol.recording.speaker import is_said_by
 from khala_protocol.recording.unpack import BROKEN, unpacked
 
 if TYPE_CHECKING:
@@ -66,13 +67,14 @@ class Recorded:
 
     @cached_property
     def message(self) -> Wire | None:
-        """The message; None if the bytes are not of this protocol, too many, or a picture."""
-        if len(self.payload) > MAX_MESSAGE_BYTES or (self.address and self.address.topic is Topic.IMAGE):
+        """The message; None if there is none: a picture, too many bytes, or words in the mouth of somebody else."""
+        if len(self.payload) > MAX_MESSAGE_BYTES or self.address is None or self.address.topic is Topic.IMAGE:
             return None
         try:
-            return decode(self.payload)
+            message = decode(self.payload)
         except PeerError:
             return None
+        return message if is_said_by(self.address, message) else None
 
 
 @dataclass(frozen=True)
@@ -224,9 +226,14 @@ def recover(path: Path | str, new_path: Path | str) -> Recording:
         RecordingError: `path` is not a recording, or `new_path` exists or cannot be written.
     """
     old = Recording.open(path)
-    with Recorder(new_path, metadata=old.metadata) as recorder:
-        for sample in old:
-            recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    recorder = Recorder(new_path, metadata=old.metadata)
+    try:
+        with recorder:
+            for sample in old:
+                recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)
+    except BaseException:
+        recorder.path.unlink(missing_ok=True)  # half of a copy says less than the old file
+        raise
     return Recording.open(new_path)
 
 

@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Self
 from mcap.writer import CompressionType, Writer
 
 from khala_protocol.errors import PeerError, RecordingError
+from khala_protocol.files import make_private
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import MESSAGE_TYPES, SCHEMA_VERSION, Wire
 
@@ -147,16 +148,14 @@ def _writing(path: Path) -> Iterator[None]:
 
 def _create(path: Path) -> IO[bytes]:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_private(path.parent)
         path.touch(0o600, exist_ok=False)  # prompts and replies are for its user alone
         return path.open("wb")
     except FileExistsError:
         if path.is_dir():
             raise RecordingError(f"{path} is a directory: name a file in it, such as {path / 'run.mcap'}") from None
-        if path.exists():
-            raise RecordingError(
-                f"{path} exists already: choose another name, recordings are not overwritten"
-            ) from None
+        raise RecordingError(f"{path} exists already: choose another name, recordings are not overwritten") from None
+    except NotADirectoryError:
         raise RecordingError(f"{path} cannot be written: a part of its path is a file, not a directory") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be written: {error.strerror}; choose another place") from None

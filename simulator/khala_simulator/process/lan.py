@@ -306,7 +306,8 @@ class Peers:
 
     def _part(self, error: LockstepError) -> None:
         """End the game for every member: it is no longer one game."""
-        print(f"StarCraft II simulator: {error}; the game ends", file=sys.stderr)  # noqa: T201  # there is no other log
+        words = ascii(str(error))  # it may quote another process
+        print(f"StarCraft II simulator: {words}; the game ends", file=sys.stderr)  # noqa: T201  # there is no other log
         for link in tuple(self._links):
             link.close()
             self._lose(link)

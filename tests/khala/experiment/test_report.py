@@ -140,7 +140,6 @@ def test_how_it_was_played_stands_there(made: HandMade) -> None:
 def test_models_are_named_as_they_were_asked_and_as_they_answered(made: HandMade) -> None:
     match = plan(made.store.experiment())[0]
     path = made.store.recording_for(match.key)
-    path.parent.mkdir(parents=True)
     record(path, match.config)
     made.store.take(path, attempts=1)
     facts = {row[0]: row[1] for row in table(made, "").rows}

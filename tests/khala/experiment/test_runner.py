@@ -160,7 +160,6 @@ async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
 async def test_the_money_of_a_runner_that_was_killed_counts(store: Store) -> None:
     match = plan(experiment())[0]
     path = store.recording_for(match.key)
-    path.parent.mkdir(parents=True)
     record(path, match.config, cost_usd=0.5, result=False)
     runner = Runner(experiment(), store, MadeEngine(), Budget())
     assert runner.spent.usd == 0.5

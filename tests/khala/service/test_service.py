@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -12,7 +13,7 @@ import pytest
 from khala.matches import new
 from khala.minds import Minds
 from khala.service import client
-from khala.service.book import Limits
+from khala.service.book import KEPT, Limits
 from khala.service.client import NoService, Refused
 from khala.service.daemon import STARTS, Service
 from khala.service.pool import Ending
@@ -78,13 +79,14 @@ class Stage:
     used_mb: int = 0
     stop: asyncio.Event = field(default_factory=asyncio.Event)
     drain_s: float = 5.0
+    service: Service = field(init=False)
     _service: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
         async def take() -> Pretender:
             return Pretender(self)
 
-        service = Service(
+        self.service = service = Service(
             self.broker.session(), BusConfig(), take, self.out, self.limits, self.drain_s,
             used_mb=lambda: self.used_mb, measure=lambda _: self.used_mb // 2,
         )  # fmt: skip
@@ -94,6 +96,11 @@ class Stage:
     async def __aexit__(self, *_: object) -> None:
         self.stop.set()
         await self.ended()
+
+    async def end_newest(self) -> None:
+        await asyncio.sleep(1)
+        self.playing[self.begun[-1]].end("done")
+        await asyncio.sleep(1)
 
     async def ended(self) -> None:
         assert self._service is not None
@@ -243,6 +250,46 @@ async def test_an_order_that_breaks_the_reader_is_refused_and_the_service_goes_o
 
 def _breaks(*_: object, **__: object) -> None:
     raise RecursionError
+
+
+async def test_a_flood_of_names_has_one_turn_and_one_part_of_the_queue(tmp_path: Path) -> None:
+    async with Stage(tmp_path, Limits(matches=1, queued=20)) as stage:
+        await stage.submit("known", "ann")
+        await asyncio.sleep(1)
+        for number in range(40):
+            with contextlib.suppress(Refused):
+                await stage.submit(f"flood-{number}", f"owner-{number}")
+        with pytest.raises(Refused, match="10 matches of owners that this service has not played for yet are waiting"):
+            await stage.submit("more", "another")
+        for run in ("a1", "a2"):
+            assert (await stage.submit(run, "ann")).state == "queued"
+        for _ in range(4):
+            await stage.end_newest()
+        assert stage.begun == ["known", "flood-0", "a1", "flood-1", "a2"]
+
+
+async def test_one_owner_leaves_places_for_others(tmp_path: Path) -> None:
+    async with Stage(tmp_path, Limits(matches=1, queued=4)) as stage:
+        for run in ("a0", "b0"):
+            await stage.submit(run, run[0])
+        await stage.end_newest()  # both are known now
+        for run in ("a1", "a2"):
+            await stage.submit(run, "a")
+        with pytest.raises(
+            Refused, match="2 matches of a are waiting already, and the other places are kept for others"
+        ):
+            await stage.submit("a3", "a")
+        assert (await stage.submit("b1", "b")).state == "queued"
+
+
+async def test_refused_orders_do_not_push_out_what_was_played(tmp_path: Path) -> None:
+    async with Stage(tmp_path) as stage:
+        await stage.submit("played")
+        await stage.end_newest()
+        for number in range(2 * KEPT):
+            stage.service.book.refuse(order(f"flood-{number}"), "no place")
+        assert (await stage.card("played")).state == "done"
+        assert len((await client.listed(stage.bus)).matches) == KEPT + 1
 
 
 async def test_a_name_that_is_in_use_and_a_full_queue_are_refused(tmp_path: Path) -> None:

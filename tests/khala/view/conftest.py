@@ -20,6 +20,14 @@ if TYPE_CHECKING:
 GOLDEN = Path(__file__).parents[1] / "golden.mcap"
 
 
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_the_session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the indexes of recordings of the session out of the user's cache directory."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KHALA_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KHALA_CACHE", str(tmp_path / "cache"))

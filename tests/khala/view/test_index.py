@@ -123,12 +123,37 @@ def test_two_viewers_share_it(path: Path) -> None:
     assert len(index.rows("select * from step")) == STEPS
 
 
-def test_in_a_directory_that_cannot_be_written_it_is_in_the_cache(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
+def test_it_is_in_the_cache_and_one_beside_the_recording_is_not_believed(path: Path, tmp_path: Path) -> None:
+    """Whoever made the recording may have put one there, with any fingerprint."""
+    found = opened(path).index
+    forged = path.with_name(f".{path.name}.index")
+    forged.write_bytes(found.path.read_bytes())
+    with contextlib.closing(sqlite3.connect(forged)) as db:
+        db.execute("delete from step where step > 1")
+        db.commit()
+    found.is_broken = True
+    found.close()
     index = opened(path).index
-    assert index.path.parent.name == "view"
+    assert index.path.parent == tmp_path / "cache" / "view"
     assert len(index.rows("select * from step")) == STEPS
-    assert not list(path.parent.glob(".*"))
+
+
+def test_one_of_a_recording_that_was_changed_inside_is_made_again(path: Path) -> None:
+    """Its beginning, its end, its size and its time of change are what they were."""
+    with contextlib.closing(opened(path).index) as index:
+        (chunk,) = index.rows("select chunk from sample where topic = 'report' and step = 20")[0]
+    before, data = path.stat(), bytearray(path.read_bytes())
+    data[chunk + 60] ^= 0xFF
+    path.write_bytes(bytes(data))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert opened(path).index.rows("select count(*) from step") == [(20,)]
+
+
+def test_those_that_nobody_looked_at_for_long_are_forgotten(path: Path, tmp_path: Path) -> None:
+    old, new = (opened(make(tmp_path / f"{name}.mcap")).index.path for name in ("old", "new"))
+    os.utime(old, (0, 0))
+    opened(path)
+    assert (old.exists(), new.exists()) == (False, True)
 
 
 def test_only_its_user_may_read_it(path: Path) -> None:
@@ -189,3 +214,20 @@ def test_messages_that_are_none_change_no_answer(tmp_path: Path) -> None:
 def test_replies_need_not_be_read_to_be_found(path: Path) -> None:
     found = opened(path).index.rows("select count(*), count(distinct step) from sample where topic = ?", Topic.REPLY)
     assert found == [(STEPS, STEPS)]
+
+
+def test_words_in_the_mouth_of_another_agent_are_found_under_no_agent(tmp_path: Path) -> None:
+    """Neither where a message is read nor where only its beginning is looked at."""
+    path = tmp_path / "foreign.mcap"
+    with Recorder(path) as recorder:
+        put(recorder, *begin())
+        put(recorder, *step_of(0))
+        for message in step_of(0):
+            key = key_of(message)
+            if key.endswith(("/reply", "/exchange", "/observation")):
+                recorder.write(key.replace("/blue/", "/red/"), encode(message))
+                recorder.write(key, encode(message).replace(b'"run":"made"', b'"run":"other"', 1))
+    with contextlib.closing(opened(path).index) as index:
+        found = index.rows("select topic, side, count(*) from sample where agent != '' group by topic, side")
+    assert {side for _, side, _ in found} == {"blue"}
+    assert {topic: count for topic, _, count in found}["reply"] == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from pathlib import Path
@@ -66,6 +67,16 @@ def test_one_that_changed_is_read_again(tmp_path: Path) -> None:
     path.unlink()
     make(path, steps=3)
     assert lines([path], tmp_path)[0].steps == 3
+
+
+def test_one_that_was_replaced_with_its_size_and_its_time_kept_is_read_again(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap")
+    before, data = path.stat(), path.read_bytes()
+    assert lines([path], tmp_path)[0].complete
+    path.write_bytes(data[:-8] + bytes(8))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    library._read_head.cache_clear()
+    assert not lines([path], tmp_path)[0].complete
 
 
 def test_a_directory_lists_what_is_below_it_and_nothing_else(tmp_path: Path) -> None:
