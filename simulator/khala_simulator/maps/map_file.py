@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 from yaml import YAMLError
 
 from khala_simulator.maps.game_map import GameMap, MapError, find_map, load_map, map_from, map_names
-from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario
+from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.scenario_file import parse_scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

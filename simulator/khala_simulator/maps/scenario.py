@@ -35,6 +35,9 @@ from khala_simulator.maps.script import At, CreateSpec, Enters, Every, Made, Tou
 MELEE_MINERALS = 50.0
 """What every player has at the start of a melee game."""
 
+LARGEST_SIDE = 512
+"""Cells of the longest side of a map."""
+Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
 Box = Annotated[
     tuple[int, int, int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
 ]
@@ -66,7 +69,7 @@ class PlayerSpec(Model):
 class Flat(Model):
     """A terrain without a terrain file: level ground of this many cells."""
 
-    flat: Annotated[tuple[int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
+    flat: Annotated[tuple[Side, Side], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
 
 
 class Scenario(Model):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, model_validator
 
-from khala_simulator.maps.places import GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName
+from khala_simulator.maps.places import MOST_UNITS, GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -173,7 +173,7 @@ class CreateSpec(Model):
 
     player: Owner
     unit: UnitName
-    count: Annotated[int, Field(ge=1, le=400)] = 1
+    count: Annotated[int, Field(ge=1, le=MOST_UNITS)] = 1
     at: Spot
     facing: float | Literal["random"] = 4.7124
     life: Annotated[float, Field(gt=0)] | None = None
@@ -198,7 +198,7 @@ class RegroupSpec(Model):
 
     player: Owner
     unit: UnitName
-    more: Annotated[int, Field(ge=0)] = 0
+    more: Annotated[int, Field(ge=0, le=MOST_UNITS)] = 0
     at: Spot
 
 

@@ -11,7 +11,8 @@ from khala_simulator.abilities import casting
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import MapError, map_from
 from khala_simulator.maps.places import PlaceGrid, Region, Span
-from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario, sheets
+from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.scenario_file import parse_scenario, sheets
 from khala_simulator.maps.script import Comparison
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.orders import OrderKind
