@@ -13,10 +13,8 @@ import contextlib
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from yaml import YAMLError
-
 from khala_simulator.maps.game_map import GameMap, MapError, find_map, load_map, map_from, map_names
-from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.nodes import ScenarioError, text_of
 from khala_simulator.maps.scenario_file import parse_scenario
 
 if TYPE_CHECKING:
@@ -73,15 +71,17 @@ def read_map(data: bytes, path: str) -> GameMap:
         return _read_text(data, path or "the map")
     except (MapError, ScenarioError) as error:
         raise MapDataError(str(error)) from error
-    except (ValueError, YAMLError) as error:  # no UTF-8, control characters, an impossible date
-        raise MapDataError(f"{path or 'the map'} cannot be read: {error}") from error
 
 
 def _read_text(data: bytes, source: str) -> GameMap:
-    text = data.decode()
+    text = text_of(data, source)
     if is_placeholder(data):
         return load_map(text[len(_MARK) :].strip())
-    return map_from(parse_scenario(text, source), text)  # the mark is a comment of YAML
+    scenario = parse_scenario(text, source)  # the mark is a comment of YAML
+    try:
+        return map_from(scenario, text)
+    except MapError as error:
+        raise MapError(f"{source}: {error}") from error
 
 
 def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:

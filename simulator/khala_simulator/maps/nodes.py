@@ -55,6 +55,19 @@ def compose(text: str, source: str) -> yaml.MappingNode:
     return node
 
 
+def text_of(data: bytes, source: str) -> str:
+    """Return the text in the bytes of a file.
+
+    Raises:
+        ScenarioError: it is no UTF-8.
+    """
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ScenarioError(f"{source}:{line}: the file: it is no UTF-8 text") from error
+
+
 def not_yaml(error: yaml.MarkedYAMLError, source: str) -> ScenarioError:
     """Return the error for a text that YAML refuses."""
     line = error.problem_mark.line + 1 if error.problem_mark else 1

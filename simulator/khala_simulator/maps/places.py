@@ -132,8 +132,14 @@ def kind_of_place(value: Any) -> str | None:
         return "name"
     if isinstance(value, list | tuple):
         return "point" if not value or not isinstance(value[0], list | tuple) else "points"
-    keys = value if isinstance(value, dict) else type(value).model_fields
-    return next((kind for kind in ("x", "random_in", "column") if kind in keys), None)
+    return next((kind for kind in ("x", "random_in", "column") if kind in fields_of(value)), None)
+
+
+def fields_of(value: Any) -> Collection[Any]:
+    """Return the names of the fields of a mapping or of a model; a plain value has none."""
+    if isinstance(value, Model):
+        return type(value).model_fields
+    return value if isinstance(value, dict) else ()
 
 
 Place = Annotated[
@@ -185,7 +191,7 @@ class PlaceGrid(Model):
     @model_validator(mode="after")
     def _few(self) -> PlaceGrid:
         if len(self.x) * len(self.y) > MOST_UNITS:
-            raise ValueError(f"give at most {MOST_UNITS} places, not {len(self.x)} x {len(self.y)}")
+            raise ValueError(f"give at most {MOST_UNITS} places, there are {len(self.x)} x {len(self.y)} here")
         return self
 
 

@@ -151,6 +151,6 @@ def _drawn(triggers: Any) -> list[str]:
         actions = trigger.get("do") if isinstance(trigger, dict) else None
         for action in actions if isinstance(actions, list) else ():
             options = action.get("draw", ()) if isinstance(action, dict) else ()
-            for option in [options] if isinstance(options, dict) else options:
+            for option in options if isinstance(options, list) else [options]:
                 found += list(option) if isinstance(option, dict) else []
     return found

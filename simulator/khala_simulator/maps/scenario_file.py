@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from pydantic import ValidationError
 
-from khala_simulator.maps.nodes import ScenarioError, compose, not_yaml, shown, wrong
+from khala_simulator.maps.nodes import ScenarioError, compose, not_yaml, shown, text_of, wrong
 from khala_simulator.maps.places import UnknownNameError
 from khala_simulator.maps.scenario import Scenario, names_of
 
@@ -86,13 +86,10 @@ def read_scenario(path: Path) -> Scenario:
         ScenarioError: it can't be read, is no YAML, or breaks the language.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"{path}: can't be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise ScenarioError(f"{path}:{line}: the file: it is no UTF-8 text") from error
-    return parse_scenario(text, str(path))
+    return parse_scenario(text_of(data, str(path)), str(path))
 
 
 def parse_scenario(text: str, source: str) -> Scenario:

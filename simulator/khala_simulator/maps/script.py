@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, model_validator
 
-from khala_simulator.maps.places import MOST_UNITS, GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName
+from khala_simulator.maps.places import MOST_UNITS, GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName, fields_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,7 +87,7 @@ def only_key(value: Any) -> str | None:
     """Return which of several models a value is: the name of its only key, or ``event`` for a word."""
     if isinstance(value, str):
         return "event"
-    keys = list(value) if isinstance(value, dict) else list(type(value).model_fields)
+    keys = list(fields_of(value))
     return str(keys[0]) if len(keys) == 1 else None
 
 
