@@ -10,6 +10,8 @@ Above: `process/install.py`, `process/lobby.py`. Below: `game_map.py`, `archive.
 from __future__ import annotations
 
 import contextlib
+import errno
+import stat
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -24,6 +26,8 @@ FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps", "duels")
 """Folders below `Maps`: those that PySC2, SMAC and LLM-PySC2 look into, and that of Khala's own maps."""
 
 SUFFIX = ".SC2Map"
+LARGEST_FILE = 256 * 2**20
+"""Bytes of a map or a replay; the largest of the game have some 20 MB."""
 _MARK = b"# A map of Khala's simulator\n"
 _ARCHIVE = b"MPQ"
 
@@ -92,12 +96,26 @@ def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | 
     if path in saved:
         return saved[path]
     for file in _files(path, data_dir):
-        with contextlib.suppress(OSError, ValueError):  # not there, a directory, or no possible name at all
-            return file.read_bytes()
+        with contextlib.suppress(OSError, ValueError):  # not there, no file, or no possible name at all
+            return read_file(file)
     try:
         return _placeholder(find_map(path))
     except MapError:
         return None
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a regular file: a pipe would stop the process, and a device fill its memory.
+
+    Raises:
+        OSError: it can't be read, is no regular file, or is too large.
+    """
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+    if found.st_size > LARGEST_FILE:
+        raise OSError(errno.EFBIG, f"it is larger than {LARGEST_FILE} bytes", str(path))
+    return path.read_bytes()
 
 
 def _files(path: str, data_dir: Path) -> Iterator[Path]:

@@ -14,6 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.api.game_info import RACES, GameInfo
 from khala_simulator.api.projection import size_problem
 from khala_simulator.api.viewer import Viewer
+from khala_simulator.maps.map_file import read_file
 from khala_simulator.process.clock import LOOPS_PER_SECOND, RealtimeClock
 from khala_simulator.process.process import Failure, Playing
 from khala_simulator.process.replay import Replay, ReplayError, rerun
@@ -111,7 +112,7 @@ def _read(process: Process, request: sc.RequestStartReplay | sc.RequestReplayInf
     if kind == "replay_path":
         for place in _places(process, request.replay_path):
             with contextlib.suppress(OSError, ValueError):  # not there, or no possible name at all
-                data = place.read_bytes()
+                data = read_file(place)
                 break
         else:
             raise _Unreadable("InvalidReplayPath", f"No replay {request.replay_path}")
