@@ -41,7 +41,7 @@ HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
 
 
 class MapError(ValueError):
-    """No such map, or its terrain is missing."""
+    """No such map, or its terrain is missing or does not hold it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,15 @@ def map_from(scenario: Scenario, text: str) -> GameMap:
 
 
 def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
-    """Return the map of a scenario on a terrain, which ``content`` defines completely."""
+    """Return the map of a scenario on a terrain, which ``content`` defines completely.
+
+    Raises:
+        MapError: a point or the playable area is not on the terrain; the text names the field.
+    """
+    width, height = terrain.size
+    for field, (x, y, *_) in scenario.stated_points():
+        if not (0 <= x <= width and 0 <= y <= height):
+            raise MapError(f"{field}: [{x:g}, {y:g}] is not on the map, which has {width} x {height} cells")
     narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
     return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
 

@@ -25,12 +25,15 @@ executes it and ``maps`` joins it with its terrain.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UpgradeName
-from khala_simulator.maps.script import At, CreateSpec, Enters, Every, Made, Touches, Trigger
+from khala_simulator.maps.script import At, Create, CreateSpec, Enters, Every, Made, Touches, Trigger
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 MELEE_MINERALS = 50.0
 """What every player has at the start of a melee game."""
@@ -107,6 +110,27 @@ class Scenario(Model):
             if len(without) > open_starts:
                 raise ValueError(f"a melee game needs a start location for player {without[open_starts]}")
         return self
+
+    def stated_points(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Yield each point that the file gives in numbers, with its field; those that are drawn or counted are not."""
+        yield from ((f"points.{name}", point) for name, point in self.points.items())
+        yield from ((f"start_locations[{number}]", point) for number, point in enumerate(self.start_locations))
+        yield from ((f"players.{number}.start", player.start) for number, player in self.players.items() if player.start)
+        if self.camera is not None:
+            yield "camera", self.camera
+        for field, spec in self._created():
+            if isinstance(spec.at, tuple):
+                for place in spec.at if isinstance(spec.at[0], tuple) else [spec.at]:
+                    yield f"{field}.at", place  # type: ignore[misc]  # a point, or a list of them
+
+    def _created(self) -> Iterator[tuple[str, CreateSpec]]:
+        yield from ((f"units[{number}]", spec) for number, spec in enumerate(self.units))
+        for name, group in self.groups.items():
+            yield from ((f"groups.{name}[{number}]", spec) for number, spec in enumerate(group))
+        for number, trigger in enumerate(self.triggers):
+            for place, action in enumerate(trigger.do):
+                if isinstance(action, Create):
+                    yield f"triggers[{number}].do[{place}].create", action.create
 
     @cached_property
     def periods(self) -> tuple[int, ...]:

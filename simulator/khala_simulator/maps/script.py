@@ -178,7 +178,7 @@ class CreateSpec(Model):
     facing: float | Literal["random"] = 4.7124
     life: Annotated[float, Field(gt=0)] | None = None
     energy: Annotated[float, Field(ge=0)] | None = None
-    cargo: dict[UnitName, Annotated[int, Field(ge=1, le=8)]] = Field(default_factory=dict)
+    cargo: dict[UnitName, Annotated[int, Field(ge=1, le=8)]] = Field(default_factory=dict, max_length=8)
 
 
 class Create(Model):
