@@ -27,7 +27,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UpgradeName
 from khala_simulator.maps.script import At, Create, CreateSpec, Enters, Every, Made, Touches, Trigger
@@ -81,7 +81,10 @@ class Scenario(Model):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     family: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     title: str
-    terrain: str | Flat
+    terrain: Annotated[
+        Annotated[str, Tag("name")] | Annotated[Flat, Tag("flat")],
+        Discriminator(lambda value: "name" if isinstance(value, str) else "flat"),
+    ]
     playable: Box | None = None
     """The playable part of the terrain, ``[x0, y0, x1, y1]``; by default the terrain's own."""
     visibility: Visibility = Visibility()

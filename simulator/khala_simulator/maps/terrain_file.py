@@ -32,7 +32,8 @@ ATTRIBUTE_AT: Final = 4
 Z_STEP: Final = 256.0
 SIGNED_FROM: Final = 128.0  # heights from here on are below zero
 CLIFF_TILE: Final = 1  # bit of a cell's flags
-_TWO_WORDS = re.compile(rb"(?=([A-Za-z]\w*\x00[A-Za-z]\w*\x00))")  # may overlap: a file's name may end before them
+# The names may overlap: a file's name may end before them. Without a limit a long word takes quadratic time.
+_TWO_WORDS = re.compile(rb"(?=([A-Za-z]\w{0,99}\x00[A-Za-z]\w{0,99}\x00))")
 
 
 class TerrainError(ValueError):

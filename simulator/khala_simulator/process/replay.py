@@ -13,7 +13,7 @@ import dataclasses
 import json
 import struct
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from google.protobuf.message import DecodeError, Message
 from s2clientprotocol import debug_pb2
@@ -34,6 +34,8 @@ _MEMBER = "khala.replay"
 _MARK = b"Khala replay 3\n"
 _ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
 _KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
+_LARGEST = 2**29
+"""Bytes of the content of a replay."""
 
 
 class ReplayError(ValueError):
@@ -87,7 +89,11 @@ class Replay:
         if not data.startswith(_MARK):
             raise ReplayError("The data is not a replay of this simulator")
         try:
-            return cls._decode(zlib.decompress(data[len(_MARK) :]))
+            whole = zlib.decompressobj()
+            content = whole.decompress(data[len(_MARK) :], _LARGEST)
+            if not whole.eof:
+                raise ValueError("it is cut off, or too large")
+            return cls._decode(content)
         except (zlib.error, ValueError, LookupError, TypeError, struct.error, DecodeError) as error:
             raise ReplayError(f"The replay is damaged: {error}") from error
 
@@ -101,18 +107,28 @@ class Replay:
             map_data=map_data,
             path=fields["path"],
             players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in fields["players"]),
-            seed=fields["seed"],
-            disable_fog=fields["disable_fog"],
-            realtime=fields["realtime"],
+            seed=_number(fields, "seed"),
+            disable_fog=bool(fields["disable_fog"]),
+            realtime=bool(fields["realtime"]),
             observers=tuple(sc.PlayerSetup.FromString(bytes.fromhex(observer)) for observer in fields["observers"]),
         )
         interfaces = {
             int(player): sc.InterfaceOptions.FromString(bytes.fromhex(options))
             for player, options in fields["interfaces"].items()
         }
-        results = {int(player): result for player, result in fields["results"].items()}
+        results = {int(player): sc.Result.Value(sc.Result.Name(result)) for player, result in fields["results"].items()}
         races = {int(player): str(race) for player, race in fields["races"].items()}
-        return cls(setup, interfaces, fields["loops"], results, races, tuple(unpack(log)))
+        places = range(1, len(setup.players) + 1)
+        if strangers := {*interfaces, *results, *races}.difference(places):
+            raise ValueError(f"it has no player {min(strangers)}")
+        return cls(setup, interfaces, _number(fields, "loops"), results, races, tuple(unpack(log)))
+
+
+def _number(fields: dict[str, Any], name: str) -> int:
+    number = fields[name]
+    if type(number) is not int or not 0 <= number < 1 << 32:
+        raise ValueError(f"{name} is {number!r}")
+    return number
 
 
 def _hex(message: Message) -> str:
