@@ -87,8 +87,10 @@ def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseR
         player = extra.player_info
         player.player_id, player.type, player.race_requested = number, setup.type, setup.race
         player.player_name = setup.player_name
-        if (race := RACES.get(replay.races[number])) is not None:
+        if (race := RACES.get(replay.races.get(number, ""))) is not None:
             player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum
+        if number not in replay.results:
+            continue
         extra.player_result.player_id = number
         extra.player_result.result = sc.Result.Value(sc.Result.Name(replay.results[number]))  # type: ignore[arg-type]  # same numbers
     return info
