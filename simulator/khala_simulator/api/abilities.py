@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
     Result: TypeAlias = error_pb2.ActionResult.ValueType
 
-_ON_PANEL = frozenset({"unload_unit"})
-"""Effects of abilities without a button: a click on a passenger gives them, so the game does not offer them."""
-
-
 @dataclasses.dataclass(frozen=True, slots=True)
 class UnitCommand:
     """What a player asked for: an ability id of either kind, for units by tag, at a unit, a point or nothing."""
@@ -116,7 +112,7 @@ def _forms(catalog: Catalog, row: int, requested: int) -> tuple[Ability | None, 
 @lru_cache(maxsize=1024)
 def _card(catalog: Catalog, row: int) -> tuple[Ability, ...]:
     """Return the abilities on the buttons of a type's command card."""
-    return tuple(ability for ability in catalog.abilities_of(row) if ability.effect not in _ON_PANEL)
+    return tuple(ability for ability in catalog.abilities_of(row) if not ability.unlisted)
 
 
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
