@@ -96,7 +96,9 @@ def _without_parts(_: list[int]) -> list[sc.Request]:
 
 def _numbers(tags: list[int]) -> list[sc.Request]:
     floats, whole = (float("nan"), float("inf"), -1e38, 1e38), (-(2**31), -1, 2**31 - 1)
-    points = [_actions(command(ability, tags, point=(x, y))) for ability in (1, 16, 23, 318) for x in floats for y in floats]
+    points = [
+        _actions(command(ability, tags, point=(x, y))) for ability in (1, 16, 23, 318) for x in floats for y in floats
+    ]
     return [*points, *(_actions(command(ability, tags, target=2**64 - 1)) for ability in whole)]
 
 
@@ -197,11 +199,14 @@ def _visit(origin: str | None, host: str | None = None) -> Play:
 
 async def _lan_client(_: Path) -> str:
     """PySC2's library names the game as its origin; it must be let in."""
-    async with _server() as (url, port), aiohttp.ClientSession() as http:
-        async with http.ws_connect(url, headers={"Origin": f"http://127.0.0.1:{port}"}) as ws:
-            await ws.send_bytes(PING)
-            answer = sc.Response.FromString(await ws.receive_bytes(timeout=PATIENCE_S))
-            return "" if answer.id == 7 else "PySC2 was not answered"
+    async with (
+        _server() as (url, port),
+        aiohttp.ClientSession() as http,
+        http.ws_connect(url, headers={"Origin": f"http://127.0.0.1:{port}"}) as ws,
+    ):
+        await ws.send_bytes(PING)
+        answer = sc.Response.FromString(await ws.receive_bytes(timeout=PATIENCE_S))
+        return "" if answer.id == 7 else "PySC2 was not answered"
 
 
 def _frames(*frames: bytes) -> Play:
@@ -307,7 +312,21 @@ def _cut_archive() -> bytes:
 async def _mutations(_: Path) -> str:
     dice = random.Random(3)
     text = HEAD + "units: [{player: 1, unit: Marine, at: [4, 4]}]\npoints: {a: [3, 3]}\n"
-    junk = ("7", "[]", "{}", "[[]]", ".nan", "-.inf", "!!binary x", "2026-02-31", "&a *a", "? ", "\x07", "'", "9" * 5000)
+    junk = (
+        "7",
+        "[]",
+        "{}",
+        "[[]]",
+        ".nan",
+        "-.inf",
+        "!!binary x",
+        "2026-02-31",
+        "&a *a",
+        "? ",
+        "\x07",
+        "'",
+        "9" * 5000,
+    )
     for _number in range(150):
         begin = dice.randrange(len(text))
         hostile = text[:begin] + dice.choice(junk) + text[begin + dice.randint(0, 12) :]
@@ -340,7 +359,9 @@ async def _replays(_: Path) -> str:
         for _change in range(dice.randint(1, 4)):
             data[dice.randrange(len(data))] = dice.randrange(256)
         broken = bytes(data[: dice.choice((len(data), dice.randrange(len(data))))])
-        if fault := _answered(client, sc.Request(replay_info=sc.RequestReplayInfo(replay_data=broken)).SerializeToString()):
+        if fault := _answered(
+            client, sc.Request(replay_info=sc.RequestReplayInfo(replay_data=broken)).SerializeToString()
+        ):
             return fault
     return ""
 
@@ -390,6 +411,7 @@ def _row(door: str, what: str, play: Play, kind: Kind = "attack") -> Row:
 _game_row, _map_row = partial(_row, "game: requests"), partial(_row, "game: maps")
 _socket_row, _command_row = partial(_row, "game: websocket"), partial(_row, "khala sc2")
 _BOMB = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))])
+_ROW = HEAD + "units: [{player: 1, unit: Marine, at: {x: {from: 0, to: 1.0e+9}, y: 3}}]\n"
 
 ROWS: Final[tuple[Row, ...]] = (
     _game_row("requests and actions without their parts", _request(_without_parts), "quirk"),
@@ -414,7 +436,7 @@ ROWS: Final[tuple[Row, ...]] = (
     _map_row("a scenario nested 200 000 deep", _scenario(HEAD + "triggers: " + "[" * 200_000)),
     _map_row("aliases of aliases", _scenario(_BOMB)),
     _map_row("a terrain of 10 billion cells", _scenario(HEAD.replace("[32, 32]", "[100000, 100000]"))),
-    _map_row("a row of a billion units", _scenario(f"{HEAD}units: [{{player: 1, unit: Marine, at: {{x: {{from: 0, to: 1.0e+9}}, y: 3}}}}]\n")),
+    _map_row("a row of a billion units", _scenario(_ROW)),
     _map_row("150 mutated scenarios", _mutations, "fault"),
     _map_row("a unit off the map", _map(lambda: MARK + HEAD.encode() + b"points: {a: [99999, 3]}\n"), "fault"),
     _map_row("an archive that is cut off", _map(_cut_archive), "fault"),

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
+from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.maps.game_map import load_map, map_names
 from khala_simulator.maps.map_file import MapDataError, read_file, read_map
 from khala_simulator.maps.nodes import ScenarioError
 from khala_simulator.maps.scenario_file import parse_scenario, read_scenario
 from khala_simulator.process.client import Client, ResponseError, interface
-from s2clientprotocol import sc2api_pb2 as sc
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +31,9 @@ players: {1: {race: terran, control: agent}, 2: {race: zerg, control: computer}}
 """
 UNIT = HEAD + "units: [{player: 1, unit: Marine, at: [4, 4]}]\n"
 BOMB = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))])
-MERGED = "\n".join(["m0: &m0 {x: 1}", *(f"m{i}: &m{i} {{<<: [{', '.join([f'*m{i - 1}'] * 9)}]}}" for i in range(1, 12))])
+MERGED = "\n".join(
+    ["m0: &m0 {x: 1}", *(f"m{i}: &m{i} {{<<: [{', '.join([f'*m{i - 1}'] * 9)}]}}" for i in range(1, 12))]
+)
 
 SENTENCES = [
     (HEAD + f"triggers: {'[' * 200_000}", "h.yaml:6: the file: nested too deep"),

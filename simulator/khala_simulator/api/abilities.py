@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
     Result: TypeAlias = error_pb2.ActionResult.ValueType
 
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class UnitCommand:
     """What a player asked for: an ability id of either kind, for units by tag, at a unit, a point or nothing."""

@@ -239,7 +239,9 @@ def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
     x0, y0, x1, y1 = playable
     width, height = terrain.size
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-        raise MapError(f"playable: the playable area {list(playable)} is not within the terrain's {width} x {height} cells")
+        raise MapError(
+            f"playable: the playable area {list(playable)} is not within the terrain's {width} x {height} cells"
+        )
     inside = np.zeros_like(terrain.walk)
     inside[y0:y1, x0:x1] = True
     grids = {name: getattr(terrain, name) & inside for name in ("walk", "glide", "build", "creep")}

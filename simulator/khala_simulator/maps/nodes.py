@@ -150,4 +150,3 @@ def _check_scalar(node: yaml.Node, field: str) -> None:
     except (yaml.YAMLError, *_UNREADABLE) as error:
         kind = node.tag.rpartition(":")[2]
         raise wrong(node, f"{place}: {shown(node.value)} is no {kind}; put it in quotes if it is a text") from error
-

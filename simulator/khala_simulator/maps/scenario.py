@@ -72,7 +72,9 @@ class PlayerSpec(Model):
 class Flat(Model):
     """A terrain without a terrain file: level ground of this many cells."""
 
-    flat: Annotated[tuple[Side, Side], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
+    flat: Annotated[
+        tuple[Side, Side], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+    ]
 
 
 class Scenario(Model):
@@ -118,7 +120,9 @@ class Scenario(Model):
         """Yield each point that the file gives in numbers, with its field; those that are drawn or counted are not."""
         yield from ((f"points.{name}", point) for name, point in self.points.items())
         yield from ((f"start_locations[{number}]", point) for number, point in enumerate(self.start_locations))
-        yield from ((f"players.{number}.start", player.start) for number, player in self.players.items() if player.start)
+        yield from (
+            (f"players.{number}.start", player.start) for number, player in self.players.items() if player.start
+        )
         if self.camera is not None:
             yield "camera", self.camera
         for field, spec in self._created():

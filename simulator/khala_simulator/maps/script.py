@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, model_validator
 
-from khala_simulator.maps.places import MOST_UNITS, GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName, fields_of
+from khala_simulator.maps.places import (
+    MOST_UNITS,
+    GroupName,
+    Model,
+    Owner,
+    Place,
+    RegionName,
+    Source,
+    Spot,
+    UnitName,
+    fields_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

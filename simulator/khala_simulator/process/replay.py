@@ -91,11 +91,7 @@ class Replay:
         if not data.startswith(_MARK):
             raise ReplayError("The data is not a replay of this simulator")
         try:
-            whole = zlib.decompressobj()
-            content = whole.decompress(data[len(_MARK) :], _LARGEST)
-            if not whole.eof:
-                raise ValueError("it is cut off, or too large")
-            return cls._decode(content)
+            return cls._decode(_unpacked(data[len(_MARK) :]))
         except (zlib.error, ValueError, LookupError, struct.error, DecodeError) as error:
             raise ReplayError(f"The replay is damaged: {error}") from error
 
@@ -123,6 +119,14 @@ class Replay:
         if problem := next(filter(None, map(size_problem, interfaces.values())), ""):
             raise ValueError(problem)
         return cls(setup, interfaces, head.loops, head.results, head.races, tuple(unpack(log)))
+
+
+def _unpacked(data: bytes) -> bytes:
+    whole = zlib.decompressobj()
+    content = whole.decompress(data, _LARGEST)
+    if not whole.eof:
+        raise ValueError("it is cut off, or too large")
+    return content
 
 
 class _Head(BaseModel):

@@ -69,8 +69,9 @@ class Ability:
 
     ``general`` is the id under which clients may also ask for it, ``solo`` means that only one of several ordered units
     uses it, ``transient`` that it leaves the unit's orders alone, ``overhead`` that the unit has to be right above the
-    point, ``unlisted`` that no command card has a button for it, so that the game never says it is available: a click on
-    a passenger or on a place of a queue gives such a one. ``count`` is how many it makes, ``supply`` their supply in all. ``numbers`` are the skill's own numbers.
+    point. An ``unlisted`` one has no button on a command card, so the game never lists it as available: a click on a
+    passenger or on a place of a queue gives it. ``count`` is how many it makes, ``supply`` their supply in all.
+    ``numbers`` are the skill's own numbers.
     """
 
     id: int

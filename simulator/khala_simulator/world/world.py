@@ -50,7 +50,7 @@ NO_TAG: Final = 0
 TAG_BASE: Final = 1 << 32
 INDEX_SHIFT: Final = 18
 MOST_UNITS: Final = 4_000
-"""Units that scripts and debug commands fill a world up to; a tag has room for 16 383, and a loop is slow long before."""
+"""Units up to which scripts and debug commands fill a world; tags have room for 16 383, and loops are slow by then."""
 
 
 @dataclass(frozen=True, slots=True)

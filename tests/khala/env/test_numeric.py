@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv
 
-from khala.env.numeric import CentralEnv, StarCraft2Env, env, parallel_env
+from khala.env import numeric
+from khala.env.numeric import CentralEnv, StarCraft2Env, parallel_env
 from khala_protocol.errors import ConfigError
 from khala_simulator.battle import Battle
 
@@ -161,7 +162,7 @@ def played_on(made: Any) -> str:
 
 MAKERS: dict[str, Callable[[], Any]] = {
     "parallel": lambda: parallel_env("3m"),
-    "aec": lambda: env("3m"),
+    "aec": lambda: numeric.env("3m"),
     "central": lambda: CentralEnv("3m"),
     "gymnasium": lambda: gymnasium.make("khala.env.numeric:khala-smac/3m-v0"),
 }

@@ -10,8 +10,8 @@ import pytest
 from khala_simulator.abilities import casting
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import MapError, map_from
-from khala_simulator.maps.places import PlaceGrid, Region, Span
 from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.places import PlaceGrid, Region, Span
 from khala_simulator.maps.scenario_file import parse_scenario, sheets
 from khala_simulator.maps.script import Comparison
 from khala_simulator.tick import advance, new_game
