@@ -410,7 +410,7 @@ def _row(door: str, what: str, play: Play, kind: Kind = "attack") -> Row:
 
 _game_row, _map_row = partial(_row, "game: requests"), partial(_row, "game: maps")
 _socket_row, _command_row = partial(_row, "game: websocket"), partial(_row, "khala sc2")
-_BOMB = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12))])
+_BOMB = "\n".join(["a0: &a0 {x: 1}", *(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 12))])
 _ROW = HEAD + "units: [{player: 1, unit: Marine, at: {x: {from: 0, to: 1.0e+9}, y: 3}}]\n"
 
 ROWS: Final[tuple[Row, ...]] = (
