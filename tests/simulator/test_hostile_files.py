@@ -123,12 +123,12 @@ def test_a_script_that_makes_units_without_end_stops_before_the_tags_are_used_up
 ) -> None:
     text = HEAD + (
         "triggers: [{name: a, when: [start], do: ["
-        + ", ".join(["{create: {player: 1, unit: SupplyDepot, count: 400, at: [24, 24]}}"] * 3)
+        + ", ".join(["{create: {player: 1, unit: Medivac, at: {x: {from: 1, to: 20}, y: {from: 1, to: 5}}}}"] * 3)
         + "]}]\n"
     )
-    monkeypatch.setattr(worlds, "MOST_UNITS", 500)
+    monkeypatch.setattr(worlds, "MOST_UNITS", 150)
     world = new_game(map_from(parse_scenario(text, "h.yaml"), text), seed=1)
-    assert len(world.units_of(1)) == 500
+    assert len(world.units_of(1)) == 150
 
 
 # mutations ------------------------------------------------------------------------------------------------------------

@@ -101,10 +101,11 @@ def _check_depth(text: str, source: str) -> None:
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
+        line = 1 if event.start_mark is None else event.start_mark.line + 1
         if depth > DEEPEST:
-            raise wrong(event, "the file: nested too deep")
+            raise ScenarioError(f"{source}:{line}: the file: nested too deep")
         if count > 2 * MOST_VALUES:  # names of fields are events as well
-            raise wrong(event, f"the file: there are more than {MOST_VALUES} values")
+            raise ScenarioError(f"{source}:{line}: the file: there are more than {MOST_VALUES} values")
 
 
 def _check_values(root: yaml.MappingNode) -> None:
