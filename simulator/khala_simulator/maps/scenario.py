@@ -128,7 +128,7 @@ class Scenario(Model):
         for field, spec in self._created():
             if isinstance(spec.at, tuple):
                 for place in spec.at if isinstance(spec.at[0], tuple) else [spec.at]:
-                    yield f"{field}.at", place  # type: ignore[misc]  # a point, or a list of them
+                    yield f"{field}.at", place
 
     def _created(self) -> Iterator[tuple[str, CreateSpec]]:
         yield from ((f"units[{number}]", spec) for number, spec in enumerate(self.units))
