@@ -214,7 +214,7 @@ def _frames(*frames: bytes) -> Play:
 
     async def play(_: Path) -> str:
         async with _server() as (url, port), aiohttp.ClientSession() as http:
-            _, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer = (await asyncio.open_connection("127.0.0.1", port))[1]
             writer.write(
                 b"GET /sc2api HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                 b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"

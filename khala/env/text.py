@@ -113,7 +113,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Make the environment again."""
-        vars(self).update(state)
+        self.__dict__.update(state)
         self._forget()
 
     def observation_space(self, agent: str) -> spaces.Space[str]:

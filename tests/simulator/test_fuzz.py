@@ -157,7 +157,7 @@ def test_a_text_that_is_not_utf_8_is_refused_by_its_name(path: tuple[str, ...]) 
     state = next(state for state in LEGAL if path[0] in LEGAL[state] and state is not Status.ended)
     response = sc.Response.FromString(prepare(state).session.handle(broken))
     assert list(response.error) == [f"{'.'.join(path)} in the request is not a text in UTF-8"]
-    assert (response.id, response.status) == (3, state)
+    assert (response.id, Status(response.status)) == (3, state)
 
 
 @pytest.mark.parametrize("state", [Status.launched, Status.in_game], ids=lambda state: state.name)

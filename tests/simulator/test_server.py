@@ -258,8 +258,9 @@ async def test_the_library_of_pysc2_is_let_in(running: Running) -> None:
     ws = await asyncio.to_thread(websocket.create_connection, f"ws://127.0.0.1:{port}/sc2api", timeout=5)
     await asyncio.to_thread(ws.send, PING.SerializeToString())
     answer = await asyncio.to_thread(ws.recv)
+    assert isinstance(answer, bytes)
     assert sc.Response.FromString(answer).id == 255
-    ws.shutdown()
+    ws.shutdown()  # type: ignore[no-untyped-call]  # websocket-client has no types
 
 
 async def test_a_request_beyond_the_limit_ends_that_connection_only(

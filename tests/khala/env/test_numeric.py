@@ -6,7 +6,7 @@ import pickle
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import cloudpickle
+import cloudpickle  # type: ignore[import-untyped]  # it has no types
 import gymnasium
 import numpy as np
 import pytest
@@ -142,6 +142,7 @@ def test_a_seed_begins_a_new_game_and_none_goes_on() -> None:
 def test_a_reset_in_the_middle_of_an_episode_goes_on_in_the_same_game() -> None:
     env = CentralEnv("3m", seed=3)
     first, _ = env.reset()
+    again = first
     for episode in range(1, 4):
         env.step(np.array([EAST, EAST, EAST]))
         again, _ = env.reset()

@@ -8,7 +8,7 @@ import random
 import warnings
 from typing import TYPE_CHECKING, Any
 
-import cloudpickle
+import cloudpickle  # type: ignore[import-untyped]  # it has no types
 import numpy as np
 import psutil
 import pytest

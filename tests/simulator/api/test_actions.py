@@ -693,6 +693,7 @@ def test_pysc2_warns_of_no_ability_of_a_loaded_transport(
 def test_no_unit_offers_an_ability_that_pysc2_does_not_know() -> None:
     known = pytest.importorskip("khala_bridge.compat").actions.ABILITY_IDS
     catalog, unknown = load_catalog(), set[tuple[str, int]]()
+    world = new_game(load_map("Melee/Flat128"), seed=1)
     for number, unit in enumerate(catalog.units):
         if number % 30 == 0:  # not too many in one place
             world = new_game(load_map("Melee/Flat128"), seed=1)
