@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import time
+import zlib
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +18,7 @@ from khala_simulator.maps.game_map import map_from
 from khala_simulator.maps.map_file import MapDataError, read_file, read_map
 from khala_simulator.maps.nodes import ScenarioError
 from khala_simulator.maps.scenario_file import parse_scenario, read_scenario, sheets
+from khala_simulator.process import mpq
 from khala_simulator.process.client import Client, ResponseError, interface
 from khala_simulator.tick import new_game
 from khala_simulator.world import world as worlds
@@ -221,6 +224,38 @@ def test_mutated_scenarios_are_played_or_refused() -> None:
 def test_many_mutated_scenarios_are_played_or_refused() -> None:
     played = play_mutations(1500, seed=2)
     assert 100 < played < 1400
+
+
+# replays --------------------------------------------------------------------------------------------------------------
+
+FIELDS = ("path", "map", "players", "interfaces", "seed", "disable_fog", "loops", "observers", "results", "races")
+JUNK: tuple[Any, ...] = (None, -1, 1.5, "x", [7], {"9": "0801"})
+
+
+@pytest.fixture(scope="module")
+def head_and_log() -> tuple[dict[str, Any], bytes]:
+    client = Client()
+    client.play("SMAC_Maps/3m", interface(screen=0))
+    client.step(8)
+    data = mpq.member(client.ask(save_replay=sc.RequestSaveReplay()).save_replay.data, "khala.replay")
+    assert data is not None
+    head, _, log = zlib.decompress(data.partition(b"\n")[2]).partition(b"\n")
+    return json.loads(head), log
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_replay_whose_head_is_wrong_is_refused_or_watched(
+    field: str, head_and_log: tuple[dict[str, Any], bytes]
+) -> None:
+    head, log = head_and_log
+    for value in JUNK:
+        text = json.dumps({**head, field: value}).encode() + b"\n" + log
+        client, data = Client(), b"Khala replay 3\n" + zlib.compress(text)
+        info = client.ask(replay_info=sc.RequestReplayInfo(replay_data=data)).replay_info
+        if info.HasField("error"):
+            assert info.error_details.startswith("The replay is damaged: ")
+            continue
+        assert (field, value) == ("path", "x")  # any name will do
 
 
 # files that are none --------------------------------------------------------------------------------------------------
