@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import random
@@ -163,7 +164,7 @@ def mutated(data: Any, dice: random.Random) -> Any:
         holder, key = dice.choice(_places(data))
         kind = dice.random()
         if kind < 0.5:
-            holder[key] = dice.choice(VALUES)
+            holder[key] = copy.deepcopy(dice.choice(VALUES))  # a later change must not reach the next scenario
         elif kind < 0.65:
             del holder[key]
         elif kind < 0.8:
@@ -222,8 +223,8 @@ def test_mutated_scenarios_are_played_or_refused() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_many_mutated_scenarios_are_played_or_refused() -> None:
-    played = play_mutations(1500, seed=2)
-    assert 100 < played < 1400
+    played = play_mutations(600, seed=2)
+    assert 30 < played < 570
 
 
 # replays --------------------------------------------------------------------------------------------------------------
