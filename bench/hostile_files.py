@@ -1,11 +1,12 @@
-"""Read files that are made to do harm: mutated task, model and agents files, and mutated recordings.
+"""Read files that are made to do harm: mutated task, model and agents files, scenarios of maps, and recordings.
 
     python -m bench.hostile_files                                              3000 of each
     python -m bench.hostile_files --files 10000 --recordings 10000 --seed 7
     python -m bench.hostile_files --json                                       one JSON object on stdout
 
-Every file is read, or refused by a `KhalaError` of one sentence. Anything else is counted, and printed with the seed of
-its case: another exception, a case of more than 250 ms of CPU, more than 300 MB of memory. The exit code is then 1.
+Every file is read, or refused by an error of one sentence, a `KhalaError` or a `ScenarioError`. Anything else is
+counted, and printed with the seed of its case: another exception, a case of more than 250 ms of CPU, more than 300 MB
+of memory. The exit code is then 1.
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import yaml
 from rich.console import Console
 
 from khala_agents.config import AgentsFile, ModelConfig
@@ -33,6 +36,9 @@ from khala_orchestrator.transcript import StepSelection, summary, transcript
 from khala_protocol.configfile import load
 from khala_protocol.errors import KhalaError, RecordingError
 from khala_protocol.recording import Recorder, Recording, read
+from khala_simulator.maps.game_map import map_names
+from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.scenario_file import read_scenario, sheets
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,7 +107,7 @@ class Tally:
         try:
             case()
             self.read += 1
-        except KhalaError:
+        except (KhalaError, ScenarioError):
             pass
         except Exception as error:  # noqa: BLE001  # to find them is the purpose
             self.violations.append(f"{name}: {type(error).__name__}: {str(error)[:200]}")
@@ -185,6 +191,30 @@ def _bytes(text: str, dice: random.Random) -> bytes:
     if data and dice.random() < 0.1:
         data[dice.randrange(len(data))] = dice.randrange(256)
     return bytes(data)
+
+
+# --- scenarios ----------------------------------------------------------------------------------------------
+
+
+def scenarios(count: int, seed: int, directory: Path) -> Tally:
+    """Read mutations of the scenarios of all shipped maps."""
+    tally = Tally()
+    maps = resources.files("khala_simulator.data") / "maps"
+    shipped = {
+        name: yaml.safe_dump(sheet.data(), sort_keys=False)
+        for family in {name.partition("/")[0] for name in map_names()}
+        for file in (maps / family).iterdir()
+        if file.name.endswith(".yaml")
+        for name, sheet in sheets(file.read_text(encoding="utf-8"), file.name)
+    }
+    names = sorted(shipped)
+    for number in range(count):
+        dice = random.Random(f"{seed} {number}")
+        name, other = dice.choice(names), dice.choice(names)
+        hostile = directory / "scenario.yaml"
+        hostile.write_bytes(_bytes(mutated(shipped[name], shipped[other], dice), dice))
+        tally.judge(f"scenario {seed} {number}, of {name}", lambda: read_scenario(hostile))  # noqa: B023  # called at once
+    return tally
 
 
 # --- recordings ---------------------------------------------------------------------------------------------
@@ -304,10 +334,11 @@ def _nowhere() -> Console:
 
 
 def measure(count_files: int, count_recordings: int, seed: int) -> dict[str, Tally]:
-    """Return the tallies of files and of recordings."""
+    """Return the tallies of files, of as many scenarios, and of recordings."""
     with tempfile.TemporaryDirectory() as directory:
         return {
             "files": files(count_files, seed, Path(directory)),
+            "scenarios": scenarios(count_files, seed, Path(directory)),
             "recordings": recordings(count_recordings, seed, Path(directory)),
         }
 

@@ -46,6 +46,8 @@ _LONGEST_REPLY: Final = 4_000
 _CHARACTERS: Final = "\n" + "".join(filter(str.isprintable, map(chr, range(0x3000))))
 TRUNCATED: Final = frozenset({"time limit", "step limit", "agents gone"})
 """Why an episode ends that was not decided."""
+_RUNNING: Final = frozenset({"_thread", "_games", "_match", "_onlooker", "_turn", "_texts"})
+"""Attributes of an environment that belong to its match."""
 _UNTIMED: Final = {"wall_s": 0.0, "latency_p50_s": None, "latency_p95_s": None, "lag_s": 0.0}
 """What a clock has measured: without it, the same seed and replies give the same."""
 
@@ -86,16 +88,35 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         self._reward, self._game = reward, game
         self.render_mode = render_mode
         self.possible_agents = list(self._seats)
-        self.agents: list[str] = []
         text = spaces.Text(_LONGEST_TEXT, min_length=0, charset=_CHARACTERS)
         self.observation_spaces = dict.fromkeys(self.possible_agents, text)
         self.action_spaces = {agent: spaces.Text(_LONGEST_REPLY, min_length=0) for agent in self.possible_agents}
+        self._forget()
+
+    def _forget(self) -> None:
+        """Be as before the first episode."""
+        self.agents: list[str] = []
         self._thread: LoopThread | None = None
         self._games = IdleGames()
         self._match: SeatedMatch | None = None
         self._onlooker: Onlooker | None = None
         self._turn = Turn()
         self._texts: dict[str, str] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what `pickle` and `copy` keep: how the environment was made.
+
+        Raises:
+            TypeError: an episode has begun; the game is a process, which cannot be copied.
+        """
+        if self._thread is not None:
+            raise TypeError("an environment in words cannot be pickled or copied between reset() and close()")
+        return {name: value for name, value in vars(self).items() if name not in _RUNNING}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Make the environment again."""
+        self.__dict__.update(state)
+        self._forget()
 
     def observation_space(self, agent: str) -> spaces.Space[str]:
         """Return the space of the texts that an agent reads."""

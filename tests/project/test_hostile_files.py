@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.hostile_files import SLOWEST_MS, files, recordings
+from bench.hostile_files import SLOWEST_MS, files, recordings, scenarios
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,6 +22,13 @@ def test_mutated_task_model_and_agents_files_are_read_or_refused(tmp_path: Path)
     assert 0 < tally.read < tally.cases
 
 
+def test_mutated_scenarios_are_read_or_refused(tmp_path: Path) -> None:
+    tally = scenarios(100, 3, tmp_path)
+    assert tally.violations == []
+    assert tally.slowest_ms < LIMIT_MS
+    assert 0 < tally.read < tally.cases
+
+
 def test_mutated_recordings_are_read_as_far_as_they_go(tmp_path: Path) -> None:
     tally = recordings(20, 3, tmp_path)
     assert tally.violations == []
@@ -32,6 +39,6 @@ def test_mutated_recordings_are_read_as_far_as_they_go(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [11, 12])
 def test_many_mutated_files_are_read_or_refused(seed: int, tmp_path: Path) -> None:
-    for tally in (files(2000, seed, tmp_path), recordings(500, seed, tmp_path)):
+    for tally in (files(2000, seed, tmp_path), scenarios(2000, seed, tmp_path), recordings(500, seed, tmp_path)):
         assert tally.violations == []
         assert tally.slowest_ms < LIMIT_MS

@@ -1,14 +1,14 @@
-"""Requests made at random from the API's own descriptors: the session answers them all."""
+"""Requests made at random from the API's own descriptors, and broken on their way: the session answers them all."""
 
 import asyncio
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
 import pytest
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 from google.protobuf.message_factory import GetMessageClass
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -18,7 +18,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.process.client import Client, interface
 from khala_simulator.process.lan import HOST
 from khala_simulator.process.session import Session
-from khala_simulator.process.status import Status
+from khala_simulator.process.status import LEGAL, Status
 
 KINDS = [field.name for field in sc.Request.DESCRIPTOR.oneofs_by_name["request"].fields]
 SCALARS: dict[int, st.SearchStrategy[Any]] = {
@@ -128,6 +128,66 @@ def test_no_request_breaks_a_session(start: Callable[[], Client], data: st.DataO
         assert Status(response.status) is client.session.status
         assert bool(response.error) != response.HasField(kind)  # type: ignore[arg-type]  # kind is a field's name
         assert not any(error.startswith("The simulator failed") for error in response.error)
+
+
+def texts(descriptor: Descriptor | None) -> Iterator[tuple[str, ...]]:
+    """Yield the path of every text in a message."""
+    assert descriptor is not None
+    for field in descriptor.fields:
+        if field.message_type is not None:
+            yield from ((field.name, *path) for path in texts(field.message_type))
+        elif field.type == FieldDescriptor.TYPE_STRING:
+            yield (field.name,)
+
+
+TEXTS = [path for path in texts(sc.Request.DESCRIPTOR) if path[0] != "quit"]
+MARK = "a text to be broken"
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=map(".".join, TEXTS))
+def test_a_text_that_is_not_utf_8_is_refused_by_its_name(path: tuple[str, ...]) -> None:
+    request = sc.Request(id=3)
+    inner: Any = request
+    for name in path[:-1]:
+        inner = getattr(inner, name)
+        inner = inner.add() if hasattr(inner, "add") else inner
+    last = inner.DESCRIPTOR.fields_by_name[path[-1]]
+    inner.MergeFrom(type(inner)(**{path[-1]: [MARK] if last.is_repeated else MARK}))
+    broken = request.SerializeToString().replace(MARK.encode(), b"\xff" * len(MARK))
+    state = next(state for state in LEGAL if path[0] in LEGAL[state] and state is not Status.ended)
+    response = sc.Response.FromString(prepare(state).session.handle(broken))
+    assert list(response.error) == [f"{'.'.join(path)} in the request is not a text in UTF-8"]
+    assert (response.id, Status(response.status)) == (3, state)
+
+
+@pytest.mark.parametrize("state", [Status.launched, Status.in_game], ids=lambda state: state.name)
+@settings(max_examples=settings().max_examples // 2, suppress_health_check=SLOW)
+@given(data=st.data())
+def test_no_bytes_break_a_session(state: Status, data: st.DataObject) -> None:
+    client = prepare(state)
+    for _ in range(6):
+        kind = data.draw(st.sampled_from([k for k in KINDS if k != "quit"]))
+        body = data.draw(REQUESTS[kind])
+        tame(kind, body)
+        raw = bytearray(sc.Request(id=3, **{kind: body}).SerializeToString())  # type: ignore[arg-type]  # kind is a field's name
+        for place, value in data.draw(st.lists(st.tuples(st.integers(0, 400), st.integers(0, 255)), max_size=4)):
+            raw[place % len(raw)] = value
+        request = parsed(bytes(raw[: data.draw(st.integers(0, len(raw)) | st.just(len(raw)))]))
+        response = sc.Response.FromString(client.session.handle(request))
+        assert Status(response.status) is client.session.status
+        assert not any(error.startswith("The simulator failed") for error in response.error)
+
+
+def parsed(raw: bytes) -> bytes:
+    """Return a broken request without what would only take long, if it still is a request."""
+    try:
+        request = sc.Request.FromString(raw)
+    except DecodeError:
+        return raw
+    if (kind := request.WhichOneof("request")) in {None, "quit"}:
+        return raw if kind is None else b""
+    tame(kind, getattr(request, kind))
+    return request.SerializeToString()
 
 
 async def answer(session: Session, kind: str, body: Message) -> sc.Response:

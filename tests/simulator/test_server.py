@@ -7,13 +7,16 @@ from collections.abc import AsyncIterator
 
 import aiohttp
 import pytest
+import websocket
 from aiohttp import WSMsgType
+from aiohttp.test_utils import make_mocked_request
+from multidict import CIMultiDict
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.__main__ import Arguments, listen, main, parse
 from khala_simulator.process.client import interface
-from khala_simulator.process.server import serve
+from khala_simulator.process.server import is_from_page, serve
 from khala_simulator.process.session import Session
 
 Ws = aiohttp.ClientWebSocketResponse
@@ -206,6 +209,69 @@ async def test_a_client_that_quits_without_reading_ends_the_server(running: Runn
     await ws.send_bytes(sc.Request(quit=sc.RequestQuit()).SerializeToString())
     await ws.close()
     await asyncio.wait_for(running.task, 1)
+
+
+# pages of the web -----------------------------------------------------------------------------------------------------
+
+PAGES = {
+    "another page": ("127.0.0.1:5000", ["http://evil.example"]),
+    "a page from a file or a frame": ("127.0.0.1:5000", ["null"]),
+    "a page of this machine": ("127.0.0.1:5000", ["http://127.0.0.1:8000"]),
+    "a page over TLS": ("127.0.0.1:5000", ["https://127.0.0.1:5000"]),
+    "two origins": ("127.0.0.1:5000", ["http://127.0.0.1:5000", "http://evil.example"]),
+    "a name that its owner points here": ("evil.example:5000", ["http://evil.example:5000"]),
+    "an empty origin": ("127.0.0.1:5000", [""]),
+    "no host": ("", ["http://evil.example"]),
+}
+CLIENTS = {
+    "PySC2 on this machine": ("127.0.0.1:5000", ["http://127.0.0.1:5000"]),
+    "PySC2 by IPv6": ("[::1]:5000", ["http://[::1]:5000"]),
+    "PySC2 by LAN": ("192.168.1.20:5000", ["http://192.168.1.20:5000"]),
+    "PySC2 by a name without a dot": ("game:5000", ["http://game:5000"]),
+    "PySC2 by this machine's name": (f"{socket.gethostname()}:5000", [f"http://{socket.gethostname()}:5000"]),
+    "PySC2 at port 80": ("127.0.0.1", ["http://127.0.0.1"]),
+    "python-sc2": ("127.0.0.1:5000", []),
+    "python-sc2 by any name": ("game.example:5000", []),
+}
+
+
+@pytest.mark.parametrize(
+    ("host", "origins", "page"),
+    [(*given, True) for given in PAGES.values()] + [(*given, False) for given in CLIENTS.values()],
+    ids=[*PAGES, *CLIENTS],
+)
+def test_a_page_is_told_from_a_client(host: str, origins: list[str], page: bool) -> None:
+    headers = CIMultiDict([("Host", host), *(("Origin", origin) for origin in origins)])
+    assert is_from_page(make_mocked_request("GET", "/sc2api", headers)) is page
+
+
+async def test_a_page_is_refused_and_its_visit_drops_no_client(running: Running) -> None:
+    ws = await running.connect()
+    with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+        await running.http.ws_connect(f"{running.url}/sc2api", origin="http://evil.example")
+    assert refused.value.status == 403
+    assert (await ask(ws, PING)).HasField("ping")
+
+
+async def test_the_library_of_pysc2_is_let_in(running: Running) -> None:
+    port = running.url.rpartition(":")[2]
+    ws = await asyncio.to_thread(websocket.create_connection, f"ws://127.0.0.1:{port}/sc2api", timeout=5)
+    await asyncio.to_thread(ws.send, PING.SerializeToString())
+    answer = await asyncio.to_thread(ws.recv)
+    assert isinstance(answer, bytes)
+    assert sc.Response.FromString(answer).id == 255
+    ws.shutdown()  # type: ignore[no-untyped-call]  # websocket-client has no types
+
+
+async def test_a_request_beyond_the_limit_ends_that_connection_only(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("khala_simulator.process.server.LARGEST_REQUEST", 1000)
+    ws = await running.connect()
+    await ws.send_bytes(bytes(1001))
+    assert (await ws.receive()).type in {WSMsgType.CLOSED, WSMsgType.CLOSE, WSMsgType.ERROR}
+    ws = await running.connect()
+    assert (await ask(ws, PING)).HasField("ping")
 
 
 # the command line -----------------------------------------------------------------------------------------------------

@@ -444,11 +444,11 @@ WHOLE = b"name: x\nfamily: y\ntitle: z\nterrain: %s\nplayers: {1: {race: zerg, c
     ("text", "details"),
     [
         (b"name: x\nfamily: y\ntitle: z\nterrain: agria_open\nplayers: 5\n", "own.SC2Map:6: players: "),
-        (b"\0\nx: 1\n", "own.SC2Map cannot be read: "),
-        (b"\xff\nx: 1\n", "own.SC2Map cannot be read: "),
-        (b"x: 2020-99-99\ny: 1\n", "own.SC2Map cannot be read: "),
+        (b"\0\nx: 1\n", "own.SC2Map:2: the file: it has characters that no text has"),
+        (b"\xff\nx: 1\n", "own.SC2Map:2: the file: it is no UTF-8 text"),
+        (b"x: 2020-99-99\ny: 1\n", "own.SC2Map:2: x: 2020-99-99 is no timestamp; put it in quotes if it is a text"),
         (b"x: [\ny: 1\n", "own.SC2Map:"),
-        (WHOLE % b"moon", "no terrain 'moon' is shipped"),
+        (WHOLE % b"moon", "own.SC2Map: terrain: no terrain 'moon' is shipped"),
         (b"nothing\n", "no map 'nothing'; shipped are "),
     ],
 )

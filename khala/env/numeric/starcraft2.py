@@ -94,12 +94,13 @@ class StarCraft2Env:
     def reset(self, *, seed: int | None = None) -> tuple[list[Floats32], Floats32]:
         """Begin an episode, and return `get_obs()` and `get_state()`.
 
-        The game goes on from the episode before, as SMAC's does. With a seed it is a new game.
+        The game goes on from the episode before, over or not, and so does its chance. With a seed it is a new game.
+        SMAC's package does so too, except before its first episode is over: then it starts another game from the seed.
         """
         if seed is not None:
             self._seed, self._battle = seed, None
         self._steps = 0
-        if self._battle is None or not self._ended:
+        if self._battle is None:
             self._launch()
         else:
             self.battle.kill(np.concatenate([f.now.tag[f.alive] for f in (self._own, self._enemy)]).tolist())

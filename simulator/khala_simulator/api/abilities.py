@@ -110,9 +110,15 @@ def _forms(catalog: Catalog, row: int, requested: int) -> tuple[Ability | None, 
     return exact, tuple(a for a in card if a.general == requested and casting.is_modelled(a))
 
 
+@lru_cache(maxsize=1024)
+def _card(catalog: Catalog, row: int) -> tuple[Ability, ...]:
+    """Return the abilities on the buttons of a type's command card."""
+    return tuple(ability for ability in catalog.abilities_of(row) if not ability.unlisted)
+
+
 def usable(world: World, slot: int, *, free: bool = False) -> list[Ability]:
     """Return the abilities that a unit can use now, by ascending id; ``free`` ignores cost and cooldown."""
-    card = world.catalog.abilities_of(int(world.type[slot]))
+    card = _card(world.catalog, int(world.type[slot]))
     return [a for a in card if casting.refusal(world, slot, a, free=free) is ActionResult.SUCCESS]
 
 
@@ -126,7 +132,7 @@ def usable_by_any(world: World, slots: Iterable[int]) -> list[Ability]:
     left: dict[int, list[Ability]] = {}  # by type: what is neither found nor missing to all
     for slot in slots:
         row = int(world.type[slot])
-        asked = left[row] if row in left else world.catalog.abilities_of(row)
+        asked = left[row] if row in left else _card(world.catalog, row)
         left[row] = []
         for ability in asked:
             if ability.id in found:

@@ -52,7 +52,8 @@ def _create(world: World, order: debug_pb2.DebugCreateUnit) -> None:
     if known and 0 <= owner < len(world.players) and all(map(math.isfinite, point)):
         x0, y0, x1, y1 = world.map.terrain.playable
         inside = (min(max(point[0], x0), x1), min(max(point[1], y0), y1))
-        commands.debug_create(world, order.unit_type, owner, inside, min(order.quantity or 1, MAX_UNITS))
+        count = min(order.quantity or 1, MAX_UNITS, world.room)
+        commands.debug_create(world, order.unit_type, owner, inside, count)
 
 
 def _set_value(world: World, order: debug_pb2.DebugSetUnitValue) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import re
 import struct
 import zlib
@@ -58,7 +59,10 @@ def read_archive(data: bytes, path: str) -> GameMap:
     digest = content + name.encode()
     if known is not None and not known.scenario.melee and known.terrain.size == terrain.size:
         return game_map(known.scenario, terrain, digest)
-    return game_map(_melee(_member(_open(data), OBJECTS), name), terrain, digest)
+    try:
+        return game_map(_melee(_member(_open(data), OBJECTS), name, terrain.size), terrain, digest)
+    except MapError as error:
+        raise ArchiveError(str(error)) from error
 
 
 def _known(path: str) -> GameMap | None:
@@ -116,13 +120,13 @@ def _member(archive: Any, name: str) -> bytes:
 # what stands on the map -----------------------------------------------------------------------------------------------
 
 
-def _melee(objects: bytes, name: str) -> Scenario:
+def _melee(objects: bytes, name: str, size: tuple[int, int]) -> Scenario:
     """Return a melee game on the start locations of a map, with the units of the map."""
     try:
         root = _tree(objects)
         starts = [_point(o) for o in root.iter("ObjectPoint") if o.get("Type") == "StartLoc"]
-        units = [unit for o in root.iter("ObjectUnit") if (unit := _unit(o, len(starts))) is not None]
-    except (ET.ParseError, ValueError) as error:
+        units = [unit for o in root.iter("ObjectUnit") if (unit := _unit(o, len(starts), size)) is not None]
+    except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
         raise ArchiveError(f"{OBJECTS} in the archive can't be read: {error}") from error
     slots = {number: {"race": "random", "control": "open", "ai": "melee"} for number in range(1, len(starts) + 1)}
     return Scenario.model_validate(
@@ -146,16 +150,26 @@ def _tree(data: bytes) -> ET.Element:
 
 
 def _point(element: ET.Element) -> tuple[float, float]:
-    x, y = (float(number) for number in element.get("Position", "").split(",")[:2])
+    x, y = (_number(number) for number in element.get("Position", "").split(",")[:2])
     return x, y
 
 
-def _unit(element: ET.Element, players: int) -> dict[str, Any] | None:
-    """Return a placed unit in the form of a scenario; None for an unknown type or an absent player."""
+def _number(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no number")
+    return number
+
+
+def _unit(element: ET.Element, players: int, size: tuple[int, int]) -> dict[str, Any] | None:
+    """Return a placed unit in the form of a scenario; None for an unknown type, an absent player, or off the map."""
     kind, owner = element.get("UnitType", ""), int(element.get("Player", "0"))
-    if kind not in load_catalog().row_of_name or owner > players:
+    if kind not in load_catalog().row_of_name or not 0 <= owner <= players:
         return None
-    unit: dict[str, Any] = {"player": owner, "unit": kind, "at": [_point(element)]}
+    x, y = _point(element)
+    if not (0 <= x <= size[0] and 0 <= y <= size[1]):
+        return None
+    unit: dict[str, Any] = {"player": owner, "unit": kind, "at": [(x, y)]}
     if (turned := element.get("Rotation")) is not None:
-        unit["facing"] = (float(turned) - QUARTER_TURN) % (2.0 * np.pi)
+        unit["facing"] = (_number(turned) - QUARTER_TURN) % (2.0 * np.pi)
     return unit

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from khala_simulator.maps.nodes import shown
 from khala_simulator.maps.scenario import Flat, Scenario
 from khala_simulator.maps.scenario_file import Sheet, sheets
 
@@ -34,11 +36,12 @@ FIRST_CHOICE = "llm_smac"
 """The family of a bare name that several have: its maps end by themselves."""
 FLAT_Z = 10.0
 FLAT_CLIFF = 128
+_PLAIN = re.compile(r"[A-Za-z0-9_]{1,64}")  # names of shipped terrains
 HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
 
 
 class MapError(ValueError):
-    """No such map, or its terrain is missing."""
+    """No such map, or its terrain is missing or does not hold it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +173,15 @@ def map_from(scenario: Scenario, text: str) -> GameMap:
 
 
 def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
-    """Return the map of a scenario on a terrain, which ``content`` defines completely."""
+    """Return the map of a scenario on a terrain, which ``content`` defines completely.
+
+    Raises:
+        MapError: a point or the playable area is not on the terrain; the text names the field.
+    """
+    width, height = terrain.size
+    for field, (x, y, *_) in scenario.stated_points():
+        if not (0 <= x <= width and 0 <= y <= height):
+            raise MapError(f"{field}: [{x:g}, {y:g}] is not on the map, which has {width} x {height} cells")
     narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
     return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
 
@@ -185,8 +196,8 @@ def height_bytes(vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
 @lru_cache(maxsize=32)
 def _shipped(name: str) -> tuple[Terrain, bytes]:
     path = resources.files("khala_simulator.data") / "terrain" / f"{name}.npz"
-    if not path.is_file():
-        raise MapError(f"no terrain {name!r} is shipped")
+    if not _PLAIN.fullmatch(name) or not path.is_file():
+        raise MapError(f"terrain: no terrain {shown(name)!r} is shipped")
     with path.open("rb") as file, np.load(file) as grids:
         arrays = {key: grids[key] for key in grids.files}
     for array in arrays.values():
@@ -228,7 +239,9 @@ def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
     x0, y0, x1, y1 = playable
     width, height = terrain.size
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-        raise MapError(f"the playable area {list(playable)} is not within the terrain's {width} x {height} cells")
+        raise MapError(
+            f"playable: the playable area {list(playable)} is not within the terrain's {width} x {height} cells"
+        )
     inside = np.zeros_like(terrain.walk)
     inside[y0:y1, x0:x1] = True
     grids = {name: getattr(terrain, name) & inside for name in ("walk", "glide", "build", "creep")}

@@ -10,13 +10,14 @@ Above: `process/install.py`, `process/lobby.py`. Below: `game_map.py`, `archive.
 from __future__ import annotations
 
 import contextlib
+import errno
+import stat
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from yaml import YAMLError
-
 from khala_simulator.maps.game_map import GameMap, MapError, find_map, load_map, map_from, map_names
-from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario
+from khala_simulator.maps.nodes import ScenarioError, text_of
+from khala_simulator.maps.scenario_file import parse_scenario
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -25,6 +26,8 @@ FOLDERS = ("Melee", "mini_games", "llm_pysc2", "llm_smac", "SMAC_Maps", "duels")
 """Folders below `Maps`: those that PySC2, SMAC and LLM-PySC2 look into, and that of Khala's own maps."""
 
 SUFFIX = ".SC2Map"
+LARGEST_FILE = 256 * 2**20
+"""Bytes of a map or a replay; the largest of the game have some 20 MB."""
 _MARK = b"# A map of Khala's simulator\n"
 _ARCHIVE = b"MPQ"
 
@@ -72,15 +75,17 @@ def read_map(data: bytes, path: str) -> GameMap:
         return _read_text(data, path or "the map")
     except (MapError, ScenarioError) as error:
         raise MapDataError(str(error)) from error
-    except (ValueError, YAMLError) as error:  # no UTF-8, control characters, an impossible date
-        raise MapDataError(f"{path or 'the map'} cannot be read: {error}") from error
 
 
 def _read_text(data: bytes, source: str) -> GameMap:
-    text = data.decode()
+    text = text_of(data, source)
     if is_placeholder(data):
         return load_map(text[len(_MARK) :].strip())
-    return map_from(parse_scenario(text, source), text)  # the mark is a comment of YAML
+    scenario = parse_scenario(text, source)  # the mark is a comment of YAML
+    try:
+        return map_from(scenario, text)
+    except MapError as error:
+        raise MapError(f"{source}: {error}") from error
 
 
 def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | None:
@@ -91,12 +96,26 @@ def find_data(path: str, saved: Mapping[str, bytes], data_dir: Path) -> bytes | 
     if path in saved:
         return saved[path]
     for file in _files(path, data_dir):
-        with contextlib.suppress(OSError, ValueError):  # not there, a directory, or no possible name at all
-            return file.read_bytes()
+        with contextlib.suppress(OSError, ValueError):  # not there, no file, or no possible name at all
+            return read_file(file)
     try:
         return _placeholder(find_map(path))
     except MapError:
         return None
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a regular file: a pipe would stop the process, and a device fill its memory.
+
+    Raises:
+        OSError: it can't be read, is no regular file, or is too large.
+    """
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+    if found.st_size > LARGEST_FILE:
+        raise OSError(errno.EFBIG, f"it is larger than {LARGEST_FILE} bytes", str(path))
+    return path.read_bytes()
 
 
 def _files(path: str, data_dir: Path) -> Iterator[Path]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from pydantic import (
@@ -24,6 +24,7 @@ from pydantic import (
     model_validator,
 )
 
+from khala_simulator.maps.nodes import shown
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
 
@@ -34,11 +35,18 @@ if TYPE_CHECKING:
     from khala_simulator.numeric.geometry import Floats
     from khala_simulator.tables.catalog import Catalog
 
+MOST_UNITS: Final = 400
+"""Units that one entry of a file makes."""
+_LONGEST_GUESSED: Final = 100
+"""Characters of a wrong name for which the nearest one is looked for."""
+_MOST_LISTED: Final = 40
+"""Names that a message lists."""
+
 
 class Model(BaseModel):
-    """A part of a scenario: immutable, with no unknown fields."""
+    """A part of a scenario: immutable, with no unknown fields, and finite numbers."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +59,26 @@ class Names:
     groups: frozenset[str]
 
 
-def _known(value: Any, known: Collection[Any], what: str) -> Any:
-    if value in known:
-        return value
-    names = sorted(map(str, known))  # a region may be called 7 and another "seven"
-    close = difflib.get_close_matches(str(value)[:100], names, n=1)
-    hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(names) or 'none'}"
-    raise ValueError(f"there is no {what} {value}{hint}")
+class UnknownNameError(ValueError):
+    """A name is none of the known ones.
+
+    The nearest one takes milliseconds to find, so it is looked for when the error is shown: one of them is, and a file
+    may hold thousands.
+    """
+
+    def __init__(self, what: str, name: Any, known: Collection[Any]) -> None:
+        super().__init__(f"there is no {what} {shown(name)}")
+        self._name = str(name)[:_LONGEST_GUESSED]
+        self._known = known
+
+    def hint(self) -> str:
+        """Return what follows the sentence: the nearest name, or all if they are few."""
+        names = sorted(map(str, self._known))  # a region may be called 7 and another "seven"
+        if close := difflib.get_close_matches(self._name, names, n=1):
+            return f"; did you mean {shown(close[0])}?"
+        if len(names) > _MOST_LISTED:
+            return ""
+        return f"; there are {', '.join(map(shown, names)) or 'none'}"
 
 
 def _reference(what: str, *fields: str) -> AfterValidator:
@@ -67,7 +88,10 @@ def _reference(what: str, *fields: str) -> AfterValidator:
         names = info.context
         if names is None or isinstance(value, tuple):
             return value
-        return _known(value, frozenset[Any]().union(*(getattr(names, field) for field in fields)), what)
+        known = frozenset[Any]().union(*(getattr(names, field) for field in fields))
+        if value not in known:
+            raise UnknownNameError(what, value, known)
+        return value
 
     return AfterValidator(check)
 
@@ -78,8 +102,7 @@ def _in_tables(names: Callable[[Catalog], Collection[str]], what: str) -> AfterV
     def check(value: str) -> str:
         if any(value in names(load_catalog(version)) for version in (DEFAULT_VERSION, *VERSION_OF_BUILD.values())):
             return value
-        close = difflib.get_close_matches(value, sorted(names(load_catalog())), n=1)
-        raise ValueError(f"there is no {what} {value}" + (f"; did you mean {close[0]}?" if close else ""))
+        raise UnknownNameError(what, value, names(load_catalog()))
 
     return AfterValidator(check)
 
@@ -109,8 +132,14 @@ def kind_of_place(value: Any) -> str | None:
         return "name"
     if isinstance(value, list | tuple):
         return "point" if not value or not isinstance(value[0], list | tuple) else "points"
-    keys = value if isinstance(value, dict) else type(value).model_fields
-    return next((kind for kind in ("x", "random_in", "column") if kind in keys), None)
+    return next((kind for kind in ("x", "random_in", "column") if kind in fields_of(value)), None)
+
+
+def fields_of(value: Any) -> Collection[Any]:
+    """Return the names of the fields of a mapping or of a model; a plain value has none."""
+    if isinstance(value, Model):
+        return type(value).model_fields
+    return value if isinstance(value, dict) else ()
 
 
 Place = Annotated[
@@ -130,6 +159,12 @@ class Span(Model):
     to: float
     step: Annotated[float, Field(gt=0)] = 1.0
 
+    @model_validator(mode="after")
+    def _few(self) -> Span:
+        if not 0 <= (self.to - self.start) / self.step < MOST_UNITS:
+            raise ValueError(f"give an end that is not before the start, and at most {MOST_UNITS} numbers")
+        return self
+
     def values(self) -> tuple[float, ...]:
         """Return the numbers, ascending."""
         count = round((self.to - self.start) / self.step) + 1
@@ -143,7 +178,7 @@ def _axis(value: Any) -> Any:
     return (value,) if isinstance(value, int | float) else _as_tuple(value)
 
 
-Axis = Annotated[tuple[float, ...], BeforeValidator(_axis), Field(min_length=1)]
+Axis = Annotated[tuple[float, ...], BeforeValidator(_axis), Field(min_length=1, max_length=MOST_UNITS)]
 
 
 class PlaceGrid(Model):
@@ -152,6 +187,12 @@ class PlaceGrid(Model):
     x: Axis
     y: Axis
     around: Place | None = None
+
+    @model_validator(mode="after")
+    def _few(self) -> PlaceGrid:
+        if len(self.x) * len(self.y) > MOST_UNITS:
+            raise ValueError(f"give at most {MOST_UNITS} places, there are {len(self.x)} x {len(self.y)} here")
+        return self
 
 
 class RandomPlace(Model):
@@ -171,7 +212,7 @@ class ZigZag(Model):
 Spot = Annotated[
     Annotated[PointName, Tag("name")]
     | Annotated[Point, Tag("point")]
-    | Annotated[tuple[Posed, ...], Tag("points")]
+    | Annotated[tuple[Posed, ...], Tag("points"), Field(max_length=MOST_UNITS)]
     | Annotated[PlaceGrid, Tag("x")]
     | Annotated[RandomPlace, Tag("random_in")]
     | Annotated[ZigZag, Tag("column")],

@@ -25,16 +25,22 @@ executes it and ``maps`` joins it with its terrain.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UpgradeName
-from khala_simulator.maps.script import At, CreateSpec, Enters, Every, Made, Touches, Trigger
+from khala_simulator.maps.script import At, Create, CreateSpec, Enters, Every, Made, Touches, Trigger
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 MELEE_MINERALS = 50.0
 """What every player has at the start of a melee game."""
 
+LARGEST_SIDE = 512
+"""Cells of the longest side of a map."""
+Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
 Box = Annotated[
     tuple[int, int, int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
 ]
@@ -66,7 +72,9 @@ class PlayerSpec(Model):
 class Flat(Model):
     """A terrain without a terrain file: level ground of this many cells."""
 
-    flat: Annotated[tuple[int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)]
+    flat: Annotated[
+        tuple[Side, Side], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+    ]
 
 
 class Scenario(Model):
@@ -75,7 +83,10 @@ class Scenario(Model):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     family: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
     title: str
-    terrain: str | Flat
+    terrain: Annotated[
+        Annotated[str, Tag("name")] | Annotated[Flat, Tag("flat")],
+        Discriminator(lambda value: "name" if isinstance(value, str) else "flat"),
+    ]
     playable: Box | None = None
     """The playable part of the terrain, ``[x0, y0, x1, y1]``; by default the terrain's own."""
     visibility: Visibility = Visibility()
@@ -104,6 +115,29 @@ class Scenario(Model):
             if len(without) > open_starts:
                 raise ValueError(f"a melee game needs a start location for player {without[open_starts]}")
         return self
+
+    def stated_points(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Yield each point that the file gives in numbers, with its field; those that are drawn or counted are not."""
+        yield from ((f"points.{name}", point) for name, point in self.points.items())
+        yield from ((f"start_locations[{number}]", point) for number, point in enumerate(self.start_locations))
+        yield from (
+            (f"players.{number}.start", player.start) for number, player in self.players.items() if player.start
+        )
+        if self.camera is not None:
+            yield "camera", self.camera
+        for field, spec in self._created():
+            if isinstance(spec.at, tuple):
+                for place in spec.at if isinstance(spec.at[0], tuple) else [spec.at]:
+                    yield f"{field}.at", place
+
+    def _created(self) -> Iterator[tuple[str, CreateSpec]]:
+        yield from ((f"units[{number}]", spec) for number, spec in enumerate(self.units))
+        for name, group in self.groups.items():
+            yield from ((f"groups.{name}[{number}]", spec) for number, spec in enumerate(group))
+        for number, trigger in enumerate(self.triggers):
+            for place, action in enumerate(trigger.do):
+                if isinstance(action, Create):
+                    yield f"triggers[{number}].do[{place}].create", action.create
 
     @cached_property
     def periods(self) -> tuple[int, ...]:
@@ -148,6 +182,6 @@ def _drawn(triggers: Any) -> list[str]:
         actions = trigger.get("do") if isinstance(trigger, dict) else None
         for action in actions if isinstance(actions, list) else ():
             options = action.get("draw", ()) if isinstance(action, dict) else ()
-            for option in [options] if isinstance(options, dict) else options:
+            for option in options if isinstance(options, list) else [options]:
                 found += list(option) if isinstance(option, dict) else []
     return found

@@ -9,13 +9,13 @@ Later values override earlier ones: mappings are merged key by key; ``units``, `
 joined, where a trigger replaces one of the same name; all else is replaced. This happens on the nodes of YAML, which
 keep their lines, so that an error points at the written line.
 
-Above: ``maps``. Below: ``scenario``.
+Above: ``maps``. Below: ``scenario``, ``nodes``.
 """
 
 from __future__ import annotations
 
-import io
 import json
+import re
 from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from pydantic import ValidationError
 
+from khala_simulator.maps.nodes import ScenarioError, compose, not_yaml, shown, text_of, wrong
+from khala_simulator.maps.places import UnknownNameError
 from khala_simulator.maps.scenario import Scenario, names_of
-from khala_simulator.tables.loader import LOADER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,10 +35,7 @@ JOINED = ("units", "triggers", "estimates")
 EXTENDS, VARIANTS = "extends", "variants"
 TEXT = "tag:yaml.org,2002:str"
 DEEPEST = 4  # files that extend each other
-
-
-class ScenarioError(ValueError):
-    """A scenario file can't be used; the text names the file, the line and the field."""
+_PLAIN = re.compile(r"[A-Za-z0-9_]{1,64}(/[A-Za-z0-9_]{1,64})?")  # names of shipped files
 
 
 @dataclass(frozen=True)
@@ -57,10 +55,12 @@ class Sheet:
         try:
             return Scenario.model_validate(raw, context=names_of(raw))
         except ValidationError as error:
-            first = error.errors()[0]
+            first = error.errors(include_url=False)[0]
             mark, field = _locate(self.node, first["loc"], missing=first["type"] == "missing")
-            message = first["msg"].removeprefix("Value error, ")
-            raise ScenarioError(f"{mark.name}:{mark.line + 1}: {field or 'the file'}: {message}") from error
+            fault = first.get("ctx", {}).get("error")
+            hint = fault.hint() if isinstance(fault, UnknownNameError) else ""
+            message = first["msg"].removeprefix("Value error, ") + hint
+            raise ScenarioError(f"{mark.name}:{mark.line + 1}: {shown(field) or 'the file'}: {message}") from error
 
     @property
     def title(self) -> str:
@@ -71,8 +71,8 @@ class Sheet:
         """Return the plain data."""
         try:
             return yaml.constructor.SafeConstructor().construct_document(self.node)
-        except yaml.MarkedYAMLError as error:
-            raise _not_yaml(error, self.source) from error
+        except yaml.MarkedYAMLError as error:  # such as a list that says it is a text
+            raise not_yaml(error, self.source) from error
 
     def canonical(self) -> str:
         """Return the data as one text, the same for the same content."""
@@ -86,10 +86,10 @@ def read_scenario(path: Path) -> Scenario:
         ScenarioError: it can't be read, is no YAML, or breaks the language.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"{path}: can't be read: {error.strerror}") from error
-    return parse_scenario(text, str(path))
+    return parse_scenario(text_of(data, str(path)), str(path))
 
 
 def parse_scenario(text: str, source: str) -> Scenario:
@@ -111,17 +111,17 @@ def single_sheet(text: str, source: str) -> Sheet:
 
 def sheets(text: str, source: str) -> Iterator[tuple[str, Sheet]]:
     """Yield every scenario of a text with its name, in the order of the file."""
-    node = _with_bases(_compose(text, source), source)
+    node = _with_bases(compose(text, source), source)
     variants = _take(node, VARIANTS)
     if variants is None:
         name = _scalar(node, "name")
         yield name, Sheet(node, source)
         return
     if not isinstance(variants, yaml.MappingNode):
-        raise _wrong(variants, f"{VARIANTS}: give a name and what is its own for each")
+        raise wrong(variants, f"{VARIANTS}: give a name and what is its own for each")
     for key, own in variants.value:
         if not isinstance(own, yaml.MappingNode):
-            raise _wrong(own, f"{VARIANTS}.{key.value}: give a mapping")
+            raise wrong(own, f"{VARIANTS}.{shown(key.value)}: give a mapping")
         pair = tuple(yaml.ScalarNode(TEXT, text, key.start_mark, key.end_mark) for text in ("name", key.value))
         named = yaml.MappingNode(own.tag, [pair, *own.value], own.start_mark, own.end_mark)
         yield key.value, Sheet(_laid_over(node, named), source)
@@ -130,34 +130,7 @@ def sheets(text: str, source: str) -> Iterator[tuple[str, Sheet]]:
 def base_text(name: str) -> str | None:
     """Return the text of a shipped file below ``data/maps``, or None."""
     path = resources.files("khala_simulator.data") / "maps" / f"{name}.yaml"
-    return path.read_text(encoding="utf-8") if ".." not in name and path.is_file() else None
-
-
-class _Source(io.StringIO):
-    """A text with the name that YAML puts into its marks."""
-
-    def __init__(self, text: str, name: str) -> None:
-        super().__init__(text)
-        self.name = name
-
-
-def _compose(text: str, source: str) -> yaml.MappingNode:
-    try:
-        node = yaml.compose(_Source(text, source), Loader=LOADER)
-    except yaml.MarkedYAMLError as error:
-        raise _not_yaml(error, source) from error
-    if not isinstance(node, yaml.MappingNode):
-        raise ScenarioError(f"{source}:1: the file: a scenario is a mapping of fields")
-    return node
-
-
-def _not_yaml(error: yaml.MarkedYAMLError, source: str) -> ScenarioError:
-    line = error.problem_mark.line + 1 if error.problem_mark else 1
-    return ScenarioError(f"{source}:{line}: not YAML: {error.problem}")
-
-
-def _wrong(node: yaml.Node, text: str) -> ScenarioError:
-    return ScenarioError(f"{node.start_mark.name}:{node.start_mark.line + 1}: {text}")
+    return path.read_text(encoding="utf-8") if _PLAIN.fullmatch(name) and path.is_file() else None
 
 
 def _with_bases(node: yaml.MappingNode, source: str, depth: int = 0) -> yaml.MappingNode:
@@ -167,8 +140,8 @@ def _with_bases(node: yaml.MappingNode, source: str, depth: int = 0) -> yaml.Map
         return node
     text = base_text(str(base.value)) if isinstance(base, yaml.ScalarNode) and depth < DEEPEST else None
     if text is None:
-        raise _wrong(base, f"{EXTENDS}: there is no shipped scenario {base.value!s}")
-    return _laid_over(_with_bases(_compose(text, f"{base.value}.yaml"), source, depth + 1), node)
+        raise wrong(base, f"{EXTENDS}: there is no shipped scenario {shown(base.value)}")
+    return _laid_over(_with_bases(compose(text, f"{base.value}.yaml"), source, depth + 1), node)
 
 
 def _take(node: yaml.MappingNode, name: str) -> yaml.Node | None:

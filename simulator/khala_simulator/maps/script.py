@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, model_validator
 
-from khala_simulator.maps.places import GroupName, Model, Owner, Place, RegionName, Source, Spot, UnitName
+from khala_simulator.maps.places import (
+    MOST_UNITS,
+    GroupName,
+    Model,
+    Owner,
+    Place,
+    RegionName,
+    Source,
+    Spot,
+    UnitName,
+    fields_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,7 +98,7 @@ def only_key(value: Any) -> str | None:
     """Return which of several models a value is: the name of its only key, or ``event`` for a word."""
     if isinstance(value, str):
         return "event"
-    keys = list(value) if isinstance(value, dict) else list(type(value).model_fields)
+    keys = list(fields_of(value))
     return str(keys[0]) if len(keys) == 1 else None
 
 
@@ -173,12 +184,12 @@ class CreateSpec(Model):
 
     player: Owner
     unit: UnitName
-    count: Annotated[int, Field(ge=1, le=400)] = 1
+    count: Annotated[int, Field(ge=1, le=MOST_UNITS)] = 1
     at: Spot
     facing: float | Literal["random"] = 4.7124
     life: Annotated[float, Field(gt=0)] | None = None
     energy: Annotated[float, Field(ge=0)] | None = None
-    cargo: dict[UnitName, Annotated[int, Field(ge=1, le=8)]] = Field(default_factory=dict)
+    cargo: dict[UnitName, Annotated[int, Field(ge=1, le=8)]] = Field(default_factory=dict, max_length=8)
 
 
 class Create(Model):
@@ -198,7 +209,7 @@ class RegroupSpec(Model):
 
     player: Owner
     unit: UnitName
-    more: Annotated[int, Field(ge=0)] = 0
+    more: Annotated[int, Field(ge=0, le=MOST_UNITS)] = 0
     at: Spot
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from khala_simulator.maps import walkability
 from khala_simulator.maps.game_map import Terrain, height_bytes
+from khala_simulator.maps.scenario import LARGEST_SIDE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +32,8 @@ ATTRIBUTE_AT: Final = 4
 Z_STEP: Final = 256.0
 SIGNED_FROM: Final = 128.0  # heights from here on are below zero
 CLIFF_TILE: Final = 1  # bit of a cell's flags
-LARGEST_SIDE: Final = 512
-_TWO_WORDS = re.compile(rb"(?=([A-Za-z]\w*\x00[A-Za-z]\w*\x00))")  # may overlap: a file's name may end before them
+# The names may overlap: a file's name may end before them. Without a limit a long word takes quadratic time.
+_TWO_WORDS = re.compile(rb"(?=([A-Za-z]\w{0,99}\x00[A-Za-z]\w{0,99}\x00))")
 
 
 class TerrainError(ValueError):

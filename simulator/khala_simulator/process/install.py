@@ -160,13 +160,13 @@ def _write_maps(maps: Path) -> None:
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:
     """Link one map; clients look for maps exactly one folder below `Maps`."""
-    from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
+    from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_file, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
     folder = file.parent.name if file.parent != top else OWN_FOLDER
     path = f"{folder}/{file.stem}.SC2Map"
     target = maps / path
     try:
-        read_map(file.read_bytes(), path)
+        read_map(read_file(file), path)
     except (MapDataError, OSError) as error:
         return OwnMap(file, path, str(error))
     target.parent.mkdir(parents=True, exist_ok=True)

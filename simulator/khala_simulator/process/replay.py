@@ -13,13 +13,15 @@ import dataclasses
 import json
 import struct
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from google.protobuf.message import DecodeError, Message
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from s2clientprotocol import debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.game import HostedGame, LogEntry, Setup
+from khala_simulator.api.projection import size_problem
 from khala_simulator.maps.map_file import read_map
 from khala_simulator.process import mpq
 from khala_simulator.process.clock import LOOPS_PER_SECOND
@@ -34,6 +36,8 @@ _MEMBER = "khala.replay"
 _MARK = b"Khala replay 3\n"
 _ENTRY = struct.Struct("<IBBI")  # loop, player, kind, size
 _KINDS: tuple[type[sc.Action | debug_pb2.DebugCommand], ...] = (sc.Action, debug_pb2.DebugCommand)
+_LARGEST = 2**29
+"""Bytes of the content of a replay."""
 
 
 class ReplayError(ValueError):
@@ -87,32 +91,68 @@ class Replay:
         if not data.startswith(_MARK):
             raise ReplayError("The data is not a replay of this simulator")
         try:
-            return cls._decode(zlib.decompress(data[len(_MARK) :]))
-        except (zlib.error, ValueError, LookupError, TypeError, struct.error, DecodeError) as error:
+            return cls._decode(_unpacked(data[len(_MARK) :]))
+        except (zlib.error, ValueError, LookupError, struct.error, DecodeError) as error:
             raise ReplayError(f"The replay is damaged: {error}") from error
 
     @classmethod
     def _decode(cls, data: bytes) -> Replay:
-        head, _, log = data.partition(b"\n")
-        fields = json.loads(head)
-        map_data = fields["map"].encode("latin-1")
+        text, _, log = data.partition(b"\n")
+        head = _head(text)
+        map_data = head.map.encode("latin-1")
         setup = Setup(
-            game_map=read_map(map_data, fields["path"]),
+            game_map=read_map(map_data, head.path),
             map_data=map_data,
-            path=fields["path"],
-            players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in fields["players"]),
-            seed=fields["seed"],
-            disable_fog=fields["disable_fog"],
-            realtime=fields["realtime"],
-            observers=tuple(sc.PlayerSetup.FromString(bytes.fromhex(observer)) for observer in fields["observers"]),
+            path=head.path,
+            players=tuple(sc.PlayerSetup.FromString(bytes.fromhex(player)) for player in head.players),
+            seed=head.seed,
+            disable_fog=head.disable_fog,
+            realtime=head.realtime,
+            observers=tuple(sc.PlayerSetup.FromString(bytes.fromhex(observer)) for observer in head.observers),
         )
         interfaces = {
-            int(player): sc.InterfaceOptions.FromString(bytes.fromhex(options))
-            for player, options in fields["interfaces"].items()
+            player: sc.InterfaceOptions.FromString(bytes.fromhex(options))
+            for player, options in head.interfaces.items()
         }
-        results = {int(player): result for player, result in fields["results"].items()}
-        races = {int(player): str(race) for player, race in fields["races"].items()}
-        return cls(setup, interfaces, fields["loops"], results, races, tuple(unpack(log)))
+        if strangers := {*interfaces, *head.results, *head.races}.difference(range(1, len(setup.players) + 1)):
+            raise ValueError(f"it has no player {min(strangers)}")
+        if problem := next(filter(None, map(size_problem, interfaces.values())), ""):
+            raise ValueError(problem)
+        return cls(setup, interfaces, head.loops, head.results, head.races, tuple(unpack(log)))
+
+
+def _unpacked(data: bytes) -> bytes:
+    whole = zlib.decompressobj()
+    content = whole.decompress(data, _LARGEST)
+    if not whole.eof:
+        raise ValueError("it is cut off, or too large")
+    return content
+
+
+class _Head(BaseModel):
+    """What a replay says before its log; messages are in hexadecimal digits."""
+
+    model_config = ConfigDict(strict=True)
+
+    path: str
+    map: str
+    players: list[str]
+    interfaces: dict[int, str]
+    seed: Annotated[int, Field(ge=0, lt=2**32)]
+    disable_fog: bool
+    realtime: bool
+    observers: list[str]
+    loops: Annotated[int, Field(ge=0, lt=2**32)]
+    results: dict[int, Annotated[int, Field(ge=1, le=4)]]
+    races: dict[int, str]
+
+
+def _head(text: bytes) -> _Head:
+    try:
+        return _Head.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise ValueError(f"{'.'.join(map(str, first['loc'])) or 'head'}: {first['msg']}") from error
 
 
 def _hex(message: Message) -> str:

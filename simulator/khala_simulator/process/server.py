@@ -6,6 +6,9 @@ that a client that vanished silently does not lock others out.
 
 If a client disconnects while its request is being answered, the request is dropped.
 
+A web page that somebody has open can reach every port of this machine, and a page cannot hide its origin. PySC2's
+library sends an origin too, but that of the game itself; other clients send none.
+
 It knows nothing of the game: that is `session.py`, called with the bytes of one request at a time.
 """
 
@@ -14,7 +17,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
-from typing import TYPE_CHECKING
+import ipaddress
+import socket
 
 from aiohttp import WSMsgType, web
 
@@ -22,10 +26,9 @@ from khala_simulator.process.parent_watch import orphaned
 from khala_simulator.process.session import Session
 from khala_simulator.process.status import Status
 
-if TYPE_CHECKING:
-    import socket
-
 ENDPOINT = "/sc2api"
+LARGEST_REQUEST = 256 * 2**20
+"""Bytes of a request; the largest real one is a map that a client saves, of some 20 MB."""
 _REQUESTS = {WSMsgType.TEXT, WSMsgType.BINARY}
 
 
@@ -38,9 +41,11 @@ class Server:
         self._transport: asyncio.Transport | None = None
         self._turn = asyncio.Lock()  # a client that was replaced still has to learn that its request is dropped
 
-    async def connect(self, request: web.Request) -> web.WebSocketResponse:
-        """Answer one client until it leaves, is replaced, or ends the process with quit."""
-        client = web.WebSocketResponse(decode_text=False, max_msg_size=0, compress=False, timeout=0.1)
+    async def connect(self, request: web.Request) -> web.StreamResponse:
+        """Answer one client until it leaves, is replaced, or ends the process with quit; refuse a web page."""
+        if is_from_page(request):
+            return web.Response(status=403, text="This is a game: its clients are programs, and no page of the web.\n")
+        client = web.WebSocketResponse(decode_text=False, max_msg_size=LARGEST_REQUEST, compress=False, timeout=0.1)
         await client.prepare(request)
         before, self._transport = self._transport, request.transport
         if before is not None:
@@ -64,6 +69,29 @@ class Server:
             finally:
                 if self.session.status is Status.quit:
                     self.done.set()
+
+
+def is_from_page(request: web.BaseRequest) -> bool:
+    """Return whether a web page opened a connection, and no client of the game.
+
+    A page's origin is not that of the game, or it is one whose owner points its name at this machine. Such a name has a
+    dot; the addresses under which clients reach the game are numbers, the name of this machine, or names of a local
+    network without a dot.
+    """
+    origins, host = request.headers.getall("Origin", []), request.headers.get("Host", "")
+    if not origins:
+        return False
+    name = host.rpartition(":")[0] if host.rpartition(":")[2].isdecimal() else host
+    is_ours = "." not in name or name.casefold() == socket.gethostname().casefold() or _is_address(name)
+    return not is_ours or any(origin.casefold() != f"http://{host}".casefold() for origin in origins)
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return True
 
 
 def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: str | None) -> None:

@@ -23,6 +23,7 @@ from khala_simulator.api import wire
 from khala_simulator.process.process import Failure, Process
 from khala_simulator.process.requests import HANDLERS
 from khala_simulator.process.status import Machine, Status, UsageError
+from khala_simulator.process.texts import broken_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,6 +70,8 @@ class Session:
             request = sc.Request.FromString(data)
         except DecodeError:
             return self._respond([_error("The request is not a protobuf message of the SC2 API")], None)
+        if field := broken_text(request):
+            return self._respond([_error(f"{field} in the request is not a text in UTF-8")], request)
         return self._respond(await self._answer(request), request)
 
     async def _answer(self, request: sc.Request) -> list[Part]:

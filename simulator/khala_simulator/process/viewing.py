@@ -14,6 +14,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.api.game_info import RACES, GameInfo
 from khala_simulator.api.projection import size_problem
 from khala_simulator.api.viewer import Viewer
+from khala_simulator.maps.map_file import read_file
 from khala_simulator.process.clock import LOOPS_PER_SECOND, RealtimeClock
 from khala_simulator.process.process import Failure, Playing
 from khala_simulator.process.replay import Replay, ReplayError, rerun
@@ -86,8 +87,10 @@ def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseR
         player = extra.player_info
         player.player_id, player.type, player.race_requested = number, setup.type, setup.race
         player.player_name = setup.player_name
-        if (race := RACES.get(replay.races[number])) is not None:
+        if (race := RACES.get(replay.races.get(number, ""))) is not None:
             player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum
+        if number not in replay.results:
+            continue
         extra.player_result.player_id = number
         extra.player_result.result = sc.Result.Value(sc.Result.Name(replay.results[number]))  # type: ignore[arg-type]  # same numbers
     return info
@@ -111,7 +114,7 @@ def _read(process: Process, request: sc.RequestStartReplay | sc.RequestReplayInf
     if kind == "replay_path":
         for place in _places(process, request.replay_path):
             with contextlib.suppress(OSError, ValueError):  # not there, or no possible name at all
-                data = place.read_bytes()
+                data = read_file(place)
                 break
         else:
             raise _Unreadable("InvalidReplayPath", f"No replay {request.replay_path}")

@@ -109,10 +109,12 @@ def _places(world: World, unit: UnitType, spec: CreateSpec) -> Iterator[tuple[fl
     """Yield x, y and facing of every unit, one after the other, because a random place depends on those before it."""
     facing = 0.0 if spec.facing == "random" else spec.facing
     for place in _spots(world, unit, spec.at, spec.count):
+        if not world.room:
+            return
         turned = place[2] if len(place) > 2 else facing
         if spec.facing == "random":
             turned = float(world.rng.uniform(0.0, TAU))
-        yield place[0], place[1], turned
+        yield *_on_map(world, place[0], place[1]), turned
 
 
 def _spots(world: World, unit: UnitType, at: Any, count: int) -> Iterator[tuple[float, ...]]:
@@ -129,6 +131,12 @@ def _spots(world: World, unit: UnitType, at: Any, count: int) -> Iterator[tuple[
         yield from free_places(world, unit, point_of(world, at), count)
     else:
         yield from (place for place in at for _ in range(count))
+
+
+def _on_map(world: World, x: float, y: float) -> Point:
+    """Return the nearest point on the map: a grid, a column or a region may reach beyond it."""
+    width, height = world.map.terrain.size
+    return min(max(x, 0.0), float(width)), min(max(y, 0.0), float(height))
 
 
 def random_place(world: World, unit: UnitType, at: RandomPlace) -> Point:
@@ -265,7 +273,7 @@ def point_of(world: World, place: Any) -> Point:
         drawn = world.script.points.get(place)
         return world.map.scenario.points[place] if drawn is None else drawn
     x, y = place
-    return float(x), float(y)
+    return _on_map(world, float(x), float(y))
 
 
 def _spawn(world: World, names: tuple[str, ...]) -> None:
@@ -278,7 +286,9 @@ def _draw(world: World, options: tuple[dict[str, Any], ...]) -> None:
     option = options[int(world.rng.integers(len(options)))] if len(options) > 1 else options[0]
     for name, source in option.items():
         region = world.map.scenario.regions.get(source) if isinstance(source, str) else None
-        world.script.points[name] = point_of(world, source) if region is None else next(_points_in(world, region))
+        world.script.points[name] = (
+            point_of(world, source) if region is None else _on_map(world, *next(_points_in(world, region)))
+        )
 
 
 def _select(world: World, who: Who) -> None:

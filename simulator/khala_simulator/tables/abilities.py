@@ -69,7 +69,9 @@ class Ability:
 
     ``general`` is the id under which clients may also ask for it, ``solo`` means that only one of several ordered units
     uses it, ``transient`` that it leaves the unit's orders alone, ``overhead`` that the unit has to be right above the
-    point. ``count`` is how many it makes, ``supply`` their supply in all. ``numbers`` are the skill's own numbers.
+    point. An ``unlisted`` one has no button on a command card, so the game never lists it as available: a click on a
+    passenger or on a place of a queue gives it. ``count`` is how many it makes, ``supply`` their supply in all.
+    ``numbers`` are the skill's own numbers.
     """
 
     id: int
@@ -96,6 +98,7 @@ class Ability:
     autocast_range: float = 0.0
     autocast_filters: Filter = Filter()
     transient: bool = False
+    unlisted: bool = False
     overhead: bool = False
     moves: bool = False
     solo: bool = False

@@ -49,6 +49,8 @@ __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 NO_TAG: Final = 0
 TAG_BASE: Final = 1 << 32
 INDEX_SHIFT: Final = 18
+MOST_UNITS: Final = 4_000
+"""Units up to which scripts and debug commands fill a world; tags have room for 16 383, and loops are slow by then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +153,11 @@ class World(UnitColumns, WorldCaches):
         self._grow(64)
 
     # units --------------------------------------------------------------------------------------------------------
+
+    @property
+    def room(self) -> int:
+        """How many more units scripts and debug commands may make."""
+        return max(0, MOST_UNITS - int(np.count_nonzero(self.alive)))
 
     def add(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float) -> int:
         """Take a free slot for a unit at exactly ``point``; return it. ``lifecycle.spawn`` writes the rest."""

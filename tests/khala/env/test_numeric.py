@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import cloudpickle  # type: ignore[import-untyped]  # it has no types
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import AsyncVectorEnv
 
+from khala.env import numeric
 from khala.env.numeric import CentralEnv, StarCraft2Env, parallel_env
 from khala_protocol.errors import ConfigError
 from khala_simulator.battle import Battle
@@ -131,6 +137,60 @@ def test_a_seed_begins_a_new_game_and_none_goes_on() -> None:
     again, _ = env.reset(seed=3)
     assert env.battles.battle.loop == 0
     np.testing.assert_array_equal(first["state"], again["state"])
+
+
+def test_a_reset_in_the_middle_of_an_episode_goes_on_in_the_same_game() -> None:
+    env = CentralEnv("3m", seed=3)
+    first, _ = env.reset()
+    again = first
+    for episode in range(1, 4):
+        env.step(np.array([EAST, EAST, EAST]))
+        again, _ = env.reset()
+        assert env.battles.battle.loop == episode * 10  # a step of eight loops, and two for the new units
+        assert env.battles.masks()[:, 1:].any(axis=1).all()
+        assert env.battles.get_stats()["battles_game"] == 0
+    assert not np.array_equal(first["state"], again["state"])  # chance goes on as well
+
+
+def played_on(made: Any) -> str:
+    """Play six steps with fixed chance, and return the world's digest."""
+    battles, dice = made.unwrapped.battles, np.random.default_rng(5)
+    for _ in range(6):
+        battles.step(fight(battles, dice))
+    digest: str = battles.battle.digest()
+    return digest
+
+
+MAKERS: dict[str, Callable[[], Any]] = {
+    "parallel": lambda: parallel_env("3m"),
+    "aec": lambda: numeric.env("3m"),
+    "central": lambda: CentralEnv("3m"),
+    "gymnasium": lambda: gymnasium.make("khala.env.numeric:khala-smac/3m-v0"),
+}
+
+
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+@pytest.mark.parametrize("library", [pickle, cloudpickle], ids=["pickle", "cloudpickle"])
+def test_an_environment_is_pickled_before_and_in_an_episode(make: Callable[[], Any], library: Any) -> None:
+    fresh = library.loads(library.dumps(make()))
+    fresh.reset(seed=2)
+    one = make()
+    one.reset(seed=2)
+    assert one.unwrapped.battles.battle.digest() == fresh.unwrapped.battles.battle.digest()
+    copy = library.loads(library.dumps(one))
+    before = one.unwrapped.battles.battle.digest()
+    ends = [played_on(game) for game in (one, copy)]
+    assert ends[0] == ends[1] != before
+
+
+@pytest.mark.slow
+def test_environments_play_in_processes_that_share_no_memory_with_this_one() -> None:
+    envs = AsyncVectorEnv([partial(CentralEnv, "3m")] * 2, context="spawn")
+    try:
+        seen, _ = envs.reset(seed=4)
+    finally:
+        envs.close()
+    np.testing.assert_array_equal(seen["state"][1], CentralEnv("3m").reset(seed=5)[0]["state"])
 
 
 def test_an_action_that_is_not_available_is_replaced_by_stop() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import pickle
 import random
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import cloudpickle  # type: ignore[import-untyped]  # it has no types
 import numpy as np
 import psutil
 import pytest
@@ -63,6 +65,25 @@ async def test_agents_read_and_write_what_they_do_over_the_bus(pair: TextParalle
     assert infos["Zealots"]["result"].killed == result.killed
     assert worth == pytest.approx((result.killed.value - result.lost.value) / 1000)
     assert infos["Zealots"]["reports"][0].fate == "fresh"
+
+
+@pytest.mark.parametrize("make", [words.parallel_env, words.env], ids=["parallel", "aec"])
+@pytest.mark.parametrize("library", [pickle, cloudpickle], ids=["pickle", "cloudpickle"])
+def test_an_environment_is_pickled_before_its_first_episode(make: Any, library: Any) -> None:
+    env = make("2s3z_pair", agents=["Zealots"], others="skilled", max_cycles=3)
+    again = library.loads(library.dumps(env))
+    assert again.possible_agents == ["Zealots"]
+    assert vars(again.unwrapped)["_task"] == vars(env.unwrapped)["_task"]
+
+
+@game
+def test_an_environment_with_an_episode_says_why_it_is_not_pickled(pair: TextParallelEnv) -> None:
+    pair.reset(seed=1)
+    with pytest.raises(TypeError, match=r"cannot be pickled or copied between reset\(\) and close\(\)"):
+        pickle.dumps(pair)
+    pair.close()
+    again = pickle.loads(pickle.dumps(pair))
+    assert again.agents == []
 
 
 @game

@@ -8,14 +8,17 @@ from hypothesis import strategies as st
 from s2clientprotocol import common_pb2, debug_pb2, error_pb2, raw_pb2, spatial_pb2, ui_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_simulator.abilities import casting
+from khala_simulator.abilities import casting, commands
 from khala_simulator.abilities.casting import is_modelled
 from khala_simulator.api import game
+from khala_simulator.api.abilities import usable
+from khala_simulator.maps.game_map import load_map
 from khala_simulator.process.client import Client, command, interface
 from khala_simulator.process.status import Status
 from khala_simulator.tables.abilities import Ability
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tick import advance, new_game
 from khala_simulator.world.world import World
 
 OBSERVER, STALKER, ZEALOT, PROBE, PHOENIX, NEXUS = 82, 74, 73, 84, 78, 59
@@ -641,3 +644,81 @@ def test_no_action_breaks_a_game(rounds: list[list[sc.Action]]) -> None:
             assert 0 <= unit.pos.x <= 32
             assert 0 <= unit.pos.y <= 32
     assert client.session.status is Status.in_game
+
+
+# transports -----------------------------------------------------------------------------------------------------------
+
+TRANSPORTS = {
+    "Medivac": "Marine",
+    "Bunker": "Marine",
+    "CommandCenter": "SCV",
+    "WarpPrism": "Zealot",
+    "OverlordTransport": "Zergling",
+    "NydusNetwork": "Zergling",
+}
+SMART, LOAD, LOAD_ALL, UNLOAD_UNIT = 1, 3668, 3663, 3796
+
+
+@pytest.mark.parametrize(("carrier", "passenger"), TRANSPORTS.items(), ids=TRANSPORTS)
+def test_pysc2_warns_of_no_ability_of_a_loaded_transport(
+    carrier: str, passenger: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    features = pytest.importorskip("khala_bridge.compat").features
+    client = Client()
+    client.play("Melee/Flat64", interface(screen=64, minimap=64))
+    tags = {name: made(client, name) for name in (carrier, passenger)}
+    if carrier == "CommandCenter":  # takes workers only, and all that are near
+        client.act(command(LOAD_ALL, [tags[carrier]]))
+    else:
+        client.act(command(LOAD, [tags[carrier]], target=tags[passenger]))
+    client.step(60)
+    client.act(command(SMART, [tags[carrier]], point=(32, 32)))  # raw commands select their units
+    seen = client.step(4).observation
+    assert [len(unit.passengers) for unit in seen.raw_data.units if unit.tag == tags[carrier]] == [1]
+
+    warnings: list[tuple[object, ...]] = []
+    monkeypatch.setattr(features.logging, "warning", lambda *said: warnings.append(said))
+    info = client.ask(game_info=sc.RequestGameInfo()).game_info
+    layers = features.AgentInterfaceFormat(feature_dimensions=features.Dimensions(64, 64))
+    reader = features.features_from_game_info(info, agent_interface_format=layers)
+    assert reader.available_actions(seen)
+    assert not warnings
+
+    client.act(command(UNLOAD_UNIT, [tags[carrier]]))  # it is not offered, and still there
+    after = client.step(40).observation.raw_data.units
+    assert [len(unit.passengers) for unit in after if unit.tag == tags[carrier]] == [0]
+
+
+@pytest.mark.slow
+def test_no_unit_offers_an_ability_that_pysc2_does_not_know() -> None:
+    known = pytest.importorskip("khala_bridge.compat").actions.ABILITY_IDS
+    catalog, unknown = load_catalog(), set[tuple[str, int]]()
+    world = new_game(load_map("Melee/Flat128"), seed=1)
+    for number, unit in enumerate(catalog.units):
+        if number % 30 == 0:  # not too many in one place
+            world = new_game(load_map("Melee/Flat128"), seed=1)
+            world.players[1].minerals = world.players[1].vespene = 99_999.0
+            for switch in ("free", "tech_tree", "food", "cooldown"):
+                commands.debug_switch(world, 1, switch)
+            commands.debug_upgrade(world, 1)
+        if unit.resource:
+            continue
+        (slot,) = commands.debug_create(world, unit.id, 1, (64.5, 64.5))
+        for loops in (1, 5):
+            advance(world, loops)
+            offered = usable(world, slot, free=True) if world.alive[slot] else []
+            unknown |= {(unit.name, ability.id) for ability in offered if ability.id not in known}
+            busy = next((a for a in offered if a.effect in {"train", "research", "morph", "burrow"}), None)
+            if busy is not None:  # what is made or changes can be cancelled
+                casting.use(world, [slot], busy)
+    assert not unknown
+
+
+def made(client: Client, name: str) -> int:
+    """Return the tag of a new unit of the player in the middle of the map."""
+    before = {unit.tag for unit in client.observe().observation.raw_data.units}
+    kind = load_catalog().unit(name).id
+    order = debug_pb2.DebugCreateUnit(unit_type=kind, owner=1, pos=common_pb2.Point2D(x=32, y=32), quantity=1)
+    client.debug(debug_pb2.DebugCommand(create_unit=order))
+    units = client.step(2).observation.raw_data.units
+    return next(unit.tag for unit in units if unit.unit_type == kind and unit.tag not in before)

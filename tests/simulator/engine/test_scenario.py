@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_simulator.maps.game_map import MapError, find_map, load_map, map_from, map_names
-from khala_simulator.maps.scenario_file import ScenarioError, parse_scenario, read_scenario
+from khala_simulator.maps.nodes import ScenarioError
+from khala_simulator.maps.scenario_file import parse_scenario, read_scenario
 from khala_simulator.tick import advance, new_game
 
 if TYPE_CHECKING:
