@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 UNKNOWN = Usage(requests=1, unknown_requests=1)
+UNBILLED = Usage(requests=1)
 
 
 class LLMPolicy(Policy):
@@ -261,27 +262,33 @@ class _Tries:
         ) as ticket:
             self._made += 1
             began = self._clock()
+            request = self._request(began)
             outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
             try:
-                completion = await self._completed(began)
+                completion = await self._completed(request)
                 outcome = _Outcome(
                     completion.verdict, completion, completion.reason, self._with_images(completion.usage)
                 )
                 ticket.settle(outcome.usage)
             except LLMError as error:
-                usage = outcome.usage if error.may_be_billed else Usage(requests=1)
+                usage = outcome.usage if error.may_be_billed and request.delivery.left else UNBILLED
                 outcome = _Outcome(error.status, None, excerpt(str(error)), usage)
                 ticket.settle(usage)
+                raise
+            except asyncio.CancelledError:
+                if not request.delivery.left:
+                    outcome = _Outcome("cancelled", usage=UNBILLED)
+                    ticket.settle(UNBILLED)
                 raise
             finally:
                 self._trace(began, ticket, outcome)
             return completion
 
-    async def _completed(self, began: float) -> Completion:
+    async def _completed(self, request: Request) -> Completion:
         """Return the completion; tell the breaker how the call ended."""
         breaker, deadline = self._policy.breaker, self._context.deadline
         try:
-            completion = await self._policy.client.complete(self._request(began))
+            completion = await self._policy.client.complete(request)
         except LLMError as error:
             breaker.note(error)
             raise

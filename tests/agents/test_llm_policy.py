@@ -15,6 +15,7 @@ from khala_agents.llm.client import (
     EndpointUnavailable,
     LimitExceeded,
     LLMError,
+    Request,
     RequestRefused,
     Unauthorized,
     Unreachable,
@@ -184,6 +185,26 @@ async def test_a_request_of_unknown_usage_says_the_most_that_it_may_have_cost(
     assert (exchange.status, exchange.usage.unknown_requests) == ("cancelled", 1)
     assert exchange.usage.unknown_usd == pytest.approx(budget.booked_usd)
     assert budget.booked_usd > 4_000e-6, "the longest answer, and the prompt"
+
+
+async def test_a_request_that_never_left_costs_nothing(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    model = listed_model("never")
+
+    async def connect(request: Request) -> Completion:
+        request.delivery.left = False
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    monkeypatch.setattr(model, "complete", connect)
+    limits = Limits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := Budget(1.0)))
+    policy, exchanges = traced(model, limits=limits)
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(5):
+            await policy.decide(briefing(), observation())
+    assert (exchanges[0].status, exchanges[0].usage.unknown_requests, budget.booked_usd) == ("cancelled", 0, 0.0)
 
 
 # --- replay ---------------------------------------------------------------------------------------------

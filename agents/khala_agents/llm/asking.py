@@ -99,7 +99,7 @@ class HttpClient(ABC):
             self._fields = self._fit()  # another client may have learned something
             body = self._body(request)
             role = self._role if any(message.role == "system" for message in request.messages) else None
-            answer = await self._http.post(self.PATH, to_json(body))
+            answer = await self._http.post(self.PATH, to_json(body), request.delivery)
             if answer.status not in REFUSALS or verdict_of(answer.status, answer.body):
                 return answer
             learned = self.quirks.learn(answer.body, body, role)

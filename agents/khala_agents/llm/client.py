@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, TypeAlias
 
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import ChatMessage, Usage
@@ -57,6 +57,20 @@ class Origin:
     purpose: Purpose = "decision"
 
 
+@dataclass(slots=True)
+class Delivery:
+    """How far a request came: one that never left costs nothing.
+
+    Attributes:
+        left: whether a byte of it may have reached the endpoint; a client that can tell sets it to False until then.
+    """
+
+    left: bool = True
+
+    EXTENSION: ClassVar[str] = "khala_delivery"
+    """Under this name a request over HTTP carries it to its transport."""
+
+
 @dataclass(frozen=True, slots=True)
 class Request:
     """One request.
@@ -68,6 +82,7 @@ class Request:
         attempt: number of this try for this decision, from 1.
         pictures: bytes of all images that the messages name, by their hashes.
         stable: number of messages at the front that other requests of the episode begin with, too, for caches.
+        delivery: how far it came.
     """
 
     messages: tuple[ChatMessage, ...]
@@ -76,6 +91,7 @@ class Request:
     attempt: int = 1
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     stable: int = 0
+    delivery: Delivery = field(default_factory=Delivery)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from khala_agents.llm.address import checked_address
-from khala_agents.llm.client import LLMError, MalformedCompletion, RequestRefused, Unreachable
+from khala_agents.llm.client import Delivery, LLMError, MalformedCompletion, RequestRefused, Unreachable
 from khala_agents.llm.faults import error_for
 from khala_agents.llm.network import Trust, proxy_for, trusted
 from khala_agents.secret import excerpt
@@ -95,8 +95,8 @@ class HttpEndpoint:
         self._urls: dict[str, httpx.URL] = {}
         self._transport: httpx.AsyncBaseTransport | None = None
 
-    async def post(self, path: str, body: bytes) -> HttpAnswer:
-        """Return the answer, whatever its status.
+    async def post(self, path: str, body: bytes, delivery: Delivery | None = None) -> HttpAnswer:
+        """Return the answer, whatever its status, and note whether the request has left.
 
         Raises:
             LLMError: there is none.
@@ -106,7 +106,7 @@ class HttpEndpoint:
         from khala_agents.llm.transport import BodyTooLarge  # noqa: PLC0415
 
         try:
-            return await self._answer("POST", path, body)
+            return await self._answer("POST", path, body, delivery)
         except BodyTooLarge as error:
             raise MalformedCompletion(f"{self.address} cannot be used: {error}") from None
         except httpx.DecodingError:
@@ -146,7 +146,9 @@ class HttpEndpoint:
         if transport is not None:
             await transport.aclose()
 
-    async def _answer(self, method: str, path: str, body: bytes | None = None) -> HttpAnswer:
+    async def _answer(
+        self, method: str, path: str, body: bytes | None = None, delivery: Delivery | None = None
+    ) -> HttpAnswer:
         """Return the answer to a request.
 
         It goes to the transport itself: an `httpx.AsyncClient`, with redirects, authentication and cookies that no
@@ -156,7 +158,8 @@ class HttpEndpoint:
 
         if path not in self._urls:
             self._urls[path] = httpx.URL(self.address + path + self._query)
-        request = httpx.Request(method, self._urls[path], headers=self._headers, content=body)
+        extensions = {} if delivery is None else {Delivery.EXTENSION: delivery}
+        request = httpx.Request(method, self._urls[path], headers=self._headers, content=body, extensions=extensions)
         answer = await self._connected().handle_async_request(request)
         return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 

@@ -16,9 +16,12 @@ import aiohttp
 import httpx
 from aiohttp.http_exceptions import ContentEncodingError
 
+from khala_agents.llm.client import Delivery
+
 if TYPE_CHECKING:
     import ssl
     from collections.abc import AsyncIterator
+    from types import SimpleNamespace
 
 CONNECT_S = 5.0
 KEEP_ALIVE_S = 120.0
@@ -56,6 +59,9 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 request never left.
             httpx.DecodingError: it cannot be unpacked, or is too large.
         """
+        delivery: Delivery | None = request.extensions.get(Delivery.EXTENSION)
+        if delivery is not None:
+            delivery.left = False
         try:
             async with self._open().request(
                 request.method,
@@ -64,6 +70,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 data=request.content,
                 allow_redirects=False,
                 proxy=self._proxy,
+                trace_request_ctx=delivery,
             ) as answer:
                 body = await _whole(answer.content.iter_any(), answer)
         except aiohttp.ServerTimeoutError as error:
@@ -95,6 +102,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 cookie_jar=aiohttp.DummyCookieJar(),
                 skip_auto_headers=_OURS,  # httpx has set them
                 max_field_size=MAX_HEADER_BYTES,
+                trace_configs=[_noting_departure()],
             )
         return self._session
 
@@ -123,6 +131,18 @@ class SocksTransport(httpx.AsyncBaseTransport):
     async def aclose(self) -> None:
         """Close the connections."""
         await self._inner.aclose()
+
+
+def _noting_departure() -> aiohttp.TraceConfig:
+    """Return what notes that a request leaves, at its first byte."""
+
+    async def note(_: object, context: SimpleNamespace, __: object) -> None:
+        if context.trace_request_ctx is not None:
+            context.trace_request_ctx.left = True
+
+    tracing = aiohttp.TraceConfig()
+    tracing.on_request_headers_sent.append(note)
+    return tracing
 
 
 async def _whole(pieces: AsyncIterator[bytes] | Any, answer: aiohttp.ClientResponse | None) -> bytes:
