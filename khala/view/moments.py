@@ -143,7 +143,7 @@ class Moments:
             game_loop=seen.game_loop,
             effect_step=effect,
             status=report.status if report else reply.status if reply else None,
-            detail=(report.detail if report else "") or (reply.detail if reply else ""),
+            detail=_why(report or reply),
             fate=report.fate if report else None,
             age_loops=report.age_loops if report else 0,
             latency_s=report.latency_s if report else reply.latency_s if reply else None,
@@ -228,6 +228,11 @@ class Moments:
             return decode_as(kind, self._index.payload(found.spot))
         except PeerError:
             return None
+
+
+def _why(said: AgentReport | Reply | None) -> str:
+    """Return why an agent did not decide: in a few words, and in those of its endpoint."""
+    return ": ".join(filter(None, (said.detail, said.reason))) if said else ""
 
 
 def _letter(one: Any, step: int) -> Letter:
