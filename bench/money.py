@@ -2,11 +2,13 @@
 
     python -m bench.money                              all kinds of trouble, caps of 0.05, 0.30 and 1.00, 1 and 8 jobs
     python -m bench.money --kind late --cap 0.3        some of them
+    python -m bench.money --experiment                 whole experiments in place of single agents, N matches at once
     python -m bench.money --json                       one JSON object on stdout
 
 Each job is an agent with a ledger of its own on the same file, as processes of a match have; the clients, limits and
 retries are the real ones. The endpoint bills every answer that it began to write, whether or not it arrived, by a
-count of tokens that is less favourable than ours. The exit code is 1 if it billed more than the cap in any row.
+count of tokens that is less favourable than ours. With --experiment, `khala experiment run --budget-usd CAP --jobs N`
+plays matches of two agents, until the budget is used up. The exit code is 1 if more was billed than the cap in any row.
 
 `billed` is what the endpoint counts, `booked` what the ledger says, `used` the part of the cap that was billed: the
 rest was held for requests of which nobody knows what they cost. Seen: docs/measurements.md.
@@ -59,6 +61,15 @@ try_timeout_s: {LATE_S}
 prices: {{prompt: {PRICES.prompt}, completion: {PRICES.completion}}}
 retry: {{tries: 2, base_s: 0, cap_s: 0, jitter_s: 0}}
 breaker: {{failures: 1000}}
+"""
+
+
+EXPERIMENT: Final = """
+name: billed
+fixed: {task: 2s3z_pair, model: billed.yaml, max_steps: 8, max_wait_s: 1}
+factors: {clock: [frozen]}
+seeds: 12
+retries: 0
 """
 
 
@@ -285,6 +296,23 @@ async def _ask(endpoint: BillingEndpoint, model: Path, cap_usd: float, path: Pat
             await policy.close()
 
 
+async def play(kind: str, cap_usd: float, jobs: int, directory: Path) -> Spent:
+    """Play an experiment whose models ask an endpoint in trouble, and return what was spent."""
+    place = directory / f"{kind}-{cap_usd}-{jobs}".replace(" ", "-")
+    place.mkdir()
+    async with BillingEndpoint(kind) as endpoint:
+        (place / "billed.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url))
+        (place / "grid.yaml").write_text(EXPERIMENT)
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-P", "-m", "khala", "experiment", "run", "grid.yaml", "--budget-usd", str(cap_usd),
+            "--jobs", str(jobs), "--json", cwd=place, stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
+        )  # fmt: skip
+        said, _ = await process.communicate()
+        booked_usd = json.loads(said)["cost_usd"]
+        return Spent(kind, cap_usd, jobs, endpoint.requests, endpoint.billed_usd, booked_usd)
+
+
 def _scene() -> tuple[Briefing, Observation]:
     """Return a briefing and an observation of a recorded match, without a deadline."""
     recording = Recording.open(GOLDEN)
@@ -302,13 +330,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--kind", action="append", choices=KINDS, help="only these kinds of trouble")
     parser.add_argument("--cap", action="append", type=float, help="only these caps, in US dollars")
     parser.add_argument("--jobs", action="append", type=int, help="only these numbers of agents at once")
+    parser.add_argument("--experiment", action="store_true", help="play experiments, with so many matches at once")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     given = parser.parse_args(arguments)
     logging.disable(logging.ERROR)
     rows = []
     with tempfile.TemporaryDirectory(prefix="khala-money-") as directory:
         for kind, cap_usd, jobs in itertools.product(given.kind or KINDS, given.cap or CAPS, given.jobs or JOBS):
-            rows.append(asyncio.run(spend(kind, cap_usd, jobs, Path(directory))))
+            how = play if given.experiment else spend
+            rows.append(asyncio.run(how(kind, cap_usd, jobs, Path(directory))))
     if given.json:
         print(json.dumps([asdict(row) | {"kept": row.kept} for row in rows]))
     else:

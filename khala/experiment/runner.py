@@ -1,10 +1,10 @@
 """Plays the matches of an experiment that are missing: pilot, budget, retries.
 
 Each match may spend at most a part of what is left, so that all together never spend more than the budget: what a
-match that runs may still spend is held back from the others. What it has spent stands in its ledger, whatever became of
-it and of its recording. A match that ends because its part is used up counts as invalid, with the cause `budget`.
-Matches of models whose endpoint refuses them for good are not begun any more. Below it an engine plays, and the store
-keeps what was played.
+match that runs may still spend is held back from the others. While nobody knows what a match costs, one is played
+alone. What it has spent stands in its ledger, whatever became of it and of its recording. A match that ends because its
+part is used up counts as invalid, with the cause `budget`. Matches of models whose endpoint refuses them for good are
+not begun any more. Below it an engine plays, and the store keeps what was played.
 """
 
 from __future__ import annotations
@@ -83,6 +83,8 @@ class Runner:
     stopped: str = ""
     """Why matches were not begun; "" if all were."""
     _began_s: float = 0.0
+    _next_end: asyncio.Event = field(default_factory=asyncio.Event)
+    """Is set when a match ends."""
     _played: dict[str, Played] = field(default_factory=dict)
     _waiting: deque[PlannedMatch] = field(default_factory=deque)
     _tries: Counter[str] = field(default_factory=Counter)
@@ -119,7 +121,10 @@ class Runner:
             match = self._waiting.popleft()
             if why := self._refused.get(_minds_of(match)):
                 self.stopped = why
-            elif why := self._too_much(match):
+            elif self.spent.held_usd > LEAST_USD and (self._too_dear(match) or self._costs_nobody_knows_what(match)):
+                self._waiting.appendleft(match)  # one that runs will give back what it does not spend
+                await self._next_end.wait()
+            elif why := self._used_up() or self._too_many_tokens(match) or self._too_dear(match):
                 self.stopped = why
                 return
             else:
@@ -154,6 +159,8 @@ class Runner:
         if found[0].cause == "budget" and part_usd is not None:
             self._was_short(match.cell, part_usd)
         self._end(match, done, found[0])
+        ended, self._next_end = self._next_end, asyncio.Event()
+        ended.set()
 
     def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:
         self.spent.usd -= self._unread_usd.pop(match.key, 0.0)
@@ -173,14 +180,22 @@ class Runner:
 
     # --- what it takes --------------------------------------------------------------------------------
 
-    def _too_much(self, match: PlannedMatch) -> str:
-        """Return why a match is not begun; "" if it is."""
+    def _used_up(self) -> str:
+        """Return why no match is begun any more; "" if there is time."""
         hours = (time.monotonic() - self._began_s) / 3600
         if self.budget.hours is not None and hours >= self.budget.hours:
             return f"the budget of {self.budget.hours:g} hours is used up"
+        return ""
+
+    def _too_many_tokens(self, match: PlannedMatch) -> str:
+        """Return why a match would read and write too much; "" if it would not."""
         tokens = _mean(self._numbers(match, "tokens")) or 0.0
         if self.budget.tokens is not None and self.spent.tokens + tokens > self.budget.tokens:
             return f"the budget of {self.budget.tokens} tokens is used up ({self.spent.tokens} were read and written)"
+        return ""
+
+    def _too_dear(self, match: PlannedMatch) -> str:
+        """Return why there is too little money for a match; "" if there is enough."""
         usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
         left, short = self._left_usd(), self._short_usd.get(str(match.cell))
         if left is not None and (left < LEAST_USD or left < usual_usd):
@@ -188,6 +203,12 @@ class Runner:
         if left is not None and short is not None and left <= short:
             return f"{left:.4f} USD are left, and {short:.4f} were not enough for {', '.join(match.cell.values())}"
         return ""
+
+    def _costs_nobody_knows_what(self, match: PlannedMatch) -> bool:
+        """Return whether no match was played that says what this one may cost: the first one is played alone."""
+        return self._part_usd(match) is not None and not (
+            self._numbers(match, "cost_usd") or str(match.cell) in self._short_usd
+        )
 
     def _was_short(self, cell: dict[str, str], usd: float) -> None:
         """Note that so much money was not enough for a match of a cell."""
@@ -199,13 +220,15 @@ class Runner:
         return self.budget.usd - self.spent.usd - self.spent.held_usd
 
     def _part_usd(self, match: PlannedMatch) -> float | None:
-        """Return what a match may spend: what is usual with some room, or a fair part while nothing is known."""
+        """Return what a match may spend: what is usual with some room, all while nothing is known; None for any sum."""
         left = self._left_usd()
         if left is None or not any(mind.policy is None for mind in match.minds.values()):
             return None
-        usual = max(self._numbers(match, "cost_usd"), default=0.0)
-        wanted = ROOM * max(usual, self._short_usd.get(str(match.cell), 0.0))
-        return min(left, wanted) if wanted else left / max(1, min(self.engine.slots, len(self._waiting) + 1))
+        costs = self._numbers(match, "cost_usd")
+        wanted = ROOM * max(*costs, self._short_usd.get(str(match.cell), 0.0), 0.0)
+        if wanted:
+            return min(left, wanted)
+        return left / max(1, min(self.engine.slots, len(self._waiting) + 1)) if costs else left
 
     def _numbers(self, match: PlannedMatch, name: str) -> list[float]:
         """Return what matches of the same cell have taken; of all if none of them was played."""

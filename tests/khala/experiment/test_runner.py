@@ -140,12 +140,31 @@ async def test_no_further_match_is_begun_with_less_than_was_not_enough(store: St
 
 async def test_a_match_gets_more_where_its_part_was_not_enough(store: Store) -> None:
     found = experiment(factors={"task": ["2s3z_pair"]}, seeds=2)
-    engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)  # each of two gets 0.2
-    await run(store, engine, found, usd=0.4)
-    assert states(store) == ["invalid"] * 2
+    engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)
+    await run(store, engine, found, usd=0.2)
+    assert states(store) == ["invalid"]
     await run(store, engine, found, usd=2.0)
     assert states(store) == ["done"] * 2
-    assert [job.minds["blue"].budget_usd for job in engine.jobs] == [0.2, 0.2, 0.4, 0.4]
+    assert [job.minds["blue"].budget_usd for job in engine.jobs] == [0.2, 0.4, 0.4]
+
+
+async def test_while_nobody_knows_what_a_match_costs_one_is_played_alone(store: Store) -> None:
+    engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)
+    runner = await run(store, engine, usd=1.0)
+    assert [job.minds["blue"].budget_usd for job in engine.jobs] == pytest.approx([1.0, 0.6, 0.4])
+    assert (states(store), runner.stopped) == (["done"] * 3, "the budget of 1 USD is used up (0.9000 were spent)")
+
+
+async def test_a_match_waits_for_money_that_others_give_back(store: Store) -> None:
+    engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)
+    runner = await run(store, engine, usd=1.9)
+    assert (states(store), runner.stopped, engine.most_at_once) == (["done"] * 6, "", 3)
+
+
+async def test_matches_of_free_models_are_played_at_the_same_time(store: Store) -> None:
+    engine = MadeEngine(slots=2)
+    await run(store, engine, usd=1.0)
+    assert (states(store), engine.most_at_once) == (["done"] * 6, 2)
 
 
 async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
