@@ -12,7 +12,7 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-    from khala.experiment.store import Played
+    from khala.experiment.played import Played
 
 FIELDS = ("map", "game", "opponent", "executor", "clock", "actions", "code", "versions", "hardware", "task")
 """The names that `khala.experiment.store.comparable` and `--allow` have."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
-from khala.experiment.store import unread
+from khala.experiment.played import unread
 from khala_orchestrator.tally import REFUSED
 
 if TYPE_CHECKING:
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from khala.experiment.engine import Engine
     from khala.experiment.job import Done
     from khala.experiment.plan import PlannedMatch
+    from khala.experiment.played import Played
     from khala.experiment.spec import Budget, Experiment
-    from khala.experiment.store import Played, Store
+    from khala.experiment.store import Store
 
 LEAST_USD = 1e-6
 """Less is nothing: sums of money are not exact."""

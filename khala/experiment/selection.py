@@ -18,7 +18,7 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala.experiment.store import Played
+    from khala.experiment.played import Played
 
 SIDE = "side"
 """A name that selections know beside the factors, for duels."""

@@ -13,21 +13,18 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import logging
 import re
 import sqlite3
 import weakref
 from collections import defaultdict
-from dataclasses import astuple, dataclass, replace
-from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
-
-from pydantic import TypeAdapter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from khala import indexes
-from khala.experiment.measures import CallCount, Measures, measure_with_calls
-from khala.experiment.plan import FACTOR
+from khala.experiment.index import CALLS, Row, add, connect, create, played_in, results_in, schema, take
+from khala.experiment.measures import measure_with_calls
+from khala.experiment.played import Played, judged
 from khala.experiment.spec import Experiment
 from khala.matches import free_recording, tries_in
 from khala.spending import paid_usd
@@ -41,54 +38,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from khala.experiment.plan import PlannedMatch
-    from khala_protocol.messages import Run
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-Row = tuple[Measures, list[CallCount]]
-State = Literal["done", "invalid", "crashed"]
-"""`invalid`: it was played, and says nothing about its agents; `crashed`: it was not played to its end."""
 FILE, INDEX, MATCHES, LOGS, LOCK = "experiment.yaml", "index.sqlite", "matches", "logs", ".lock"
-VERSION = 1
-SCHEMA = """
-create table matches (
-    key text primary key, cell text not null, seed integer not null, repetition integer not null,
-    state text not null, cause text not null, attempts integer not null, recording text not null,
-    wall_s real, cost_usd real, tokens integer, card text not null
-);
-create table calls (
-    match text not null, episode integer not null, side text not null,
-    agent text not null, action text not null, became text not null, count integer not null
-);
-create index calls_of_match on calls(match);
-"""
 _REPETITION = re.compile("[0-9]{1,9}")
-_TYPES = {"str": "text", "int": "integer", "float": "real", "bool": "integer"}
-_READ = {"str": (str,), "int": (int,), "float": (int, float, type(None)), "bool": (int,)}
-"""What SQLite has for each type of a measure; nothing for a number that is none."""
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """What became of one match."""
-
-    key: str
-    cell: dict[str, str]
-    seed: int
-    repetition: int
-    state: State
-    cause: str
-    """Why it is not `done`: `budget`, `crash`, `timeout`, `interrupted`, or the host's own words."""
-    attempts: int
-    recording: str
-    """Relative to the directory of the experiment; empty if there is none."""
-    wall_s: float | None
-    cost_usd: float | None
-    tokens: int | None
-    card: dict[str, Any]
-    """What of its run card must be the same in runs that are compared."""
 
 
 class Store:
@@ -163,10 +118,10 @@ class Store:
     def _opened_index(self) -> sqlite3.Connection:
         path = self.directory / INDEX
         if not path.exists() and not any(self._tries()):
-            return _created(path)
+            return create(path)
         try:
             with indexes.faults(path):
-                return _connected(path)
+                return connect(path)
         except sqlite3.DatabaseError as error:
             return self._remade(error if path.exists() else None)
 
@@ -182,7 +137,7 @@ class Store:
         except (ConfigError, OSError) as why:
             log.warning("%s is kept in memory for now, and nothing is lost: %s", path, why)
             index = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
-            index.executescript(_schema())
+            index.executescript(schema())
             return self._filled(index)
 
     def _written(self) -> sqlite3.Connection:
@@ -191,19 +146,19 @@ class Store:
         part = path.with_name(f".{INDEX}.part")
         indexes.remove(part)
         try:
-            with contextlib.closing(_created(part)) as index, indexes.faults(part):
+            with contextlib.closing(create(part)) as index, indexes.faults(part):
                 self._filled(index)
             indexes.remove(path)
             part.replace(path)
         finally:
             indexes.remove(part)
-        return _connected(path)
+        return connect(path)
 
     def _filled(self, index: sqlite3.Connection) -> sqlite3.Connection:
         for tries in self._tries():
             best = _best(tries)
             if (found := self.read(best, attempts=len(tries))) is not None:
-                _take(index, best, *found)
+                take(index, best, *found)
         return index
 
     def _tries(self) -> Iterator[list[Path]]:
@@ -226,21 +181,21 @@ class Store:
         Raises:
             OSError: the disk is full, or takes nothing.
         """
-        self._ask(lambda index: _add(index, played, rows))
+        self._ask(lambda index: add(index, played, rows))
 
     def played(self) -> dict[str, Played]:
         """Return what is known of each match, by its key."""
         if not (self.directory / INDEX).exists() and not any(self._tries()):
             return {}
-        return self._ask(_played)
+        return self._ask(played_in)
 
     def results(self) -> list[dict[str, Any]]:
         """Return a row for each episode and side: its measures, and what is known of its match."""
-        return self._ask(_results)
+        return self._ask(results_in)
 
     def calls(self) -> list[dict[str, Any]]:
         """Return what became of calls, by match, episode, side, agent and action."""
-        return self._ask(lambda index: [dict(zip(_CALLS, row, strict=True)) for row in index.execute(
+        return self._ask(lambda index: [dict(zip(CALLS, row, strict=True)) for row in index.execute(
             "select match, episode, side, agent, action, became, count from calls order by rowid"
         )])  # fmt: skip
 
@@ -261,7 +216,7 @@ class Store:
     def take(self, path: Path, *, attempts: int) -> None:
         """Read a recording into the index; one without a run card says nothing."""
         if (found := self.read(path, attempts=attempts)) is not None:
-            self._ask(lambda index: _take(index, path, *found))
+            self._ask(lambda index: take(index, path, *found))
 
     def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
@@ -281,7 +236,7 @@ class Store:
             log.warning("%s has labels that no experiment gives: it is left out", path)
             return None
         rows = measure_with_calls(recording)
-        played = _judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
+        played = judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
         is_priced = any(row.paid_usd is not None for row, _ in rows)
         cost_usd = sum(map(_paid_usd, tries_in(path.parent)))
         return replace(played, cost_usd=cost_usd if cost_usd or is_priced else None), rows
@@ -297,33 +252,11 @@ class Store:
     def adopt(self) -> None:
         """Take in recordings of a runner that was killed: what its matches have cost counts."""
         make_private(self.directory)
-        known = self._ask(_played)  # begins an index if there is none, and nothing to make it of
+        known = self._ask(played_in)  # begins an index if there is none, and nothing to make it of
         for tries in self._tries():
             key = tries[0].parent.name
             if key not in known or known[key].attempts < len(tries):
                 self.take(_best(tries), attempts=len(tries))
-
-
-def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | None) -> Played:
-    """Return what became of a match of which there is no recording that can be read."""
-    return Played(
-        key=match.key, cell=match.cell, seed=match.seed, repetition=match.repetition, state="crashed", cause=cause,
-        attempts=attempts, recording="", wall_s=None, cost_usd=cost_usd, tokens=None, card={},
-    )  # fmt: skip
-
-
-def result_columns() -> dict[str, str]:
-    """Return the columns of `results` after the first one, with their types."""
-    kinds = {name: str(kind).split(" | ")[0] for name, kind in _annotations().items()}
-    return {name: _TYPES[kind] for name, kind in kinds.items()}
-
-
-def _annotations() -> dict[str, Any]:
-    return {name: field.type for name, field in Measures.__dataclass_fields__.items()}
-
-
-def _places(values: list[Any]) -> str:
-    return f"({', '.join('?' * len(values))})"
 
 
 def _best(tries: Sequence[Path]) -> Path:
@@ -348,131 +281,3 @@ def _paid_usd(path: Path) -> float:
         return paid_usd(path)
     except RecordingError:
         return 0.0
-
-
-def _judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
-    state, cause = _state(rows, crash)
-    labels = card.labels
-    return Played(
-        key=labels.get("match", card.run),
-        cell={name.removeprefix(FACTOR): value for name, value in labels.items() if name.startswith(FACTOR)},
-        seed=card.seed,
-        repetition=int(labels.get("repetition", "0")),
-        state=state,
-        cause=cause,
-        attempts=attempts,
-        recording=recording,
-        wall_s=max((row.wall_s or 0.0 for row in rows), default=None),
-        cost_usd=None,
-        tokens=sum(row.prompt_tokens + row.completion_tokens for row in rows) if rows else None,
-        card=comparable(card),
-    )
-
-
-def _state(rows: list[Measures], crash: str) -> tuple[State, str]:
-    if crash or not rows or any(row.outcome == "unfinished" for row in rows):
-        return "crashed", crash or "interrupted"
-    if any("budget: " in row.undecided_because for row in rows):
-        return "invalid", "budget"
-    return "invalid" if (why := next((row.invalid_because for row in rows if not row.valid), "")) else "done", why
-
-
-_OTHERWISE = frozenset({"clock", "executor", "opponent", "map", "scenes"})
-"""Fields of a task that are compared by themselves, or that no agent notices."""
-
-
-def comparable(card: Run) -> dict[str, Any]:
-    """Return what of a run card must be the same in runs that are compared, by the names that `--allow` takes."""
-    task = dict(card.config)
-    return {
-        "map": f"{card.map_name} {card.map_sha256}",
-        "game": card.game,
-        "opponent": card.opponent,
-        "executor": card.executor,
-        "clock": card.clock.model_dump(mode="json"),
-        "actions": card.catalogue_sha256,
-        "code": card.code_sha256,
-        "versions": card.versions,
-        "hardware": card.hardware,
-        "task": {name: value for name, value in task.items() if name not in _OTHERWISE},
-    }
-
-
-# --- rows of the index -----------------------------------------------------------------------------------
-
-_CALLS = ("match", "episode", "side", "agent", "action", "became", "count")
-
-
-def _schema() -> str:
-    columns = ", ".join(f'"{name}" {kind}' for name, kind in result_columns().items())
-    return f"{SCHEMA} create table results (match text not null, {columns}); create index of_match on results(match)"
-
-
-def _created(path: Path) -> sqlite3.Connection:
-    indexes.create(path, _schema(), VERSION)
-    return _connected(path)
-
-
-def _connected(path: Path) -> sqlite3.Connection:
-    return indexes.connect(path, _schema(), VERSION)
-
-
-def _take(index: sqlite3.Connection, path: Path, played: Played, rows: Sequence[Row]) -> None:
-    """Note what a recording says, which may be anyone's."""
-    try:
-        _add(index, played, rows)
-    except OverflowError:
-        log.warning("%s has a number that is larger than SQLite's: it is left out", path)
-
-
-def _add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
-    values = [getattr(played, name) for name in Played.__slots__]
-    plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
-    names = list(result_columns())
-    with indexes.transaction(index):
-        for table in ("results", "calls"):
-            index.execute(f"delete from {table} where match = ?", (played.key,))  # noqa: S608
-        index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks
-        for row, calls in rows:
-            place = played.key, row.episode, row.side
-            counts = [(*place, *astuple(call)) for call in calls]
-            index.executemany("insert into calls values (?, ?, ?, ?, ?, ?, ?)", counts)
-            values = [played.key, *(getattr(row, name) for name in names)]
-            index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
-
-
-def _played(index: sqlite3.Connection) -> dict[str, Played]:
-    """Return the matches; raise `ValueError` if one is not as we write it."""
-    names, columns = Played.__slots__, ", ".join(Played.__slots__)
-    found = index.execute(f"select {columns} from matches order by rowid")  # noqa: S608  # our own names
-    rows = (dict(zip(names, row, strict=True)) for row in found)
-    plain = (row | {name: json.loads(row[name]) for name in ("cell", "card")} for row in rows)
-    return {played.key: played for played in map(_match().validate_python, plain)}
-
-
-@cache
-def _match() -> TypeAdapter[Played]:
-    return TypeAdapter(Played)
-
-
-def _results(index: sqlite3.Connection) -> list[dict[str, Any]]:
-    """Return the rows; raise `ValueError` or `LookupError` if one is not as we write it."""
-    matches, kinds = _played(index), _annotations()
-    columns = ", ".join(f'"{name}"' for name in kinds)
-    found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
-    return [_joined(matches[key], _checked(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
-
-
-def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
-    """Return a row; raise `ValueError` if a value is of another type than its column: SQLite takes any."""
-    for name, kind in kinds.items():
-        types, _, nothing = str(kind).partition(" | ")
-        if not isinstance(row[name], _READ[types]) and not (nothing and row[name] is None):
-            raise ValueError(f"{name} is {row[name]!r:.40}")
-    return row
-
-
-def _joined(match: Played, row: dict[str, Any]) -> dict[str, Any]:
-    cell = {f"{FACTOR}{name}": value for name, value in match.cell.items()}
-    about = {"match": match.key, "state": match.state, "cause_of_state": match.cause, "repetition": match.repetition}
-    return {**about, **cell, **row}

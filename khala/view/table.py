@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from khala.experiment.played import Played
     from khala.experiment.report.document import Table
     from khala.experiment.report.summary import Summary
     from khala.experiment.statistics import Interval
-    from khala.experiment.store import Played
 
 
 def line_of(directory: Path) -> ExperimentLine:

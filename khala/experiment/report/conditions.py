@@ -19,9 +19,10 @@ from khala_protocol.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from khala.experiment.played import Played
     from khala.experiment.report.summary import Cell
     from khala.experiment.selection import Row
-    from khala.experiment.store import Played, Store
+    from khala.experiment.store import Store
 
 EVERYWHERE = ("game", "actions", "code", "versions", "hardware")
 """Fields of run cards that are the same in all matches of an experiment."""

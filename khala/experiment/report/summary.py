@@ -14,8 +14,8 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from khala.experiment.played import Played
     from khala.experiment.statistics import Interval
-    from khala.experiment.store import Played
 
 FATES = ("fresh", "stale", "adapted", "refused", "dropped")
 HALLUCINATIONS = ("input_conflicting", "fact_conflicting", "context_conflicting")

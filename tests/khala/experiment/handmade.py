@@ -6,7 +6,8 @@ import random
 from typing import TYPE_CHECKING, Any
 
 from khala.experiment.measures import Measures
-from khala.experiment.store import Played, Store
+from khala.experiment.played import Played
+from khala.experiment.store import Store
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala import indexes
-from khala.experiment import store as stores
+from khala.experiment import index as rows
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner
 from khala.experiment.spec import Budget, Experiment
@@ -170,7 +170,7 @@ def test_a_disk_that_fills_up_while_it_is_made_anew_leaves_the_old_one(
     directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before, old = known(directory), (directory / INDEX).read_bytes()
-    monkeypatch.setattr(stores, "_add", _full)
+    monkeypatch.setattr(rows, "add", _full)
     with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)):
         Store(directory).rebuild()
     assert (directory / INDEX).read_bytes() == old

@@ -14,10 +14,11 @@ import pytest
 
 from khala.cli import main
 from khala.experiment.plan import plan
+from khala.experiment.played import unread
 from khala.experiment.progress import Watcher
 from khala.experiment.runner import Event, Runner
 from khala.experiment.spec import Budget, Experiment
-from khala.experiment.store import MATCHES, Store, unread
+from khala.experiment.store import MATCHES, Store
 from khala_orchestrator.console import stderr_console
 from tests.khala.experiment.made import MadeEngine, record
 
