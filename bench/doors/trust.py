@@ -45,7 +45,8 @@ def _forged_task(sides: str) -> Json:
 
 def _forged(task: Json) -> Json:
     for side in (task, *task.get("sides", ())):
-        side["agents"] = [agent | {"sections": SECTIONS} for agent in side.get("agents", ())]
+        if side.get("agents"):
+            side["agents"] = [agent | {"sections": SECTIONS} for agent in side["agents"]]
     return task
 
 
@@ -75,7 +76,7 @@ def _write_experiment(directory: Path, sides: str) -> str:
     experiment = {
         "name": "forged",
         "fixed": {"task": _write_task(directory, sides)},
-        "factors": {"player": [{"name": "mine", "settings": {"policy": "foreign_code:decide"}}]},
+        "factors": {"model": ["foreign_code:decide"]},
     }
     (directory / "forged.yaml").write_text(yaml.safe_dump(experiment), encoding="utf-8")
     kept = directory / "experiments" / "forged"

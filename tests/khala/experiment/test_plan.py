@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.experiment.plan import SWAPPED, cells, plan, task_of
+from khala.experiment.plan import SWAPPED, PlannedMatch, cells, check_playable, plan, task_of
 from khala.experiment.spec import Experiment, Settings
+from khala_orchestrator.config import load_task
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 PLAYERS = [{"name": "strong", "model": "skilled"}, {"name": "weak", "model": "focus-fire"}]
 
@@ -129,3 +131,40 @@ def test_a_cell_that_cannot_be_played_is_refused_before_anything_is(fields: dict
     with pytest.raises(ConfigError) as refused:
         plan(experiment(**fields))
     assert says in str(refused.value)
+
+
+# --- before anything is played --------------------------------------------------------------------------
+
+
+def of_models(*names: str, **fields: Any) -> list[PlannedMatch]:
+    return plan(experiment(factors={"task": ["2s3z_pair"], "model": list(names)}, seeds=1, **fields))
+
+
+def test_who_looks_at_an_experiment_needs_no_key_and_who_plays_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    matches = of_models("openai")
+    with pytest.raises(ConfigError, match="model openai: no key: set the environment variable OPENAI_API_KEY"):
+        check_playable(matches, None)
+
+
+def test_a_budget_is_refused_before_the_first_match_where_a_price_is_unknown() -> None:
+    matches = of_models("scripted", "vllm")
+    check_playable(matches, None)
+    with pytest.raises(ConfigError, match=r"model vllm: a budget needs the price of Qwen/Qwen2\.5-7B-Instruct at 127"):
+        check_playable(matches, 1.0)
+
+
+@pytest.mark.parametrize("task", ["2s3z_pair", "duel_3m"])
+def test_code_that_an_experiment_names_is_looked_at_and_not_run(
+    task: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "foreign_code.py").write_text("raise AssertionError('it ran')\n")
+    monkeypatch.chdir(tmp_path)
+    loaded: dict[str, Any] = load_task(task).model_dump(mode="json", exclude_unset=True)
+    for side in (side for side in (loaded, *loaded.get("sides", ())) if side.get("agents")):
+        side["agents"] = [agent | {"sections": ["foreign_code:mine"]} for agent in side["agents"]]
+    fields = {name: loaded[name] for name in ("agents", "sides") if loaded.get(name)}
+    found = experiment(factors={"task": [task]}, fixed={"model": "foreign_code:decide", "fields": fields}, seeds=1)
+    matches = plan(found)
+    with pytest.raises(ConfigError, match=f"task {task}: this names the code 'foreign_code'"):
+        check_playable(matches, None)
