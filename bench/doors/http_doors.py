@@ -181,7 +181,7 @@ SERVERS: Final[dict[str, Serving]] = {
 # --- requests -----------------------------------------------------------------------------------------
 
 
-async def _status(
+async def send(
     target: Target, *lines: str, host: str | None = None, path: str | None = None, method: str | None = None,
     body: bytes | None = None, length: int | None = None,
 ) -> int:  # fmt: skip
@@ -210,7 +210,7 @@ async def _status(
 async def _is_honest_answered(target: Target) -> str:
     """Return how an honest request fares, "" if well."""
     began = time.perf_counter()
-    status = await _status(target)
+    status = await send(target)
     took_s = time.perf_counter() - began
     if status != 200:
         return f"an honest client got {status}"
@@ -264,7 +264,7 @@ async def _play_trick(serving: Serving, trick: Trick, directory: Path) -> str:
             return wrong
         lines = [line.replace("PORT", str(target.port)) for line in trick.lines]
         host = trick.host.replace("PORT", str(target.port)) or None
-        status = await _status(target, *lines, host=host, **trick.options)
+        status = await send(target, *lines, host=host, **trick.options)
         return _refused("it", [status], trick.expected) or await _is_honest_answered(target)
 
 
@@ -315,11 +315,11 @@ async def _play_without_token(serving: Serving, directory: Path) -> str:
             return wrong
         bare = target.path.partition("?")[0]
         tries = [
-            await _status(target, path=bare),
-            await _status(target, path=f"{bare}?token="),
-            await _status(target, path=f"{bare}?token={secrets.token_urlsafe(24)}"),
-            await _status(target, "Authorization: Bearer x", path=bare),
-            await _status(target, "Cookie: token=x; khala_0=x", path=bare),
+            await send(target, path=bare),
+            await send(target, path=f"{bare}?token="),
+            await send(target, path=f"{bare}?token={secrets.token_urlsafe(24)}"),
+            await send(target, "Authorization: Bearer x", path=bare),
+            await send(target, "Cookie: token=x; khala_0=x", path=bare),
         ]
         return _refused("a request without the token", tries, (401, 403)) or await _is_honest_answered(target)
 
@@ -330,18 +330,18 @@ async def _play_guesses(directory: Path) -> str:
         tries = []
         for number in range(60):
             login = base64.b64encode(f"me:hunter{number + 3}".encode()).decode()
-            tries.append(await _status(target, f"Authorization: Basic {login}", path="/api/library"))
+            tries.append(await send(target, f"Authorization: Basic {login}", path="/api/library"))
         if tries.count(401) > 6:
             return f"{tries.count(401)} guesses were looked at"
         right = base64.b64encode(b"me:hunter2").decode()
-        if (status := await _status(target, f"Authorization: Basic {right}", path="/api/library")) != 429:
+        if (status := await send(target, f"Authorization: Basic {right}", path="/api/library")) != 429:
             return f"a guess that was right was told by {status}"
         return await _is_honest_answered(target)
 
 
 async def _play_token_guesses(directory: Path) -> str:
     async with openenv(directory, door=openenv_door("0.0.0.0")) as target:  # its rules alone
-        tries = [await _status(target, path=f"/schema?token={secrets.token_urlsafe(24)}") for _ in range(60)]
+        tries = [await send(target, path=f"/schema?token={secrets.token_urlsafe(24)}") for _ in range(60)]
         if 429 not in tries:
             return "60 guesses were looked at"
         return _refused("a guess", tries, (401, 429)) or await _is_honest_answered(target)
@@ -358,7 +358,7 @@ PATHS: Final = (
 async def _play_paths(directory: Path) -> str:
     async with view(directory) as target:
         query = target.path.partition("?")[2]
-        statuses = [await _status(target, path=f"{path}?{query}") for path in PATHS]
+        statuses = [await send(target, path=f"{path}?{query}") for path in PATHS]
         return _refused("a path out of the recordings", statuses, (303, 400, 404)) or await _is_honest_answered(target)
 
 
@@ -495,7 +495,7 @@ async def _play_blocked_trainer(directory: Path) -> str:
         await reader.readuntil(b"\r\n\r\n")
         for _ in range(20):
             _pass(30)
-            await _status(target)  # the server sees the time
+            await send(target)  # the server sees the time
         came = b""
         with contextlib.suppress(TimeoutError):
             came = await asyncio.wait_for(reader.read(1), 0.2)
@@ -526,7 +526,7 @@ async def _play_long_answer(directory: Path) -> str:
     """Send an answer of 100 kB, which the recording would keep."""
     async with mcp(directory) as target:
         body = INITIALIZE.replace(b'"doors"', b'"' + b"x" * 100_000 + b'"')
-        return _refused("a body of 100 kB", [await _status(target, body=body)], (413,))
+        return _refused("a body of 100 kB", [await send(target, body=body)], (413,))
 
 
 # --- files and processes ------------------------------------------------------------------------------
