@@ -9,10 +9,11 @@ import os
 from collections.abc import Mapping  # noqa: TC003  # pydantic evaluates it, in `khala.service`
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from khala import environment
 from khala_agents.build import Workshop
-from khala_agents.config import WorkerSpec, load_model
+from khala_agents.config import WorkerSpec, load_model, model_files
 from khala_agents.llm.limits import own_turns
 from khala_agents.llm.money import Budget
 from khala_agents.scripted.players import PLAYERS
@@ -80,6 +81,24 @@ class Minds:
     def code(self) -> Iterator[str]:
         """Yield the modules of policies that it names; those of single agents are in groups of their own."""
         yield from filter(None, (module_of(name) for name in (self.policy, self.fallback) if name))
+
+    def keys_sent(self) -> Iterator[str]:
+        """Yield the keys that its model would be sent to an address that no shipped model file gives for them.
+
+        `OPENAI_API_KEY to llm.example.org`: a file that names an address, or a model file, may be anyone's.
+        """
+        if self.policy is not None:
+            return
+        file = load_model(self.model)
+        host = urlsplit(self.base_url or file.base_url).hostname or ""
+        shipped = {(one.api_key_env, urlsplit(one.base_url).hostname) for one in map(load_model, model_files())}
+        if file.api_key_env and (file.api_key_env, host) not in shipped:
+            yield f"{file.api_key_env} to {host}"
+
+    @property
+    def asks_a_model(self) -> bool:
+        """Whether any of its agents does, and so may spend money."""
+        return any(mind.policy is None for mind in (self, *map(self.named, self.agents.values())))
 
     def check(self) -> None:
         """Check that an agent could decide this way, before anything is started.
@@ -160,7 +179,7 @@ async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, M
 
 
 def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> dict[str, Minds]:
-    """Return the minds of each side; each may spend the same part of the budget.
+    """Return the minds of each side; those that ask a model may spend the same part of the budget.
 
     Args:
         sides: names of the sides of the task.
@@ -173,9 +192,14 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     if unknown := [side for side in named if side not in sides]:
         is_it = f"its sides are {' and '.join(sides)}" if len(sides) > 1 else f"its only side is {sides[0]}"
         raise ConfigError(f"the task has no side {unknown[0]}: {is_it}")
-    part = None if common.budget_usd is None else common.budget_usd / len(sides)
-    fair = replace(common, budget_usd=part)
-    return {side: fair.named(named[side]) if side in named else fair for side in sides}
+    made = {side: common.named(named[side]) if side in named else common for side in sides}
+    return made if common.budget_usd is None else share_budget(made, common.budget_usd)
+
+
+def share_budget(minds: Mapping[str, Minds], usd: float) -> dict[str, Minds]:
+    """Return the minds of each side with its budget: those that ask a model may spend the same part."""
+    asking = sum(mind.asks_a_model for mind in minds.values())
+    return {side: replace(mind, budget_usd=usd / asking if mind.asks_a_model else usd) for side, mind in minds.items()}
 
 
 def trust_options(common: Minds, sides: Mapping[str, str]) -> None:

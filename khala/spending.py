@@ -5,11 +5,13 @@ A recording knows only what arrived at the host. The ledger knows what was sent:
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from khala_agents.llm.money import SUFFIX, Ledger
 from khala_orchestrator.roster import Seat
+from khala_protocol.files import write_private
 from khala_protocol.messages import ModelCall, Report
 from khala_protocol.recording import Recording
 
@@ -20,29 +22,52 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Usage
 
 
+MOST_CHARACTERS = 4096
+POINTER = "the ledger of this match is "
+"""Begins the file that stands in the place of a ledger, and names it."""
+
+
 def ledger_of(record: Path, past: Unfinished | None = None) -> Ledger:
     """Return the ledger of a match that is recorded at a path; each side has an account in it.
 
-    A match that goes on begins with what was spent before.
+    A match that goes on has the ledger of the recording that it goes on from, also if that is done twice.
+
+    Raises:
+        ConfigError: the file cannot be read.
     """
-    ledger = Ledger(record.with_suffix(SUFFIX))
-    if past is not None:
-        before = Ledger(past.recording.path.with_suffix(SUFFIX))
-        if before.exists:
-            ledger.go_on_from(before)
-        else:
+    if past is None or (past.config.forked is not None and past.config.forked.step == past.steps):
+        ledger = Ledger(_place_of(record))
+    else:
+        ledger = Ledger(_place_of(past.recording.path))
+        if not ledger.exists:
             for seat, usd in spent_usd(past.recording).items():
                 ledger.pay(seat.side, usd)
+        if ledger.exists:
+            assert ledger.path is not None
+            target = os.path.relpath(ledger.path, record.parent)
+            write_private(record.with_suffix(SUFFIX), f"{POINTER}{target}\n")
+    ledger.booked_usd()  # a broken one is found before the match begins
     return ledger
 
 
+def _place_of(record: Path) -> Path:
+    """Return where the ledger of a recording is: beside it, or where the file there points."""
+    path = record.with_suffix(SUFFIX)
+    try:
+        with path.open(encoding="utf-8") as file:
+            line = file.readline(MOST_CHARACTERS)
+    except (OSError, UnicodeDecodeError):
+        return path
+    return path.parent / line.removeprefix(POINTER).strip() if line.startswith(POINTER) else path
+
+
 def paid_usd(record: Path) -> float:
-    """Return the most that a recorded match has cost.
+    """Return the most that a recorded match has cost, with what it cost before it was resumed.
 
     Raises:
         RecordingError: it has no ledger, and there is no recording.
     """
-    ledger = Ledger(record.with_suffix(SUFFIX))
+    ledger = Ledger(_place_of(record))
     if not ledger.exists:
         return sum(spent_usd(Recording.open(record)).values())
     with ledger:

@@ -33,6 +33,7 @@ _HEADER = r"^[A-Za-z0-9!#$%&'*+.^_`|~-]{1,100}$"
 _SENDABLE = r"^[ -~]{0,1000}$"
 _OWN_HEADERS = frozenset({"accept", "accept-encoding", "connection", "content-length", "content-type", "host",
                           "transfer-encoding"})  # fmt: skip
+_LIMITS = frozenset({"max_tokens", "max_completion_tokens"})
 _OWN_FIELDS: dict[str, tuple[JsonValue, str]] = {
     "stream": (False, "Khala reads whole answers"),
     "n": (1, "one answer is read, and all would be billed"),
@@ -153,6 +154,8 @@ class ModelConfig(Frozen):
         for name, sent in value.items():
             if _KEY_LIKE.search(name):
                 raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
+            if name in _LIMITS and not (isinstance(sent, int) and sent > 0):
+                raise ValueError(f"'{name}' is a number of tokens: without it nobody can tell what an answer may cost")
             if name in _OWN_FIELDS and sent != _OWN_FIELDS[name][0]:
                 raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name][1]}")
         return value

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import sys
 import time
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 COMPLETIONS: Final = "/chat/completions"
 STEPS: Final = 6
+NOT_BEGUN: Final = 1
 NOT_VALID: Final = 3
 PROMPT_END_S: Final = 30.0
 """A match that cannot get better ends in its first step; what it takes on a busy machine is its start."""
@@ -34,6 +36,15 @@ max_tokens: 100
 try_timeout_s: 0.5
 retry: {tries: 1}
 prices: {prompt: 1.0, completion: 1.0}
+"""
+
+
+GRID: Final = f"""
+name: grid
+fixed: {{task: 2s3z_pair, model: model.yaml, max_steps: {STEPS}, max_wait_s: 2}}
+factors: {{clock: [frozen]}}
+seeds: 1
+retries: 0
 """
 
 
@@ -52,15 +63,20 @@ async def play(directory: Path, *options: str, answer: Callable[[CannedRequest],
     async with Canned(answer) as endpoint:
         (directory / "model.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url), encoding="utf-8")
         began = time.perf_counter()
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-P", "-m", "khala", "run", "2s3z_pair", "--model", "model.yaml", *options,
-            cwd=directory, env={**os.environ, "COLUMNS": "200"}, start_new_session=True,
-            stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
-        _, said = await process.communicate()
+        code, _, screen = await _khala(directory, "run", "2s3z_pair", "--model", "model.yaml", *options)
         took_s = time.perf_counter() - began
-    screen = said.decode()
-    return Match(process.returncode or 0, screen.strip().splitlines()[-1], screen, took_s)
+    return Match(code, screen.strip().splitlines()[-1], screen, took_s)
+
+
+async def _khala(directory: Path, *arguments: str) -> tuple[int, str, str]:
+    """Run `khala` in a directory; return its exit code, and what it printed on stdout and on stderr."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-P", "-m", "khala", *arguments,
+        cwd=directory, env={**os.environ, "COLUMNS": "200"}, start_new_session=True,
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    printed, said = await process.communicate()
+    return process.returncode or 0, printed.decode(), said.decode()
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +143,7 @@ CASES: Final[dict[str, tuple[Callable[[], Callable[[CannedRequest], Given] | Giv
         Said(NOT_VALID, ("not valid", "will not answer it", "there is no model"), (LOG,), LONG, at_once=True),
     ),
     "does not take the key": (
-        lambda: refusal(401, "wrong key"), Said(1, ("wrong key",), (), LONG, at_once=True),
+        lambda: refusal(401, "wrong key"), Said(NOT_BEGUN, ("wrong key",), (), LONG, at_once=True),
     ),
     "takes the key for its list of models alone": (
         lambda: lambda asked: refusal(401, "wrong key") if asked.path.endswith(COMPLETIONS) else Given({"data": []}),
@@ -153,6 +169,24 @@ async def _play(directory: Path, name: str) -> str:
     return _fault(await play(directory, *expected.options, answer=answer()), expected)
 
 
+async def _play_experiment(directory: Path, name: str) -> str:
+    """Play a match of an experiment, and look at its row: a match that is not valid must be in no number."""
+    answer, said = CASES[name]
+    async with Canned(answer()) as endpoint:
+        (directory / "model.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url), encoding="utf-8")
+        (directory / "grid.yaml").write_text(GRID, encoding="utf-8")
+        code, _, screen = await _khala(directory, "experiment", "run", "grid.yaml")
+        _, printed, _ = await _khala(directory, "experiment", "status", "grid", "--json")
+    if code != (said.code and NOT_VALID):
+        return f"exit code {code}: {screen.strip().splitlines()[-1]}"
+    (row,) = json.loads(printed)["cells"]
+    if (row["done"], row["invalid"]) != ((1, 0) if said.code == 0 else (0, 1)):
+        return f"its row is {row}"
+    if said.code and not any(words in cause for cause in row["causes"] for words in said.words):
+        return f"its cause is {row['causes']}"
+    return ""
+
+
 async def _raise(directory: Path) -> str:
     (directory / "raising.py").write_text(RAISING, encoding="utf-8")
     expected = Said(NOT_VALID, ("not valid", "did not make 2 of 6", "RuntimeError"), ("lost the thread",))
@@ -174,6 +208,7 @@ def _fault(match: Match, expected: Said) -> str:
 def _rows() -> Iterator[Row]:
     for name in CASES:
         yield Row("khala run", f"a model that {name}", partial(_play, name=name), kind="fault")
+        yield Row("khala experiment run", f"a model that {name}", partial(_play_experiment, name=name), kind="fault")
     yield Row("khala run", "a policy that raises from step 4 on", _raise, kind="fault")
 
 

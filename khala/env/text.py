@@ -21,9 +21,10 @@ from khala.minds import Minds, minds_of
 from khala.rewards import battle
 from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_bridge.game.processes import IdleGames
+from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError, KhalaError
-from khala_protocol.trust import trust_named
+from khala_protocol.trust import check_trusted, trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -79,6 +80,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
     ) -> None:
         """Take a task; see `khala.env.parallel_env`."""
         task = load_task(task) if isinstance(task, str) else task
+        check_trusted(code_of(task), source=task.name)
         scenes = None if render_mode else "none"
         self._task = unhurried(change(task, max_steps=max_cycles, scenes=scenes))
         self._seats = _named(self._task, agents)

@@ -22,7 +22,7 @@ from khala_bridge.observe import Observer
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
-from khala_protocol.trust import check_trusted
+from khala_protocol.trust import check_keys, check_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -103,6 +103,7 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
             for _, mind, _ in groups_of(task, match.minds):
                 if (known := repr(mind)) not in checked:
                     checked.add(known)
+                    check_keys(mind.keys_sent())
                     replace(mind, budget_usd=budget_usd).check()
         except ConfigError as error:
             raise ConfigError(f"{_words(match.cell)}: {error}") from None

@@ -13,11 +13,12 @@ import asyncio
 import statistics
 import time
 from collections import Counter, deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
 from khala.experiment.played import unread
+from khala.minds import share_budget
 from khala_orchestrator.tally import REFUSED
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 LEAST_USD = 1e-6
 """Less is nothing: sums of money are not exact."""
+SPARE = 1.2
+"""A match is begun with so many times what is usual: its last requests are held at the most that they may cost."""
 ROOM = 2.0
 """A match may spend this many times what the dearest one of its cell has cost."""
 _CRASHES = {"lost": "crash", "error": "crash", "timeout": "timeout"}
@@ -137,10 +140,7 @@ class Runner:
         self._tries[match.key] += 1
         record = self.store.recording_for(match.key)
         self.see(Event("begins", match))
-        minds = {
-            side: replace(mind, budget_usd=None if part_usd is None else part_usd / len(match.minds))
-            for side, mind in match.minds.items()
-        }
+        minds = match.minds if part_usd is None else share_budget(match.minds, part_usd)
         job = Job(
             config=match.config.model_copy(update={"record": record}),
             minds=minds,
@@ -199,7 +199,7 @@ class Runner:
         """Return why there is too little money for a match; "" if there is enough."""
         usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
         left, short = self._left_usd(), self._short_usd.get(str(match.cell))
-        if left is not None and (left < LEAST_USD or left < usual_usd):
+        if left is not None and (left < LEAST_USD or left < SPARE * usual_usd):
             return f"the budget of {self.budget.usd:g} USD is used up ({self.spent.usd:.4f} were spent)"
         if left is not None and short is not None and left <= short:
             return f"{left:.4f} USD are left, and {short:.4f} were not enough for {', '.join(match.cell.values())}"
@@ -223,7 +223,7 @@ class Runner:
     def _part_usd(self, match: PlannedMatch) -> float | None:
         """Return what a match may spend: what is usual with some room, all while nothing is known; None for any sum."""
         left = self._left_usd()
-        if left is None or not any(mind.policy is None for mind in match.minds.values()):
+        if left is None or not any(mind.asks_a_model for mind in match.minds.values()):
             return None
         costs = self._numbers(match, "cost_usd")
         wanted = ROOM * max(*costs, self._short_usd.get(str(match.cell), 0.0), 0.0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from khala.experiment.job import Job
-from khala.minds import groups_of
+from khala.minds import groups_of, share_budget
 from khala.spending import paid_usd
 from khala_orchestrator.fork import advice_of, write_beginning
 from khala_protocol.messages import Report
@@ -171,8 +171,7 @@ async def _played(fork: Fork, engine: Engine, budget_usd: float | None) -> Futur
     beginning = fork.record.with_name("beginning.mcap")
     try:
         await asyncio.to_thread(write_beginning, fork.trunk.recording, fork.config, beginning, fork.advice)
-        each_usd = None if budget_usd is None else budget_usd / len(fork.minds)
-        minds = {side: replace(mind, budget_usd=each_usd) for side, mind in fork.minds.items()}
+        minds = dict(fork.minds) if budget_usd is None else share_budget(fork.minds, budget_usd)
         job = Job(config=fork.config, minds=minds, timeout_s=3600 * HOURS, beginning=beginning)
         ended = await engine.play(job)
         if ended.state != "done":

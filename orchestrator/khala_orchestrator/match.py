@@ -158,11 +158,14 @@ class Match:
         with watch.phase("game"):
             results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
         timings = watch.timings(answers, lag_s)
-        reports = [
+        reports: Sequence[Report] = [
             side.report(at, does, result, timings, answers.incidents, asked.unasked)
             for side, does, result in zip(self.sides, played, results, strict=True)
         ]
-        return StepOutcome(self._whole(at, reports, results), [result.snapshot for result in results], answers.lost)
+        snapshots = [result.snapshot for result in results]
+        if answers.lost or any(now.ended for now in snapshots) or at.step + 1 == self.config.task.max_steps:
+            reports = self._whole(at, reports, results)
+        return StepOutcome(reports, snapshots, answers.lost)
 
     def _ask(self, at: StepId, loop: int) -> Asked:
         return self.schedule.ask(
@@ -196,10 +199,9 @@ class Match:
         return next(side for side in self.sides if side.name == seat.side)
 
     def _whole(self, at: StepId, reports: Sequence[Report], results: Sequence[StepResult]) -> Sequence[Report]:
-        """Return the reports of a step; the last ones of an episode also tell of decisions that came to nothing."""
-        if not any(result.snapshot.ended for result in results):
-            return reports
-        loop, pending = results[0].snapshot.game_loop, self.schedule.drop()
+        """Return the reports of the last step of an episode, with the decisions that came to nothing."""
+        loop = results[0].snapshot.game_loop
+        pending = self.schedule.drop(loop)
         dropped = [side.dropped(at, pending, loop) for side in self.sides]
         pairs = zip(reports, dropped, strict=True)
         return [report.model_copy(update={"agents": (*report.agents, *more)}) for report, more in pairs]

@@ -16,14 +16,18 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from khala_orchestrator.turn import Answer
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
     from khala_orchestrator.roster import Seat
-    from khala_orchestrator.turn import Answer
     from khala_protocol.messages import Clock, Trigger, Unasked
+
+
+UNANSWERED = "no reply before the episode ended"
+"""Why an agent did not decide that still thought at the end."""
 
 
 class StepId(NamedTuple):
@@ -152,9 +156,15 @@ class Schedule:
                 moments.append(place.next_loop)
         return min(moments) - loop
 
-    def drop(self) -> Sequence[Decision]:
-        """Return the decisions that can no longer take effect, since the episode is over."""
-        return [place.decided for place in self._places.values() if place.decided is not None]
+    def drop(self, loop: int) -> Sequence[Decision]:
+        """Return the decisions that can no longer take effect at the end of an episode, and those that nobody made."""
+        found = []
+        for seat, place in self._places.items():
+            if place.decided is not None:
+                found.append(place.decided)
+            elif place.thinks and place.asked is not None:
+                found.append(Decision(seat, Answer("late", detail=UNANSWERED), *place.asked, loop))
+        return found
 
     def _is_due(self, seat: Seat, loop: int, happened: Callable[[Seat], Collection[Trigger]]) -> bool:
         place = self._places[seat]

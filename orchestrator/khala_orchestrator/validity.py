@@ -1,8 +1,9 @@
 """Whether an episode says something about its agents: one function decides, from what each of them did.
 
 An agent decides if its own model or policy does: an answer without a word, a refusal, a failure, a late reply and a
-policy that stands in are decisions that it did not make (`khala_protocol.messages.AgentStatus`). One that only holds
-its fire, or gives orders that are not possible, decides.
+policy that stands in are decisions that it did not make (`khala_protocol.messages.AgentStatus`), and so is a question
+that is open when the episode ends. One that only holds its fire, or gives orders that are not possible, decides; so
+does a policy without a model that says nothing.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 AWAY: Final = "it went away"
 """Why an agent is lost that did not come back."""
+ONE = 1
+"""So many decisions an agent may always leave to others: a short episode is not lost by one late answer."""
 NAMED_CAUSES = 3
 """Causes that a sentence names; the counts of the result have all."""
 NO_MERIT: Final[dict[Forfeit | None, str]] = {
@@ -70,7 +73,7 @@ def why_not_valid(
 
     Args:
         deeds: what they did.
-        required: the agents that count.
+        required: the agents that count; all that were asked if there are none.
         limit: the part of its decisions that an agent may leave to others or to nobody.
         lost: agents without which the match could not go on, of any side, and why.
         forfeit: how the game's other player gave the game away, if it did.
@@ -91,9 +94,9 @@ def _lost(lost: Mapping[Seat, str]) -> Iterator[str]:
 
 
 def _undecided(deeds: Deeds, required: Collection[str], limit: float) -> Iterator[str]:
-    for name in required:
+    for name in required or deeds.statuses:
         count, asked = deeds.undecided(name)
-        if not asked or (count < asked and count <= limit * asked):
+        if not asked or (count < asked and count <= max(limit * asked, ONE)):
             continue
         causes = ", ".join(f"{number} {cause}" for cause, number in deeds.causes[name].most_common(NAMED_CAUSES))
         said = f", first: {deeds.words[name]}" if name in deeds.words else ""

@@ -80,6 +80,20 @@ def check_trusted(names: Iterable[str], *, source: str | None = None) -> None:
             raise Untrusted(name, source=source)
 
 
+def check_keys(sent: Iterable[str]) -> None:
+    """Check that keys go only where the user wants them.
+
+    Args:
+        sent: `OPENAI_API_KEY to llm.example.org`, of what a file names.
+
+    Raises:
+        ConfigError: the first one is not trusted.
+    """
+    for what in sent:
+        if not is_trusted(what):
+            raise ConfigError(f"this sends the key in {what}: if you trust that address, say --trust")
+
+
 def import_trusted(module: str, *, source: str) -> ModuleType:
     """Import a module of the user.
 

@@ -117,7 +117,7 @@ async def test_a_spent_budget_stops_requests_before_they_are_made(
     policy, exchanges = traced(model, limits=limits)
     for step in range(2):
         await policy.decide(briefing(), observation(step))
-    with pytest.raises(LimitExceeded, match="budget_usd = 1"):
+    with pytest.raises(LimitExceeded, match="the budget is 1 USD"):
         await policy.decide(briefing(), observation(2))
     assert len(model.requests) == len(exchanges) == 2
 

@@ -529,7 +529,7 @@ async def test_an_agent_without_money_goes_on_without_decisions(
     assert said == [("one", "ok", "", 1), ("two", "ok", "", 1), *[("", "failed", "budget", 0)] * 3]
     assert len(model.requests) == 2
     (record,) = caplog.records
-    assert "the limit budget_usd = 1 of --budget-usd is reached (1)" in record.getMessage()
+    assert "--budget-usd is 1 USD, and 1.0000 are spent" in record.getMessage()
 
 
 async def test_a_policy_is_prepared_at_each_episode_and_closed_at_the_end(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -60,6 +61,13 @@ def test_both_sides_may_spend_the_same() -> None:
         ("agents-red-0", ["A", "B", "C"], 1.5),
     ]
     assert minds_of(["blue"], COMMON, {})["blue"].budget_usd == 3.0
+
+
+def test_a_side_that_asks_no_model_gets_no_part_of_the_budget() -> None:
+    minds = minds_of(["blue", "red"], replace(COMMON, budget_usd=3.0), {"red": "skilled"})
+    assert minds["blue"].budget_usd == 3.0
+    mixed = minds_of(["blue", "red"], Minds(policy="silent", agents={"B": "openai"}, budget_usd=3.0), {"red": "openai"})
+    assert {side: mind.budget_usd for side, mind in mixed.items()} == {"blue": 1.5, "red": 1.5}
 
 
 def test_an_agent_may_have_a_model_of_its_own_and_a_process_for_it() -> None:

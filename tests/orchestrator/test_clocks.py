@@ -84,7 +84,7 @@ async def test_in_real_time_everybody_decides_at_their_own_pace(hall: Hall, conf
     quick, slow = steps(hall, "Stalkers"), steps(hall, "Zealots")
     assert [taken - (asked or 0) for taken, asked, _, _ in quick] == [1] * len(quick)
     assert len(quick) == 14  # every second step: one to think, one for its orders to play out
-    assert slow == [(14, 0, 112, "stale")]
+    assert slow == [(14, 0, 112, "stale"), (27, 15, 104, "dropped")]
     assert result.lag_s == 0
 
 

@@ -107,16 +107,19 @@ def test_a_decision_knows_what_it_was_made_for() -> None:
     assert schedule.due(119) == []
     (quick, slow) = schedule.due(120)
     assert (quick.asked, quick.asked_loop, quick.due_loop) == (StepId(0, 3), 100, 120)
-    assert schedule.drop() == []
+    assert schedule.drop(99) == []
     assert slow.seat == SLOW
 
 
-def test_a_decision_that_never_takes_effect_is_found_at_the_end() -> None:
+def test_a_decision_that_never_takes_effect_and_one_that_nobody_made_are_found_at_the_end() -> None:
     schedule = made(rule="budget", thinking_loops=20)
     schedule.begin()
     schedule.ask(StepId(0, 0), 0, nothing)
     schedule.decide({SLOW: reply(SLOW)}, 0)
-    assert [one.seat for one in schedule.drop()] == [SLOW]
+    assert {one.seat: (one.answer.status, one.answer.detail) for one in schedule.drop(99)} == {
+        SLOW: ("ok", ""),
+        QUICK: ("late", "no reply before the episode ended"),
+    }
 
 
 @pytest.mark.parametrize(

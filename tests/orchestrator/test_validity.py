@@ -41,12 +41,22 @@ def test_a_model_that_was_away_for_nearly_all_of_its_decisions_does_not_count() 
 def test_the_limit_is_that_of_the_task_and_an_agent_decides_at_least_once() -> None:
     assert judged(deeds(ok=1, late=9), limit=1.0) == ""
     assert judged(deeds(late=9), limit=1.0) == "A never decided (9 late)"
-    assert judged(deeds(ok=99, late=1), limit=0.0) != ""
+    assert judged(deeds(ok=98, late=2), limit=0.0) != ""
+
+
+def test_a_short_episode_is_not_lost_by_one_late_answer() -> None:
+    assert judged(deeds(ok=4, late=1)) == ""
+    assert judged(deeds(ok=3, late=2)) != ""
+    assert judged(deeds(late=1)) == "A never decided (1 late)"
 
 
 def test_agents_that_were_not_asked_or_are_not_required_change_nothing() -> None:
     assert judged(Deeds()) == ""
-    assert judged(deeds(late=5), required=()) == ""
+    assert judged(deeds(late=5), required=("B",)) == ""
+
+
+def test_where_no_agent_is_required_all_that_were_asked_count() -> None:
+    assert judged(deeds(late=5), required=()) == "A never decided (5 late)"
 
 
 def test_the_most_frequent_causes_and_the_first_words_of_an_endpoint_are_named() -> None:

@@ -131,11 +131,11 @@ def _text(block: Mapping[str, Any]) -> str:
 def _usage(said: object, prices: Prices) -> Usage:
     """Return the usage in our terms: Anthropic counts cached tokens separately from `input_tokens`."""
     read, written = count(said, "input_tokens"), count(said, "output_tokens")
-    if read is None or written is None:
-        return Usage(requests=1, unknown_requests=1)
     cached = count(said, "cache_read_input_tokens") or 0
     kept = count(said, "cache_creation_input_tokens") or 0
-    prompt = read + cached + kept
+    prompt = (read or 0) + cached + kept
+    if read is None or not prompt or not written:  # of a prompt and an answer that were read, none has 0 tokens
+        return Usage(requests=1, unknown_requests=1)
     return Usage(
         requests=1,
         prompt_tokens=prompt,

@@ -246,9 +246,9 @@ class LimitExceeded(LLMError):
 
     may_be_billed = False
 
-    def __init__(self, kind: LimitType, *, value: float, limit: float, source: str) -> None:
+    def __init__(self, kind: LimitType, *, value: float, limit: float, source: str, words: str = "") -> None:
         self.type, self.value, self.limit, self.source = kind, value, limit, source
-        text = f"the limit {kind} = {limit:g} of {source} is reached ({value:.4g})"
+        text = words or f"the limit {kind} = {limit:g} of {source} is reached ({value:.4g})"
         super().__init__(text, status="budget" if kind == "budget_usd" else "limit")
 
 

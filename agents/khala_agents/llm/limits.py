@@ -230,11 +230,12 @@ class Limits:
         """
         clock = asyncio.get_running_loop().time
         arrived = clock()
-        self.budget.check()
+        if most_usd := self._most_usd(tokens, answer_tokens):
+            self.budget.check()
         place = await self._gate.enter(tokens, None if deadline is None else deadline - arrived)
-        ticket = Ticket(clock() - arrived, self._most_usd(tokens, answer_tokens))
+        ticket = Ticket(clock() - arrived, most_usd)
         try:
-            with self.budget.holding(ticket.most_usd or 0.0) as bill:  # it may have been spent during the wait
+            async with self.budget.holding(ticket.most_usd or 0.0, deadline) as bill:
                 try:
                     yield ticket
                 finally:

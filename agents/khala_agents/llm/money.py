@@ -1,6 +1,6 @@
 """What may be spent on models, and what was: a cap that holds whatever becomes of a request.
 
-    with budget.holding(0.02) as bill:      # raises `LimitExceeded` where less is left
+    async with budget.holding(0.02) as bill:      # raises `LimitExceeded` where less is left
         completion = await client.complete(request)
         bill.settle(0.004)                  # what it cost; without this line it has cost the 0.02
 
@@ -14,15 +14,17 @@ Several budgets may share a ledger: each has an account there.
 
 from __future__ import annotations
 
+import asyncio
+import os
 import sqlite3
-from contextlib import contextmanager
+from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from typing import TYPE_CHECKING, Self
 
 from khala_agents.llm.client import LimitExceeded
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import AsyncIterator, Iterator
     from pathlib import Path
 
 SUFFIX = ".ledger"
@@ -32,8 +34,8 @@ PATIENCE_S = 10.0
 LEAST_USD = 1e-9
 """Sums of money are not exact: a cap is not exceeded by less."""
 _SCHEMA = """
-create table if not exists paid (account text primary key, usd real not null);
-create table if not exists held (entry integer primary key autoincrement, account text not null, usd real not null);
+create table paid (account text primary key, usd real not null);
+create table held (entry integer primary key autoincrement, account text not null, usd real not null);
 """
 
 
@@ -61,7 +63,14 @@ class Ledger:
         if self.path is not None and not self.exists:
             return 0.0
         with self._writing() as database:
-            return _booked_usd(database, account)
+            return _sum(database, "paid", account) + _sum(database, "held", account)
+
+    def paid_usd(self, account: str) -> float:
+        """Return what an account has paid."""
+        if self.path is not None and not self.exists:
+            return 0.0
+        with self._writing() as database:
+            return _sum(database, "paid", account)
 
     def hold(self, account: str, usd: float, limit_usd: float | None) -> int:
         """Book the most that a request may cost, and return the number of the entry.
@@ -70,9 +79,9 @@ class Ledger:
             Overdrawn: the account would have more booked than its limit.
         """
         with self._writing() as database:
-            booked_usd = _booked_usd(database, account)
-            if limit_usd is not None and (booked_usd + usd > limit_usd + LEAST_USD or booked_usd >= limit_usd):
-                raise Overdrawn(booked_usd)
+            paid_usd, held_usd = _sum(database, "paid", account), _sum(database, "held", account)
+            if limit_usd is not None and paid_usd + held_usd + usd > limit_usd + LEAST_USD:
+                raise Overdrawn(paid_usd, held_usd)
             entry = database.execute("insert into held (account, usd) values (?, ?)", (account, usd)).lastrowid
         assert entry is not None
         return entry
@@ -88,13 +97,6 @@ class Ledger:
         """Add what was paid without an entry."""
         with self._writing() as database:
             _pay(database, account, usd)
-
-    def go_on_from(self, other: Ledger) -> None:
-        """Take over all sums of another ledger into this one, which is new."""
-        sums = "select account, usd from paid union all select account, usd from held"
-        with other, self._writing() as mine, other._writing() as theirs:
-            for account, usd in theirs.execute(sums):
-                _pay(mine, account, usd)
 
     def close(self) -> None:
         """Close the file. May be called twice, and the ledger be used again."""
@@ -122,28 +124,49 @@ class Ledger:
                 raise
             self._database.execute("commit")
         except (sqlite3.Error, OSError) as error:
-            fault = f"what is spent cannot be noted here, so no model is asked: {error}"
+            fault = f"this ledger of what was spent cannot be kept, and no model is asked without it ({error}): remove "
+            fault += "it if you know what was spent, or record elsewhere with --out"
             raise ConfigError(fault, source=str(self.path)) from None
 
     def _open(self) -> sqlite3.Connection:
-        if self.path is not None:
-            self.path.touch(0o600)
-        database = sqlite3.connect(self.path or ":memory:", timeout=PATIENCE_S, isolation_level=None)
+        if self.path is None:
+            database = sqlite3.connect(":memory:", isolation_level=None)
+            database.executescript(_SCHEMA)
+            return database
+        if not self.path.exists():
+            _create(self.path)
+        database = sqlite3.connect(self.path, timeout=PATIENCE_S, isolation_level=None)
+        database.execute("select 1 from paid, held limit 1")  # a file that is empty or another one has no such tables
         # Without a sync, a killed process loses nothing, only a power failure may. With a log, a request takes 0.2 ms.
-        database.executescript(f"pragma journal_mode = wal; pragma synchronous = off; {_SCHEMA}")
+        database.executescript("pragma journal_mode = wal; pragma synchronous = off;")
         return database
+
+
+def _create(path: Path) -> None:
+    """Make an empty ledger, whole or not at all; one that another process makes meanwhile stays."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    part.unlink(missing_ok=True)
+    part.touch(0o600)
+    try:
+        with closing(sqlite3.connect(part)) as database:
+            database.executescript(_SCHEMA)
+        with suppress(FileExistsError):
+            os.link(part, path)
+    finally:
+        part.unlink()
 
 
 class Overdrawn(Exception):
     """An account has too little left.
 
     Attributes:
-        booked_usd: what it has booked.
+        paid_usd: what it has paid.
+        held_usd: the most that its requests under way may cost.
     """
 
-    def __init__(self, booked_usd: float) -> None:
-        self.booked_usd = booked_usd
-        super().__init__(f"{booked_usd:.4f} USD are booked")
+    def __init__(self, paid_usd: float, held_usd: float) -> None:
+        self.paid_usd, self.held_usd = paid_usd, held_usd
+        super().__init__(f"{paid_usd:.4f} USD are paid and {held_usd:.4f} held")
 
 
 class Bill:
@@ -168,12 +191,14 @@ class Budget:
     """
 
     def __init__(
-        self, limit_usd: float | None, *, ledger: Ledger | None = None, account: str = "", source: str = "budget"
+        self, limit_usd: float | None, *, ledger: Ledger | None = None, account: str = "", source: str = "the budget"
     ) -> None:
         self.limit_usd = limit_usd
         self.source = source
         self._ledger = ledger or Ledger()
         self._account = account
+        self._under_way = 0
+        self._settled = asyncio.Event()
 
     @property
     def booked_usd(self) -> float:
@@ -181,13 +206,20 @@ class Budget:
         return self._ledger.booked_usd(self._account)
 
     def check(self) -> None:
-        """Raise `LimitExceeded` if nothing is left."""
-        if self.limit_usd is not None and (booked_usd := self.booked_usd) >= self.limit_usd:
-            raise self._exceeded(booked_usd)
+        """Raise `LimitExceeded` if all is spent."""
+        if self.limit_usd is not None and (paid_usd := self._ledger.paid_usd(self._account)) >= self.limit_usd:
+            words = f"{self.source} is {self.limit_usd:g} USD, and {paid_usd:.4f} are spent"
+            raise LimitExceeded("budget_usd", value=paid_usd, limit=self.limit_usd, source=self.source, words=words)
 
-    @contextmanager
-    def holding(self, most_usd: float) -> Iterator[Bill]:
+    @asynccontextmanager
+    async def holding(self, most_usd: float, deadline: float | None = None) -> AsyncIterator[Bill]:
         """Book the most that a request may cost, and what its bill says afterwards.
+
+        Where others of this process hold the money, wait until they give back what they do not spend.
+
+        Args:
+            most_usd: of the request; 0 for a model that costs nothing.
+            deadline: until when it is worth waiting, on the clock of the running loop; None for ever.
 
         Raises:
             LimitExceeded: there is not so much left.
@@ -195,24 +227,43 @@ class Budget:
         if not most_usd:
             yield Bill(0.0)
             return
-        try:
-            entry = self._ledger.hold(self._account, most_usd, self.limit_usd)
-        except Overdrawn as error:
-            raise self._exceeded(error.booked_usd) from None
+        entry = await self._hold(most_usd, deadline)
+        self._under_way += 1
         bill = Bill(most_usd)
         try:
             yield bill
         finally:
+            self._under_way -= 1
             self._ledger.settle(entry, bill.usd)
+            settled, self._settled = self._settled, asyncio.Event()
+            settled.set()
 
-    def _exceeded(self, booked_usd: float) -> LimitExceeded:
-        return LimitExceeded("budget_usd", value=booked_usd, limit=self.limit_usd or 0.0, source=self.source)
+    async def _hold(self, most_usd: float, deadline: float | None) -> int:
+        while True:
+            try:
+                return self._ledger.hold(self._account, most_usd, self.limit_usd)
+            except Overdrawn as error:
+                assert self.limit_usd is not None
+                refused = LimitExceeded(
+                    "budget_usd",
+                    value=error.paid_usd + error.held_usd + most_usd,
+                    limit=self.limit_usd,
+                    source=self.source,
+                    words=f"{self.source} is {self.limit_usd:g} USD, of which {error.paid_usd:.4f} are spent and "
+                    f"{error.held_usd:.4f} held for requests under way: the next request may cost {most_usd:.4f}",
+                )
+            if not self._under_way:
+                raise refused
+            try:
+                async with asyncio.timeout_at(deadline):
+                    await self._settled.wait()
+            except TimeoutError:
+                raise refused from None
 
 
-def _booked_usd(database: sqlite3.Connection, account: str | None) -> float:
-    whose, values = ("", ()) if account is None else (" where account = ?", (account,) * 2)
-    sums = f"select usd from paid{whose} union all select usd from held{whose}"  # noqa: S608  # no text of others
-    return float(database.execute(f"select total(usd) from ({sums})", values).fetchone()[0])  # noqa: S608
+def _sum(database: sqlite3.Connection, table: str, account: str | None) -> float:
+    whose, values = ("", ()) if account is None else (" where account = ?", (account,))
+    return float(database.execute(f"select total(usd) from {table}{whose}", values).fetchone()[0])  # noqa: S608  # ours
 
 
 def _pay(database: sqlite3.Connection, account: str, usd: float) -> None:

@@ -127,8 +127,9 @@ class OpenAICompatible(HttpClient):
 
     def _usage(self, said: object) -> Usage:
         prompt, completion = count(said, "prompt_tokens"), count(said, "completion_tokens")
-        if prompt is None or completion is None:
+        if not prompt or not completion:  # of a prompt and an answer that were read, none has 0 tokens
             return Usage(requests=1, unknown_requests=1)
+        completion = max(completion, (count(said, "total_tokens") or 0) - prompt)  # some count reasoning apart
         cached = min(count(said, *self._profile.cached_path) or 0, prompt)
         return Usage(
             requests=1,

@@ -25,6 +25,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.errors import GameError
 from khala_bridge.game.manners import Manners
 from khala_protocol.files import open_private
+from khala_protocol.trust import check_trusted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -86,6 +87,7 @@ class Guest:
         self._thread.start()
         self._listening.result()
         if self._opponent.command:
+            check_trusted([shlex.join(self._opponent.command)])
             self._bot = _started(self._opponent.command + self.arguments, environment, self._invitation.log)
         else:
             self._invitation.say(f"start the bot: python run.py {shlex.join(self.arguments)}")

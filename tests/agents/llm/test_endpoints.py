@@ -399,10 +399,29 @@ async def test_anthropic_is_spoken_to_in_its_own_words() -> None:
     assert usage.cost_usd == pytest.approx(0.00164)
 
 
+@pytest.mark.parametrize(
+    ("usage", "tokens"),
+    [
+        ({"prompt_tokens": 900, "completion_tokens": 60}, (900, 60, 0)),
+        ({"prompt_tokens": 900, "completion_tokens": 60, "total_tokens": 2160}, (900, 1260, 0)),  # reasoning apart
+        ({"prompt_tokens": 0, "completion_tokens": 0}, (0, 0, 1)),
+        ({"prompt_tokens": 900, "completion_tokens": 0}, (0, 0, 1)),
+        ({"prompt_tokens": -900, "completion_tokens": 60}, (0, 0, 1)),
+        ({"prompt_tokens": "many", "completion_tokens": 60}, (0, 0, 1)),
+    ],
+)
+async def test_usage_that_cannot_be_is_unknown_and_reasoning_that_is_counted_apart_is_priced(
+    usage: dict[str, Any], tokens: tuple[int, int, int]
+) -> None:
+    async with Canned(Given({"choices": [{"message": {"content": "go"}}], "usage": usage})) as server:
+        found = (await ask(client(server.base_url))).usage
+    assert (found.prompt_tokens, found.completion_tokens, found.unknown_requests) == tokens
+
+
 async def test_the_front_of_a_prompt_is_marked_for_anthropic_and_its_cache_is_counted_and_priced() -> None:
     answer = {
         "content": [{"type": "text", "text": "go"}],
-        "usage": {"input_tokens": 100, "output_tokens": 0, "cache_creation_input_tokens": 900},
+        "usage": {"input_tokens": 100, "output_tokens": 10, "cache_creation_input_tokens": 900},
     }
     prompt = (*PROMPT, ChatMessage(role="assistant", content="example"), ChatMessage(role="user", content="now"))
     async with Recorder(answer) as server:
@@ -417,7 +436,7 @@ async def test_the_front_of_a_prompt_is_marked_for_anthropic_and_its_cache_is_co
     assert example["content"] == [{"type": "text", "text": "example", "cache_control": mark}]
     assert now == {"role": "user", "content": "now"}
     assert (usage.prompt_tokens, usage.cache_write_tokens) == (1000, 900)
-    assert usage.cost_usd == pytest.approx((100 + 900 * 1.25) * 1e-6)
+    assert usage.cost_usd == pytest.approx((100 + 900 * 1.25 + 10 * 10) * 1e-6)
 
 
 ANTHROPIC_FAULTS = [

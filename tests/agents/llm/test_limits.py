@@ -108,9 +108,12 @@ async def test_nothing_is_asked_when_the_money_is_used_up() -> None:
         await use(limits)
     error = caught.value
     assert (error.type, error.limit, error.source) == ("budget_usd", 0.85, "the budget of this process")
-    assert error.value == pytest.approx(0.6)
+    assert error.value == pytest.approx(0.6 + 1.15 * 0.1 + 0.2)
     assert (error.status, error.retryable) == ("budget", False)
-    assert str(error) == "the limit budget_usd = 0.85 of the budget of this process is reached (0.6)"
+    assert str(error) == (
+        "the budget of this process is 0.85 USD, of which 0.6000 are spent and 0.0000 held for requests under way: the "
+        "next request may cost 0.3150"
+    )
 
 
 async def test_who_waited_while_the_money_went_is_refused_too() -> None:
@@ -124,8 +127,8 @@ async def test_requests_in_flight_hold_the_most_that_they_may_cost() -> None:
     budget = Budget(1.0)
     limits = Limits(prices=PRICES, budget=budget)
     outcomes = await asyncio.gather(*(use(limits, takes_s=1) for _ in range(9)), return_exceptions=True)
-    assert [isinstance(outcome, LimitExceeded) for outcome in outcomes] == [False] * 2 + [True] * 7
-    assert budget.booked_usd == pytest.approx(0.6)
+    assert [isinstance(outcome, LimitExceeded) for outcome in outcomes] == [False] * 3 + [True] * 6
+    assert budget.booked_usd == pytest.approx(0.9)
 
 
 async def test_a_prompt_is_held_as_the_endpoint_counts_once_it_has_counted_one() -> None:
@@ -141,7 +144,7 @@ async def test_a_budget_is_shared_by_endpoints_and_a_rate_is_not() -> None:
     first = Limits(LimitRules(requests_per_minute=1), prices=PRICES, budget=budget)
     second = Limits(LimitRules(requests_per_minute=1), prices=PRICES, budget=budget)
     assert await use(first, tokens=10) == 0
-    with pytest.raises(LimitExceeded, match="budget_usd"):
+    with pytest.raises(LimitExceeded, match=r"the budget is 0\.3 USD, and 0\.3000 are spent"):
         await use(second)
 
 

@@ -6,6 +6,7 @@ import asyncio
 import multiprocessing
 import os
 import signal
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
@@ -21,9 +22,9 @@ if TYPE_CHECKING:
 ENDPOINT = "https://api.openai.com/v1"
 
 
-def test_a_request_of_known_cost_gives_the_rest_back() -> None:
+async def test_a_request_of_known_cost_gives_the_rest_back() -> None:
     budget = Budget(1.0)
-    with budget.holding(0.8) as bill:
+    async with budget.holding(0.8) as bill:
         assert budget.booked_usd == pytest.approx(0.8)
         bill.settle(0.1)
     assert budget.booked_usd == pytest.approx(0.1)
@@ -33,7 +34,7 @@ async def test_a_request_that_was_cancelled_is_booked_at_the_most_that_it_may_co
     budget, begun = Budget(1.0), asyncio.Event()
 
     async def ask() -> None:
-        with budget.holding(0.8):
+        async with budget.holding(0.8):
             begun.set()
             await asyncio.Event().wait()
 
@@ -42,32 +43,66 @@ async def test_a_request_that_was_cancelled_is_booked_at_the_most_that_it_may_co
     asking.cancel()
     await asyncio.gather(asking, return_exceptions=True)
     assert budget.booked_usd == pytest.approx(0.8)
-    with pytest.raises(LimitExceeded, match=r"budget_usd = 1 of budget is reached \(0\.8\)"), budget.holding(0.3):
-        pass
+    with pytest.raises(LimitExceeded) as caught:
+        await spend(budget, 0.3)
+    assert str(caught.value) == (
+        "the budget is 1 USD, of which 0.8000 are spent and 0.0000 held for requests under way: the next request may "
+        "cost 0.3000"
+    )
 
 
-def test_a_request_that_may_cost_more_than_is_left_is_not_made() -> None:
+async def spend(budget: Budget, most_usd: float, usd: float | None = None, deadline: float | None = None) -> None:
+    """Make a request of a known cost, or an unknown one."""
+    async with budget.holding(most_usd, deadline) as bill:
+        if usd is not None:
+            bill.settle(usd)
+
+
+async def test_a_request_waits_for_money_that_others_hold_and_give_back() -> None:
+    budget, answer = Budget(1.0), asyncio.Event()
+
+    async def ask() -> None:
+        async with budget.holding(0.8) as bill:
+            await answer.wait()
+            bill.settle(0.1)
+
+    first = asyncio.create_task(ask())
+    await asyncio.sleep(0)
+    second = asyncio.create_task(spend(budget, 0.5, 0.2))
+    late = asyncio.create_task(spend(budget, 0.5, deadline=asyncio.get_running_loop().time()))
+    with pytest.raises(LimitExceeded, match=r"0\.8000 held for requests under way"):
+        await late
+    answer.set()
+    await asyncio.gather(first, second)
+    assert budget.booked_usd == pytest.approx(0.3)
+
+
+async def test_a_request_that_may_cost_more_than_is_left_is_not_made() -> None:
     budget = Budget(1.0)
-    with budget.holding(0.6), pytest.raises(LimitExceeded), budget.holding(0.5):
-        pass
-    with pytest.raises(LimitExceeded), budget.holding(0.5):
-        pass
+    await spend(budget, 0.6)
+    with pytest.raises(LimitExceeded):
+        await spend(budget, 0.5)
 
 
-def _hold(path: Path, times: int) -> None:
+async def test_a_model_that_costs_nothing_is_asked_under_any_budget() -> None:
+    await spend(Budget(0.0), 0.0)
+
+
+async def _hold(path: Path, times: int) -> None:
     budget = Budget(1.0, ledger=Ledger(path))
-    for _ in range(times):
-        try:
-            with budget.holding(0.01):
-                pass
-        except LimitExceeded:
-            return
+    with suppress(LimitExceeded):
+        for _ in range(times):
+            await spend(budget, 0.01)
+
+
+def _hold_in_a_process(path: Path) -> None:
+    asyncio.run(_hold(path, 70))
 
 
 def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
     spawn = multiprocessing.get_context("spawn")
-    processes = [spawn.Process(target=_hold, args=(path, 70)) for _ in range(2)]
+    processes = [spawn.Process(target=_hold_in_a_process, args=(path,)) for _ in range(2)]
     for process in processes:
         process.start()
     for process in processes:
@@ -76,37 +111,27 @@ def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: 
 
 
 def _die_while_asking(path: Path) -> None:
-    with Budget(1.0, ledger=Ledger(path)).holding(0.25):
-        os.kill(os.getpid(), signal.SIGKILL)
+    Ledger(path).hold("", 0.25, 1.0)
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
+async def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
     process = multiprocessing.get_context("spawn").Process(target=_die_while_asking, args=(path,))
     process.start()
     process.join(60)
     assert process.exitcode == -signal.SIGKILL
     assert Ledger(path).booked_usd() == pytest.approx(0.25)
-    with pytest.raises(LimitExceeded), Budget(1.0, ledger=Ledger(path)).holding(0.8):
-        pass
+    with pytest.raises(LimitExceeded):
+        await spend(Budget(1.0, ledger=Ledger(path)), 0.8)
 
 
-def test_sides_have_accounts_of_their_own_in_one_ledger(tmp_path: Path) -> None:
+async def test_sides_have_accounts_of_their_own_in_one_ledger(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path / "match.ledger")
     blue, red = (Budget(0.5, ledger=ledger, account=side) for side in ("blue", "red"))
-    with blue.holding(0.5) as bill:
-        bill.settle(0.4)
-    with red.holding(0.5):
-        pass
+    await spend(blue, 0.5, 0.4)
+    await spend(red, 0.5)
     assert (blue.booked_usd, red.booked_usd, ledger.booked_usd()) == pytest.approx((0.4, 0.5, 0.9))
-
-
-def test_a_ledger_goes_on_from_another_one(tmp_path: Path) -> None:
-    before, after = Ledger(tmp_path / "a.ledger"), Ledger(tmp_path / "b.ledger")
-    before.pay("blue", 0.25)
-    before.hold("red", 0.5, None)
-    after.go_on_from(before)
-    assert (after.booked_usd("blue"), after.booked_usd("red")) == pytest.approx((0.25, 0.5))
 
 
 def test_a_ledger_is_a_file_of_its_owner_and_made_when_something_is_booked(tmp_path: Path) -> None:
@@ -117,16 +142,12 @@ def test_a_ledger_is_a_file_of_its_owner_and_made_when_something_is_booked(tmp_p
     assert path.stat().st_mode & 0o777 == 0o600
 
 
-@pytest.mark.parametrize("content", [b"no database at all, but a text", b"SQLite format 3\x00" + b"\xff" * 500])
-def test_nothing_is_spent_where_it_cannot_be_noted(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize("content", [b"", b"no database at all, but a text", b"SQLite format 3\x00" + b"\xff" * 500])
+async def test_nothing_is_spent_where_it_cannot_be_noted(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "match.ledger"
     path.write_bytes(content)
-    budget = Budget(1.0, ledger=Ledger(path))
-    with (
-        pytest.raises(ConfigError, match="what is spent cannot be noted here, so no model is asked"),
-        budget.holding(0.1),
-    ):
-        pytest.fail("the request was made")
+    with pytest.raises(ConfigError, match="cannot be kept, and no model is asked without it"):
+        await spend(Budget(1.0, ledger=Ledger(path)), 0.1)
 
 
 @pytest.mark.parametrize(

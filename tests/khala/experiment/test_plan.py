@@ -11,6 +11,7 @@ from khala.experiment.spec import Experiment, Settings
 from khala_orchestrator.config import load_task
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
+from khala_protocol.trust import trust_files
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -152,6 +153,17 @@ def test_a_budget_is_refused_before_the_first_match_where_a_price_is_unknown() -
     check_playable(matches, None)
     with pytest.raises(ConfigError, match=r"model vllm: a budget needs the price of Qwen/Qwen2\.5-7B-Instruct at 127"):
         check_playable(matches, 1.0)
+
+
+def test_a_key_goes_to_no_address_that_an_experiment_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-0123456789")
+    matches = of_models("openai", fixed={"base_url": "http://127.0.0.1:9/thief/v1"})
+    with pytest.raises(ConfigError, match=r"this sends the key in OPENAI_API_KEY to 127\.0\.0\.1: if you trust"):
+        check_playable(matches, None)
+    trust_files(trusted=True)
+    check_playable(matches, None)
+    monkeypatch.setenv("KHALA_TRUST", "")
+    check_playable(of_models("openai"), None)
 
 
 @pytest.mark.parametrize("task", ["2s3z_pair", "duel_3m"])

@@ -148,6 +148,14 @@ async def test_a_match_gets_more_where_its_part_was_not_enough(store: Store) -> 
     assert [job.minds["blue"].budget_usd for job in engine.jobs] == [0.2, 0.4, 0.4]
 
 
+async def test_a_model_of_a_single_agent_is_held_to_the_budget(store: Store) -> None:
+    found = experiment(fixed={"model": "silent", "agents": {"Stalkers": "scripted"}, "task": "2s3z_pair"},
+                       factors={"clock": ["frozen"]}, seeds=1)  # fmt: skip
+    engine = MadeEngine(slots=1)
+    await run(store, engine, found, usd=0.01)
+    assert [job.minds["blue"].budget_usd for job in engine.jobs] == [0.01]
+
+
 async def test_while_nobody_knows_what_a_match_costs_one_is_played_alone(store: Store) -> None:
     engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)
     runner = await run(store, engine, usd=1.0)
