@@ -246,8 +246,8 @@ async def _pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 
 def is_answered(report: Report) -> bool:
-    """Return whether something came from both agents."""
-    return all(agent.status in {"ok", "fallback", "malformed"} for agent in report.agents)
+    """Return whether something came from both agents: also that a model failed."""
+    return all(agent.status not in {"late", "gone"} for agent in report.agents)
 
 
 @dataclass

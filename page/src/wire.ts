@@ -73,7 +73,7 @@ export interface Decision {
   game_loop: number;
   /** In which its answer took effect; None if that has not happened. */
   effect_step: number | null;
-  status: "ok" | "fallback" | "late" | "gone" | "malformed" | null;
+  status: "ok" | "empty" | "cut" | "refused" | "filtered" | "malformed" | "failed" | "late" | "fallback" | "gone" | null;
   detail: string;
   fate: "fresh" | "stale" | "adapted" | "refused" | "dropped" | null;
   age_loops: number;
@@ -228,8 +228,13 @@ export interface ModelCall {
   params: Record<string, string | number | number | boolean | null>;
   /** None if no answer came. */
   completion: string | null;
-  /** `ok`, `timeout`, `cancelled`, `http 429`, `connection`, `malformed`. */
+  /**
+   * `ok`, `empty`, `cut`, `refused` or `filtered` of an answer; else `timeout`, `cancelled`, `http 429`,
+   * `connection`, `malformed`.
+   */
   status: string;
+  /** Why there is nothing to play, in the words of the endpoint; "" if there is. */
+  reason: string;
   /** Since the observation's arrival. */
   started_s: number;
   latency_s: number;
@@ -489,6 +494,8 @@ export interface Usage {
   cost_usd: number | null;
   /** Requests that were cancelled or failed, whose tokens are unknown. */
   unknown_requests: number;
+  /** The most that these may have cost; None if no price is known for the model. */
+  unknown_usd: number | null;
   /** Number of pictures that were sent along. */
   images: number;
   /** The part of `prompt_tokens` for pictures, as the model file's rule estimates it. */
