@@ -77,7 +77,7 @@ class Kill:
     step: int
     """The last step that was over."""
     replay_s: float
-    """From the new host's run card to the next question to an agent."""
+    """From the new host's run card to the next question to the first agent, or to the end of a step that had none."""
     away_s: float
     """From the kill to the next step that was over."""
     equal: bool
@@ -213,6 +213,11 @@ class Watch:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._changed.wait(), 0.5)
 
+    def kill(self, case: str, step: int, killed_s: float) -> Kill:
+        """Return how the match went on after its host was killed; `equal` and `prompts` are yet to be found."""
+        went_on_s = self.asked_s or self.over_s  # an agent that still thinks is not asked
+        return Kill(case, step, went_on_s - self.card_s, self.over_s - killed_s, equal=False, prompts=0)
+
     async def _cards(self, cards: Subscription[Sample]) -> None:
         async for _ in cards:
             self.card_s = time.monotonic()
@@ -251,9 +256,7 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
                 stage.start_agents()
             host = stage.host(resume=True)
             await watch.until_step(step + 1, host, processes)
-            kills.append(
-                Kill(case.name, step, watch.asked_s - watch.card_s, watch.over_s - killed_s, equal=False, prompts=0)
-            )
+            kills.append(watch.kill(case.name, step, killed_s))
         code = await asyncio.to_thread(host.wait, PATIENCE_S)
         if code:
             raise RuntimeError(f"the host ended with code {code}: {processes.last_words('host')}")
