@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from bench.processes import Processes, free_port
+from bench.processes import Processes, free_port, until_listening
 from khala.local import shares
 from khala.testing import replay_host
 from khala_orchestrator.config import load_task
@@ -143,11 +143,20 @@ class Stage:
         self._processes = processes
         self._model = model
         self._case = case
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self._port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self._port}"
         self.out = Path(tempfile.mkdtemp(dir=processes.directory))
         self.agents: list[subprocess.Popen[bytes]] = []
-        if not case.own_router:
-            self._router = processes.start("router", "router", "--listen", self.endpoint)
+
+    async def begin(self) -> subprocess.Popen[bytes]:
+        """Start the match and return its host; whoever finds no router for 5 s gives up, so the router is first."""
+        if not self._case.own_router:
+            self._router = self._processes.start("router", "router", "--listen", self.endpoint)
+            await until_listening(self._port)
+        host = self.host(resume=False)
+        await until_listening(self._port)
+        self.start_agents()
+        return host
 
     def start_agents(self) -> None:
         """Start the agents."""
@@ -236,8 +245,7 @@ class Watch:
 async def play(processes: Processes, model: str, case: Case, moments: Sequence[float]) -> tuple[Path, list[Kill]]:
     """Play a match, and kill its host at these moments, counted in steps; `equal` and `prompts` are yet to be found."""
     stage = Stage(processes, model, case)
-    stage.start_agents()
-    host = stage.host(resume=False)
+    host = await stage.begin()
     kills = []
     bus = await open_bus(BusConfig(connect=(stage.endpoint,), connect_timeout_s=PATIENCE_S))
     watch = Watch(bus)
