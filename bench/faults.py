@@ -37,7 +37,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rich.console import Console
 from rich.table import Table
 
-from bench.processes import Processes, free_port
+from bench.processes import Processes, free_port, until_listening
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.policy import Policy
@@ -246,8 +246,8 @@ async def _pour(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 
 def is_answered(report: Report) -> bool:
-    """Return whether something came from both agents."""
-    return all(agent.status in {"ok", "fallback", "malformed"} for agent in report.agents)
+    """Return whether something came from both agents: also that a model failed."""
+    return all(agent.status not in {"late", "gone"} for agent in report.agents)
 
 
 @dataclass
@@ -588,21 +588,6 @@ def full_disk(processes: Processes, rule: str) -> bool:
     processes.end(agent)
     said = "recording" in processes.last_words("full")
     return said and (code == 0 if rule == "go_on" else code not in {0, 3})
-
-
-async def until_listening(port: int) -> None:
-    """Return when somebody listens there.
-
-    Raises:
-        TimeoutError: nobody does within 30 s.
-    """
-    async with asyncio.timeout(30):
-        while True:
-            with contextlib.suppress(OSError):
-                _, writer = await asyncio.open_connection("127.0.0.1", port)
-                writer.transport.abort()
-                return
-            await asyncio.sleep(0.005)
 
 
 def table(verdict: Verdict) -> Table:

@@ -7,8 +7,8 @@
 Replies are mutated ones of the corpora in `tests`, and mixtures of the tokens of the language. Each is read and acted
 on as by a match, at a real observation of a task; then the length of the next observations is measured, its own and
 those of its team mates. Frames are mutated messages of a recording, of every kind, for the codec. The exit code is 1 if
-anything raises, takes more than `LONGEST_S`, makes an observation more than `MOST_GROWTH` times as long, writes a line
-that looks like a heading, or leaves memory behind.
+anything raises, takes more than `LONGEST_S` of processor time, makes an observation more than `MOST_GROWTH` times as
+long, writes a line that looks like a heading, or leaves memory behind.
 """
 
 from __future__ import annotations
@@ -158,8 +158,8 @@ class Scene:
         self.words += [agent.name for agent in task.agents]
 
     def play(self, agent: str, text: str) -> tuple[float, dict[str, list[str]]]:
-        """Return the time of reading and acting, and the lines about it in the next observations, by agent."""
-        began = time.perf_counter()
+        """Return the processor time of reading and acting, and the lines of the next observations, by agent."""
+        began = time.process_time()
         speech = parse(text)
         joint = self.actor.joint(self.observation, {agent: speech})
         seat = Seat(self.task.side, agent)
@@ -167,7 +167,7 @@ class Scene:
             self.mailbox.listen(seat, listen.channel)
         post = self.mailbox.deliver(self._message(agent, said.recipient, said.text) for said in speech.messages)
         rejections = shortened((*joint.rejections[agent], *post.rejections.get(seat, ())))
-        took_s = time.perf_counter() - began
+        took_s = time.process_time() - began
         lines = {}
         for name in {agent, *(seat.agent for seat in post.received)}:
             own = Feedback(joint.accepted[agent], rejections) if name == agent else Feedback()
@@ -254,7 +254,7 @@ def replies(stage: list[Scene], count: int, seed: int) -> Verdict:
         except Exception:  # noqa: BLE001  # every one is a find
             verdict.exceptions[_where(text)] += 1
             continue
-        if took_s > LONGEST_S:  # another process may have had the processor
+        if took_s > LONGEST_S:  # other processes slow the caches down
             took_s = min(took_s, *(scene.play(agent, text)[0] for _ in range(2)))
         growth = scene.growth(lines)
         verdict.forged += any(map(is_forged, lines.values()))
@@ -278,7 +278,7 @@ def frames(count: int, seed: int) -> Verdict:
         payload = _broken(chance, chance.choice(known[kind]))
         try:
             took_s = _take(kind, payload)
-            if took_s > LONGEST_S:  # another process may have had the processor
+            if took_s > LONGEST_S:  # other processes slow the caches down
                 took_s = min(took_s, *(_take(kind, payload) for _ in range(2)))
         except Exception:  # noqa: BLE001  # every one is a find
             verdict.exceptions[_where(repr(payload[:200]))] += 1
@@ -289,14 +289,14 @@ def frames(count: int, seed: int) -> Verdict:
 
 
 def _take(kind: type[Any], payload: bytes) -> float:
-    began = time.perf_counter()
+    began = time.process_time()
     with contextlib.suppress(PeerError):
         decode(payload)
         message = decode_as(kind, payload)
         encode(message)
         if isinstance(message, Reply):
             encode(message.but(usage=sum([message.usage] * 3, Usage())))
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 def _broken(chance: random.Random, payload: bytes) -> bytes:

@@ -6,6 +6,7 @@ Each is found again by its environment, in `/proc`, and so are the processes tha
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import random
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 END_S = 10.0
+LISTENING_S = 60.0
 LOOK_S = 0.02
 
 
@@ -99,3 +101,18 @@ def free_port() -> int:
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(("127.0.0.1", port))
             return port
+
+
+async def until_listening(port: int) -> None:
+    """Return when somebody listens there.
+
+    Raises:
+        TimeoutError: nobody does within `LISTENING_S`.
+    """
+    async with asyncio.timeout(LISTENING_S):
+        while True:
+            with contextlib.suppress(OSError):
+                _, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.transport.abort()
+                return
+            await asyncio.sleep(0.005)

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from bench.processes import Processes, free_port
+from bench.processes import Processes, free_port, until_listening
 from khala.local import shares
 from khala.testing import replay_host
 from khala_orchestrator.config import load_task
@@ -77,7 +77,7 @@ class Kill:
     step: int
     """The last step that was over."""
     replay_s: float
-    """From the new host's run card to the next question to an agent."""
+    """From the new host's run card to the next question to the first agent, or to the end of a step that had none."""
     away_s: float
     """From the kill to the next step that was over."""
     equal: bool
@@ -143,11 +143,20 @@ class Stage:
         self._processes = processes
         self._model = model
         self._case = case
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self._port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self._port}"
         self.out = Path(tempfile.mkdtemp(dir=processes.directory))
         self.agents: list[subprocess.Popen[bytes]] = []
-        if not case.own_router:
-            self._router = processes.start("router", "router", "--listen", self.endpoint)
+
+    async def begin(self) -> subprocess.Popen[bytes]:
+        """Start the match and return its host; whoever finds no router for 5 s gives up, so the router is first."""
+        if not self._case.own_router:
+            self._router = self._processes.start("router", "router", "--listen", self.endpoint)
+            await until_listening(self._port)
+        host = self.host(resume=False)
+        await until_listening(self._port)
+        self.start_agents()
+        return host
 
     def start_agents(self) -> None:
         """Start the agents."""
@@ -213,6 +222,11 @@ class Watch:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._changed.wait(), 0.5)
 
+    def kill(self, case: str, step: int, killed_s: float) -> Kill:
+        """Return how the match went on after its host was killed; `equal` and `prompts` are yet to be found."""
+        went_on_s = self.asked_s or self.over_s  # an agent that still thinks is not asked
+        return Kill(case, step, went_on_s - self.card_s, self.over_s - killed_s, equal=False, prompts=0)
+
     async def _cards(self, cards: Subscription[Sample]) -> None:
         async for _ in cards:
             self.card_s = time.monotonic()
@@ -231,8 +245,7 @@ class Watch:
 async def play(processes: Processes, model: str, case: Case, moments: Sequence[float]) -> tuple[Path, list[Kill]]:
     """Play a match, and kill its host at these moments, counted in steps; `equal` and `prompts` are yet to be found."""
     stage = Stage(processes, model, case)
-    stage.start_agents()
-    host = stage.host(resume=False)
+    host = await stage.begin()
     kills = []
     bus = await open_bus(BusConfig(connect=(stage.endpoint,), connect_timeout_s=PATIENCE_S))
     watch = Watch(bus)
@@ -251,9 +264,7 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
                 stage.start_agents()
             host = stage.host(resume=True)
             await watch.until_step(step + 1, host, processes)
-            kills.append(
-                Kill(case.name, step, watch.asked_s - watch.card_s, watch.over_s - killed_s, equal=False, prompts=0)
-            )
+            kills.append(watch.kill(case.name, step, killed_s))
         code = await asyncio.to_thread(host.wait, PATIENCE_S)
         if code:
             raise RuntimeError(f"the host ended with code {code}: {processes.last_words('host')}")

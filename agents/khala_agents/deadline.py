@@ -5,7 +5,7 @@ from __future__ import annotations
 MARGIN_FRACTION = 0.05
 MARGIN_MIN_S = 0.05
 MARGIN_MAX_S = 0.5
-"""128 agents of one process send their fallbacks in about 0.1 s on two cores."""
+"""128 agents of one process send their empty replies in about 0.1 s on two cores."""
 
 
 def time_to_decide_s(answer_within_s: float | None) -> float | None:

@@ -29,7 +29,7 @@ P = ParamSpec("P")
 log = logging.getLogger(__name__)
 
 UNWIND_S = 0.02
-"""Time that a cancelled policy has to report its spending, before the fallback is sent."""
+"""Time that a cancelled policy has to report its spending, before an empty reply is sent."""
 
 
 class Guard:

@@ -83,7 +83,8 @@ async def run_worker(
         run: name of the run.
         side: side of the agent.
         name: name of the agent.
-        policy: decides; closed afterwards. If it does not answer in time, an empty reply is sent as a fallback.
+        policy: decides; closed afterwards. If it does not answer in time, an empty reply with the status `late` is
+            sent.
         stop: ends the worker when it is set.
     """
     return await Worker(bus, run, side, name, policy).play(stop or asyncio.Event())

@@ -28,7 +28,7 @@ class Only(StrEnum):
     ACCEPTED = "accepted"
     """It had an action, and none was refused."""
     OK = "ok"
-    """It is the agent's own, no fallback."""
+    """The agent decided itself."""
 
 
 FILTERS: Mapping[Only, Callable[[Row], bool]] = {

@@ -43,8 +43,8 @@ def export(
     only: Annotated[
         list[Only] | None,
         typer.Option(
-            help="Only decisions of won episodes, of valid ones, with all actions accepted, or that are no fallback; "
-            "all that are given hold."
+            help="Only decisions of won episodes, of valid ones, with all actions accepted, or made by the "
+            "agent itself; all that are given hold."
         ),
     ] = None,
     agent: Annotated[

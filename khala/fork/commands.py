@@ -165,9 +165,8 @@ def _end(futures: Sequence[Future]) -> None:
     if spent_usd := sum(future.spent_usd for future in futures):
         _say(f"spent: {spent_usd:.4f} USD")
     if failed := sum(future.failed for future in futures):
-        _say(
-            f"{failed} of {sum(future.decisions for future in futures)} decisions after the step were fallbacks or late"
-        )
+        decisions = sum(future.decisions for future in futures)
+        _say(f"{failed} of {decisions} decisions after the step were not made by their agents")
     _say(f"recorded: {futures[0].fork.record.parent.parent}")
     broken = [future for future in futures if future.error]
     if broken:

@@ -2,7 +2,7 @@
 
 The loop is tenacity's. Here are the table of statuses, the wait that respects `Retry-After` and the stop that
 respects the deadline. An answer after the deadline would be paid for and discarded, so a wait that would end
-after it is not begun: the error is raised at once and the agent sends its fallback early.
+after it is not begun: the error is raised at once, and the agent says early that it failed.
 """
 
 from __future__ import annotations
