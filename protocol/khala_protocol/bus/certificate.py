@@ -106,7 +106,13 @@ def read(path: Path, what: str = "certificate") -> Certificate:
         names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
         name = str(names[0].value) if names else ""
         return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
-    except (ValueError, TypeError, x509.DuplicateExtension, x509.UnsupportedGeneralNameType):  # parsed when asked for
+    except (
+        ValueError,
+        TypeError,
+        x509.InvalidVersion,
+        x509.DuplicateExtension,
+        x509.UnsupportedGeneralNameType,
+    ):  # parsed when asked for
         raise BusError(f"the TLS {what} {path} holds no certificate in PEM: is the file whole?") from None
 
 
