@@ -39,7 +39,7 @@ from khala_protocol.bus import Delivery
 from khala_protocol.bus.certificate import read
 from khala_protocol.bus.config import BusConfig, TlsFiles, host_port_of
 from khala_protocol.bus.memory import MemoryBroker
-from khala_protocol.bus.zenoh import open_bus
+from khala_protocol.bus.zenoh import ZenohBus, open_bus
 from khala_protocol.certificates import certify_agent, files_of, make_authority
 from khala_protocol.codec import encode
 from khala_protocol.errors import BusError, ConfigError
@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
     from pathlib import Path
 
-    from khala_protocol.bus import Bus
     from khala_protocol.messages import Run
 
     Play = Callable[[Path], Coroutine[Any, Any, str]]
@@ -602,7 +601,7 @@ async def _zipped(_: Path) -> str:
 
 
 @asynccontextmanager
-async def _router(directory: Path) -> AsyncIterator[tuple[Bus, Path]]:
+async def _router(directory: Path) -> AsyncIterator[tuple[ZenohBus, Path]]:
     """Run a router over TLS for the agents of a task, as `khala router --tls` does."""
     where = directory / "keys"
     make_authority(where, ["127.0.0.1"])
@@ -617,7 +616,7 @@ async def _router(directory: Path) -> AsyncIterator[tuple[Bus, Path]]:
         await bus.close()
 
 
-async def _is_honest_heard(bus: Any, where: Path, name: str = "Stalkers") -> str:
+async def _is_honest_heard(bus: ZenohBus, where: Path, name: str = "Stalkers") -> str:
     """Have an agent join and write; return how it fares, "" if the host hears it."""
     key = agent_key(RUN, "blue", name, Topic.REPLY)
     heard = await bus.subscribe(key, Delivery.SPEECH)
