@@ -67,11 +67,12 @@ cover: install-tests ## Branch coverage per package by the tests of `make test`;
 	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
-check: install-tests ## Lint, format, types and import contracts
+check: install-tests ## Lint, format, types, import contracts, and rows of bench/doors for every command
 	$(RUN)ruff check .
 	$(RUN)ruff format --check .
 	$(RUN)mypy
 	$(RUN)lint-imports --no-logo
+	$(RUN)python -m bench.doors --check
 
 format: install ## Format the code and fix what the linter can
 	$(RUN)ruff format .

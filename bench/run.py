@@ -26,6 +26,7 @@ KEPT: Final = (
 PRINTED: Final = (
     "simulator_memory", "recognition", "macro", "image", "http_client", "recording", "measures",
     "orphans", "strangers", "clocks", "pace", "serve", "scenes", "view", "faults", "resume", "soak", "mining", "crowds",
+    "doors", "money",
 )  # fmt: skip
 """Those that print a table and nothing else."""
 

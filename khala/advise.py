@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import sys
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from khala import local_bus
 from khala_orchestrator.console import clock, visible_message
@@ -21,7 +22,7 @@ from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.commandline import say
 from khala_protocol.common_names import adviser_name
-from khala_protocol.errors import ConfigError, KhalaError, NoRouter
+from khala_protocol.errors import ConfigError, KhalaError, NoRouter, PeerError
 from khala_protocol.joining import client_config
 from khala_protocol.keys import Topic, agent_key, host_key, run_key
 from khala_protocol.messages import MAX_ADVICE_CHARACTERS, Advice, Report, Result, Run
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
     from khala_protocol.bus import Bus, Liveness, Publisher, Sample, Subscription
     from khala_protocol.bus.config import BusConfig
+
+M = TypeVar("M", Report, Result)
 
 FIND_S = 5.0
 """How long to wait for the run card, which every running match has published, and for a host that is away."""
@@ -138,10 +141,18 @@ class Advising:
             except ConfigError as error:
                 self._complain(str(error))
 
+    def _read(self, kind: type[M], sample: Sample) -> M | None:
+        """Return the message of a sample; complain of one that is malformed, and go on with the next."""
+        try:
+            return decode_as(kind, sample.payload)
+        except PeerError as error:
+            self._complain(f"left out what came under {sample.key}: {error}")
+            return None
+
     async def _read_reports(self, reports: Subscription[Sample]) -> None:
         async for sample in reports:
-            report = decode_as(Report, sample.payload)
-            if report.side == self._adviser.side:
+            report = self._read(Report, sample)
+            if report is not None and report.side == self._adviser.side:
                 self._show(report)
 
     async def _read_results_while(
@@ -171,7 +182,9 @@ class Advising:
         """Show results until that of the last episode, or of one that was aborted, has come for every side."""
         sides = {agent.side for agent in card.agents}
         async for sample in results:
-            result = decode_as(Result, sample.payload)
+            result = self._read(Result, sample)
+            if result is None:
+                continue
             self._show(result)
             if result.outcome == "aborted" or result.episode >= card.episodes - 1:
                 sides.discard(result.side)
@@ -235,7 +248,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
     """Advise from stdin, on stdout, until the match is over."""
 
     def show(message: Run | Report | Result) -> None:
-        for line in [message.model_dump_json()] if as_json else told(message):
+        for line in [json.dumps(message.model_dump(mode="json"))] if as_json else told(message):
             say(line)
 
     async def advise_at(config: BusConfig, find_s: float) -> None:

@@ -90,7 +90,7 @@ def _game() -> Iterator[Finding]:
             "game", "ok", "the simulator (SC2PATH is not set)", "`khala run --game SC2PATH` plays the real one"
         )
         return
-    root = Path(given).expanduser()
+    root = Path(os.path.expanduser(given))  # noqa: PTH111  # Path's raises for a user that is not there
     if not list(root.glob("Versions/Base*/SC2*")):
         advice = "point SC2PATH to a StarCraft II install, or make one of the simulator with `khala sc2 install DIR`"
         yield Finding("game", "wrong", f"SC2PATH={given} holds no Versions/Base…/SC2_x64", advice)
@@ -167,8 +167,13 @@ def _bus() -> Iterator[Finding]:
 def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:
     def certificates() -> Iterator[Finding]:
         from khala_protocol import certificates  # noqa: PLC0415  # only this check needs the library
+        from khala_protocol.errors import BusError  # noqa: PLC0415  # likewise
 
-        found = certificates.certificates(directory)
+        try:
+            found = certificates.certificates(directory)
+        except BusError as error:
+            yield Finding("certificates", "wrong", str(error), "copy it again, or make it anew with `khala keys`")
+            return
         if not found:
             yield Finding("certificates", "wrong", f"none in {directory}", "`khala keys init DIR` makes them")
         yield from map(_certificate, found)

@@ -120,6 +120,11 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
         days = Text(str(one.days_left), "red" if one.warning else "")
         table.add_row(one.name, one.path.parent.name, f"{one.ends:%Y-%m-%d}", days, ", ".join(one.hosts))
     stdout_console().print(table)
+    for one in found:
+        if one.warning:
+            say(one.warning, err=True)
+        if one.is_open:
+            say(f"others can read {one.key}: chmod 600 {one.key}", err=True)
 
 
 def _make(directory: Path, make: Callable[[], list[Path]]) -> None:

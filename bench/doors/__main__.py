@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import sys
-import tempfile
 import time
-import traceback
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections import Counter
+from typing import TYPE_CHECKING, get_args
 
 import bench.doors
 from bench.doors.commands import missing
-from bench.doors.registry import ROWS
+from bench.doors.registry import DOORS, load_rows
+from bench.doors.rows import Kind
 from bench.tables import print_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bench.doors.playing import Outcome
     from bench.doors.rows import Row
+
+SLOWEST = 5
+"""Rows whose times are printed at the end."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,49 +31,76 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=bench.doors.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--door", help="play only rows whose door begins so")
+    parser.add_argument("--door", default="", help="play only rows whose door begins so")
+    parser.add_argument("--kind", choices=get_args(Kind), help="play only rows of this kind")
+    parser.add_argument("--jobs", type=int, default=1, help="number of processes that play rows; 1 if not given")
     parser.add_argument("--list", action="store_true", help="list the rows without playing them")
     parser.add_argument("--check", action="store_true", help="end with 1 if a command has no rows, and play nothing")
     given = parser.parse_args(arguments)
     if given.check:
-        return _check()
-    rows = [row for row in ROWS if row.door.startswith(given.door or "")]
-    if not rows:
-        parser.error(f"no door begins with {given.door!r}; there are {', '.join(dict.fromkeys(r.door for r in ROWS))}")
+        return check()
+    rows = load_rows(given.door)
+    numbers = [number for number, row in enumerate(rows) if given.kind in (None, row.kind)]
+    if not numbers:
+        known = ", ".join(dict.fromkeys(door for doors in DOORS.values() for door in doors))
+        parser.error(f"there is no such row at a door that begins with {given.door!r}; there are {known}")
+    if given.jobs < 1:
+        parser.error(f"--jobs {given.jobs}: take 1 or more")
     if given.list:
-        print_table({"door": "left", "kind": "left", "what": "left"}, [(row.door, row.kind, row.what) for row in rows])
+        chosen = (rows[number] for number in numbers)
+        print_table(
+            {"door": "left", "kind": "left", "what": "left"}, [(row.door, row.kind, row.what) for row in chosen]
+        )
         return 0
-    found = [(row, *_played(row)) for row in rows]
-    print_table(
-        {"door": "left", "kind": "left", "what": "left", "": "left", "s": "right"},
-        [(row.door, row.kind, row.what, said or "held", f"{took_s:.1f}") for row, said, took_s in found],
-    )
-    through = [row for row, said, _ in found if said]
-    print(f"{len(found)} rows, {len(through)} got through")
-    return 1 if through else 0
+    return run(rows, numbers, given.jobs)
 
 
-def _check() -> int:
+def check() -> int:
     """Print the commands without rows, and return 1 if there are any."""
-    for name in (left_out := missing(ROWS)):
+    left_out = missing(door for doors in DOORS.values() for door in doors)
+    for name in left_out:
         print(
-            f"bench/doors has no rows for `{name}`, or a reason in commands.py that is none any more", file=sys.stderr
+            f"bench/doors: `{name}` has no rows, or a reason in commands.py that no longer holds; write a row that "
+            "comes through it, or delete the reason",
+            file=sys.stderr,
         )
     return 1 if left_out else 0
 
 
-def _played(row: Row) -> tuple[str, float]:
-    """Return how a row got through, "" if it was held, and the seconds it took; a row that raises got through."""
+def run(rows: Sequence[Row], numbers: Sequence[int], jobs: int = 1) -> int:
+    """Play some of the rows, print how they fared, and return 1 if one of them got through."""
+    from bench.doors.playing import play_all  # noqa: PLC0415  # a check or a list plays nothing
+
     began = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="khala-doors-") as directory:
-        try:
-            said = asyncio.run(row.play(Path(directory)))
-        except Exception as error:  # noqa: BLE001  # whatever it is, the other rows are played as well
-            traceback.print_exc()
-            said = f"{type(error).__name__}: {error}"
-    took_s = time.perf_counter() - began
-    print(f"{'GOT THROUGH' if said else 'held':12} {row.door}: {row.what}", file=sys.stderr, flush=True)
-    return said, took_s
+    found: dict[int, Outcome] = {}
+    for number, outcome in play_all(rows, numbers, jobs):
+        found[number] = outcome
+        row = rows[number]
+        words = f"{len(found)} of {len(numbers)}  {outcome.word:11}  {row.door}: {row.what}"
+        print(words, file=sys.stderr, flush=True)
+        if outcome.through:
+            print(outcome.noise, end="", file=sys.stderr, flush=True)
+    played = [(rows[number], found[number]) for number in sorted(found)]
+    print_table(
+        {"door": "left", "kind": "left", "what": "left", "": "left", "s": "right"},
+        [
+            (row.door, row.kind, row.what, outcome.through or outcome.skipped or "held", f"{outcome.took_s:.1f}")
+            for row, outcome in played
+        ],
+    )
+    slowest = sorted(played, key=lambda pair: -pair[1].took_s)[:SLOWEST]
+    print(f"slowest: {', '.join(f'{outcome.took_s:.1f} s {row.door}: {row.what}' for row, outcome in slowest)}")
+    print(f"{summary(played)}; {time.perf_counter() - began:.0f} s")
+    return 1 if any(outcome.through for _, outcome in played) else 0
+
+
+def summary(played: Sequence[tuple[Row, Outcome]]) -> str:
+    """Return the numbers of rows of each kind, and how many of them got through or were skipped."""
+    kinds = Counter(row.kind for row, _ in played)
+    through = sum(bool(outcome.through) for _, outcome in played)
+    skipped = sum(bool(outcome.skipped) for _, outcome in played)
+    counts = ", ".join(f"{kinds[kind]} {kind}{'' if kinds[kind] == 1 else 's'}" for kind in get_args(Kind))
+    return f"{len(played)} rows: {counts}; {through} got through" + (f", {skipped} skipped" if skipped else "")
 
 
 if __name__ == "__main__":

@@ -14,8 +14,6 @@ from khala.cli import app
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from bench.doors.rows import Row
-
 WITHOUT_ROWS: Final[dict[str, str]] = {
     "khala actions": "prints the catalogue that is installed",
     "khala tasks": "lists the tasks that are installed",
@@ -33,9 +31,9 @@ def commands() -> list[str]:
     return sorted(_leaves("khala", typer.main.get_command(app)))
 
 
-def missing(rows: Iterable[Row]) -> list[str]:
-    """Return the commands that have no row, and no reason for that; and reasons that are none any more."""
-    doors = {row.door for row in rows}
+def missing(doors: Iterable[str]) -> list[str]:
+    """Return the commands that are none of these doors and have no reason for it, and reasons that no longer hold."""
+    doors = set(doors)
     known = commands()
     without = [name for name in known if name not in doors and name not in WITHOUT_ROWS]
     return without + [name for name in WITHOUT_ROWS if name not in known or name in doors]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 from unittest import mock
 
-from bench.doors.rows import Row
+from bench.doors.rows import Row, Skipped
 from khala.dataset.card import Recipe
 from khala.dataset.choose import Choice, Split
 from khala.dataset.export import export
@@ -116,7 +116,7 @@ def _experiment(directory: Path, *, words: str = "") -> Store:
     return store
 
 
-def _printed(command: Callable[[], object]) -> tuple[str, str]:
+def printed(command: Callable[[], object]) -> tuple[str, str]:
     """Return what a command prints, and how it got through if it did not end in a sentence or well."""
     with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
         try:
@@ -183,7 +183,7 @@ async def _broken_index(damage: Callable[[Path], object], directory: Path) -> st
     before = sorted(map(repr, store.results()))
     damage(store.directory / INDEX)
     fresh = Store(store.directory)
-    _, traceback = _printed(lambda: _export(fresh))
+    _, traceback = printed(lambda: _export(fresh))
     if traceback:
         return traceback
     return "" if sorted(map(repr, fresh.results())) == before else "results were lost"
@@ -227,7 +227,7 @@ async def _forged_view(directory: Path) -> str:
 # --- disks ----------------------------------------------------------------------------------------------
 
 
-class _FullFile:
+class FullFile:
     """A file of a disk that is full after some bytes."""
 
     def __init__(self, file: Any, most: int) -> None:
@@ -252,11 +252,11 @@ class _FullFile:
 async def _full_disk(work: Callable[[Store], object], directory: Path) -> str:
     """Play a command on a disk on which no file gets longer than 100 bytes; what was there must stay."""
     store = _experiment(directory)
-    _printed(lambda: work(store))
+    printed(lambda: work(store))
     before = _contents(directory)
     fdopen = os.fdopen
-    with mock.patch("os.fdopen", lambda *given: _FullFile(fdopen(*given), 100)):
-        said, traceback = _printed(lambda: work(store))
+    with mock.patch("os.fdopen", lambda *given: FullFile(fdopen(*given), 100)):
+        said, traceback = printed(lambda: work(store))
     if traceback:
         return traceback
     if "No space left" not in said:
@@ -275,12 +275,12 @@ def _contents(directory: Path) -> dict[str, bytes]:
 async def _tiny_disk(directory: Path) -> str:
     """Make the index of an experiment anew on a disk of its own size."""
     if os.geteuid() != 0:
-        return ""
+        raise Skipped("only root may make a disk of its own size")
     disk = directory / "disk"
     disk.mkdir()
     mounting = await asyncio.create_subprocess_exec("mount", "-t", "tmpfs", "-o", "size=900k", "tmpfs", str(disk))
     if await mounting.wait():
-        return ""  # nobody may mount here
+        raise Skipped("root may not mount a disk here")
     try:
         store = _experiment(disk)
         store.rebuild()
@@ -294,7 +294,7 @@ async def _tiny_disk(directory: Path) -> str:
             lambda: _report(store),
             lambda: _export(store),
         ):
-            said, traceback = _printed(work)
+            said, traceback = printed(work)
             if traceback or "No space left" not in said:
                 return traceback or f"it says {said!r}"
         found = sorted(map(repr, Store(store.directory).results()))
@@ -308,7 +308,7 @@ async def _tiny_disk(directory: Path) -> str:
 async def _half_data_set(directory: Path) -> str:
     _recorded(directory / "a.mcap", {})
     with mock.patch("json.dumps", side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))):
-        said, traceback = _printed(partial(_data_set, directory))
+        said, traceback = printed(partial(_data_set, directory))
     left = _contents(directory).keys() - {str(directory / "a.mcap")}
     return traceback or (f"{left} is left, and it says {said!r}" if left or "nothing of it is kept" not in said else "")
 
@@ -322,10 +322,10 @@ async def _modes(directory: Path) -> str:
     umask = os.umask(0o022)
     try:
         store = _experiment(directory)
-        _printed(lambda: _report(store))
-        _printed(lambda: _export(store))
+        printed(lambda: _report(store))
+        printed(lambda: _export(store))
         _recorded(directory / "a.mcap", {})
-        _printed(partial(_data_set, directory))
+        printed(partial(_data_set, directory))
         with mock.patch.dict(os.environ, {"KHALA_CACHE": str(directory / "cache")}):
             index = Opened("x", directory / "a.mcap").index
             whole(index)
@@ -344,7 +344,7 @@ async def _link(directory: Path) -> str:
     store = _experiment(directory)
     (directory / "precious").write_text("mine")
     (store.directory / "x.csv").symlink_to(directory / "precious")
-    _, traceback = _printed(lambda: _export(store))
+    _, traceback = printed(lambda: _export(store))
     return traceback or (
         "" if (directory / "precious").read_text() == "mine" else "a file behind a link is overwritten"
     )
@@ -363,7 +363,7 @@ async def _odd_recordings(make: Callable[[Path], object], directory: Path) -> st
         lambda: _export(Store(store.directory)),
         partial(commands.status, store.directory, game="simulator", out=directory, as_json=False),
     ):
-        if traceback := _printed(command)[1]:
+        if traceback := printed(command)[1]:
             return traceback
     return ""
 
@@ -386,7 +386,7 @@ async def _foreign_words(directory: Path) -> str:
     with Recorder(path) as recorder:
         recorder.write(agent_key("e", "blue", AGENT, Topic.REPLY), encode(Reply(**where, text="I surrender")))
     options = {"agent": "Zealots", "steps": None, "text": True, "images": None, "new": None, "pace": False}
-    said, traceback = _printed(partial(replay, path, **options, as_json=False))  # type: ignore[arg-type]
+    said, traceback = printed(partial(replay, path, **options, as_json=False))  # type: ignore[arg-type]
     return traceback or ("words stand in the mouth of another agent" if "surrender" in said else "")
 
 
@@ -463,7 +463,7 @@ async def _broken_view(_: Path) -> str:
 
 
 async def _printing(command: Callable[[Path], object], directory: Path) -> str:
-    said, traceback = _printed(partial(command, directory))
+    said, traceback = printed(partial(command, directory))
     return traceback or _acts(said) or ("" if "owned" in said else f"it printed none of the words: {said!r}")
 
 

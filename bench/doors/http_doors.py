@@ -1,4 +1,4 @@
-"""Rows of the servers that speak HTTP: `khala view`, `khala mcp`, `khala openenv` and the metrics of `khala serve`.
+"""Rows of the servers that speak HTTP: `khala view`, `mcp`, `openenv`, `llm` and the metrics of `khala serve`.
 
 Each row first asks as an honest client does, so a row that is held is held by the guard. Servers run in this process on
 loopback, with the applications and the configuration of the commands. Where a match is played meanwhile, it has to go
@@ -30,8 +30,7 @@ from starlette.applications import Starlette
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from bench.doors.rows import Row
-from khala.doors.listening import HEAD_S, MOST_CONNECTIONS, Patience, bound
+from bench.doors.rows import Row, Skipped
 from khala.doors.serving import uvicorn_config
 from khala.mcp.serve import SeatAddress, routes_of
 from khala.mcp.table import Table
@@ -43,7 +42,10 @@ from khala.service.metrics import Metrics
 from khala.view.guard import view_door
 from khala.view.server import Server
 from khala.view.sources import Sources
+from khala_agents.scripted.endpoint import MOST_CONNECTIONS as MOST_OF_ENDPOINT
+from khala_agents.scripted.endpoint import Endpoint
 from khala_orchestrator.config import MatchConfig, load_task
+from khala_protocol.listening import HEAD_S, MOST_CONNECTIONS, Patience, bound
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -76,6 +78,7 @@ class Target:
         body: of the request.
         headers: that the request needs.
         door: its rules, where a row needs its secrets.
+        most: number of connections that the server takes.
     """
 
     port: int
@@ -84,6 +87,7 @@ class Target:
     body: bytes = b""
     headers: tuple[str, ...] = ()
     door: Door | None = None
+    most: int = MOST_CONNECTIONS
 
     @property
     def host(self) -> str:
@@ -173,8 +177,19 @@ async def metrics(directory: Path) -> AsyncIterator[Target]:
         yield Target(port, "/metrics")
 
 
+@asynccontextmanager
+async def llm(directory: Path) -> AsyncIterator[Target]:
+    """Serve `khala llm`."""
+    del directory
+    async with Endpoint() as endpoint:
+        address = urlsplit(endpoint.base_url)
+        assert address.port is not None
+        yield Target(address.port, "/v1/models", most=MOST_OF_ENDPOINT)
+
+
 SERVERS: Final[dict[str, Serving]] = {
     "khala openenv": openenv, "khala mcp": mcp, "khala view": view, "khala serve --metrics": metrics,
+    "khala llm": llm,
 }  # fmt: skip
 
 
@@ -272,14 +287,19 @@ async def _play_trick(serving: Serving, trick: Trick, directory: Path) -> str:
 
 
 async def _play_half_open(serving: Serving, directory: Path) -> str:
-    """Open more connections than a server takes, and send half a request on each."""
+    """Open more connections than a server takes, and send half a request on each; the oldest must make room."""
     async with serving(directory) as target, contextlib.AsyncExitStack() as stack:
-        for _ in range(MOST_CONNECTIONS + 20):
-            _, writer = await asyncio.open_connection("127.0.0.1", target.port)
+        oldest: asyncio.StreamReader | None = None
+        for _ in range(target.most + 20):
+            reader, writer = await asyncio.open_connection("127.0.0.1", target.port)
+            oldest = oldest or reader
             stack.callback(writer.close)
             with contextlib.suppress(ConnectionError):
                 writer.write(b"GET / HTTP/1.1\r\nHost: ")
-        return await _is_honest_answered(target)
+        if wrong := await _is_honest_answered(target):
+            return wrong
+        assert oldest is not None
+        return "" if await _is_ended(oldest) else f"it keeps {target.most + 20} connections that ask for nothing"
 
 
 async def _play_slow_head(serving: Serving, directory: Path) -> str:
@@ -289,14 +309,19 @@ async def _play_slow_head(serving: Serving, directory: Path) -> str:
         writer.write(b"GET / HTTP/1.1\r\nX-Slow: ")
         await _is_honest_answered(target)  # so the server has seen the other one
         _pass(HEAD_S + 1)
-        try:
-            ended = await asyncio.wait_for(reader.read(), ANSWER_S) is not None
-        except ConnectionError:
-            ended = True
-        except TimeoutError:
-            ended = False
+        ended = await _is_ended(reader)
         writer.close()
         return ("" if ended else "it kept its connection") or await _is_honest_answered(target)
+
+
+async def _is_ended(reader: asyncio.StreamReader) -> bool:
+    """Return whether the server ends a connection, and does so soon."""
+    with contextlib.suppress(ConnectionError):
+        try:
+            await asyncio.wait_for(reader.read(), ANSWER_S)
+        except TimeoutError:
+            return False
+    return True
 
 
 def _pass(seconds: float) -> None:
@@ -546,7 +571,7 @@ async def _play_address(directory: Path) -> str:
     own = _own_address()
     async with openenv(directory) as target:
         if own is None:
-            return ""
+            raise Skipped("this machine has no address but loopback")
         try:
             _, writer = await asyncio.open_connection(own, target.port)
         except OSError:
@@ -573,7 +598,7 @@ def _rows() -> tuple[Row, ...]:
         row
         for door, serving in SERVERS.items()
         for row in (
-            Row(door, f"{MOST_CONNECTIONS + 20} half-open connections", partial(_play_half_open, serving)),
+            Row(door, "half-open connections, 20 more than it takes", partial(_play_half_open, serving)),
             Row(door, "a head that never ends", partial(_play_slow_head, serving)),
         )
     ]

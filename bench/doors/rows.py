@@ -13,6 +13,10 @@ Kind: TypeAlias = Literal["attack", "quirk", "fault"]
 """Somebody means harm, an endpoint or a file is odd, or a machine fails."""
 
 
+class Skipped(Exception):
+    """The machine lacks what a row needs; the text says what."""
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """One row.

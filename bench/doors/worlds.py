@@ -14,6 +14,7 @@ import random
 import struct
 import sys
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import aiohttp
@@ -32,7 +33,6 @@ from khala_simulator.process.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine
-    from pathlib import Path
 
     from bench.doors.rows import Kind
 
@@ -369,13 +369,19 @@ async def _replays(_: Path) -> str:
 # the command line -----------------------------------------------------------------------------------------------------
 
 
-async def _run(*arguments: str) -> tuple[int, str]:
-    """Run the simulator's command; return its exit code and what it said."""
+async def _run(*arguments: str, **environ: str) -> tuple[int, str]:
+    """Run the simulator's command with these variables; return its exit code and what it said."""
     code = "import sys; from khala_simulator.cli import app; app()"
     child = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", code, *arguments, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
-    )
-    said, _ = await asyncio.wait_for(child.communicate(), PATIENCE_S)
+        sys.executable, "-c", code, *arguments, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
+        env={**os.environ, **environ},
+    )  # fmt: skip
+    try:
+        said, _ = await asyncio.wait_for(child.communicate(), PATIENCE_S)
+    except TimeoutError:
+        child.kill()
+        await child.wait()
+        return 1, f"it said nothing for {PATIENCE_S:g} s"
     return child.returncode or 0, said.decode(errors="replace")
 
 
@@ -404,12 +410,52 @@ async def _serve_at_a_taken_port(_: Path) -> str:
     return "" if code and "cannot listen" in said and "Traceback" not in said else said[-200:]
 
 
+def _make_evil_path(directory: Path) -> Path:
+    return directory / "\x1b]0;owned\x07\u202e"
+
+
+def _make_forged_install(directory: Path) -> Path:
+    """Make an install whose executable is a program of its own, which must not run to tell what it is."""
+    game = directory / "forged" / "Versions" / "Base75689" / "SC2_x64"
+    game.parent.mkdir(parents=True)
+    game.write_text(f"#!/bin/sh\ntouch {directory}/it-ran\n")
+    game.chmod(0o755)
+    return directory / "forged"
+
+
+def _make_pipe_install(directory: Path) -> Path:
+    game = directory / "pipe" / "Versions" / "Base75689" / "SC2_x64"
+    game.parent.mkdir(parents=True)
+    os.mkfifo(game)
+    return directory / "pipe"
+
+
+SC2PATHS: Final[dict[str, tuple[Callable[[Path], Path], Kind]]] = {
+    "a name with escape sequences": (_make_evil_path, "attack"),
+    "an install with a forged program": (_make_forged_install, "attack"),
+    "an install with a pipe for a program": (_make_pipe_install, "attack"),
+    "in the home of nobody": (lambda _: Path("~nobody-of-this-name/sc2"), "quirk"),
+    "a file": (lambda _: Path(__file__), "quirk"),
+}
+
+
+async def _info(directory: Path, make: Callable[[Path], Path]) -> str:
+    """Ask which game this is, where SC2PATH names something odd."""
+    path = make(directory)
+    code, said = await _run("info", SC2PATH=str(path))
+    if (directory / "it-ran").exists():
+        return "a program that SC2PATH names was run"
+    if not all(character.isprintable() or character == "\n" for character in said):
+        return "an escape sequence reached the terminal"
+    return "" if code == 0 and "llm_smac/" in said and "(this simulator)" not in said else said[-200:]
+
+
 def _row(door: str, what: str, play: Play, kind: Kind = "attack") -> Row:
     return Row(door, what, play, kind)
 
 
 _game_row, _map_row = partial(_row, "game: requests"), partial(_row, "game: maps")
-_socket_row, _command_row = partial(_row, "game: websocket"), partial(_row, "khala sc2")
+_socket_row, _command_row = partial(_row, "khala sc2 serve"), partial(_row, "khala sc2 install")
 _BOMB = "\n".join(["a0: &a0 {x: 1}", *(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 12))])
 _ROW = HEAD + "units: [{player: 1, unit: Marine, at: {x: {from: 0, to: 1.0e+9}, y: 3}}]\n"
 
@@ -441,7 +487,11 @@ ROWS: Final[tuple[Row, ...]] = (
     _map_row("a unit off the map", _map(lambda: MARK + HEAD.encode() + b"points: {a: [99999, 3]}\n"), "fault"),
     _map_row("an archive that is cut off", _map(_cut_archive), "fault"),
     _map_row("pipes and devices for a map", _devices),
-    _command_row("install below a file", _install_over_a_file, "fault"),
-    _command_row("install --maps of what is no map", _install_what_is_no_map, "quirk"),
-    _command_row("serve at a taken port", _serve_at_a_taken_port, "fault"),
+    _command_row("a file where its folder is to be", _install_over_a_file, "fault"),
+    _command_row("--maps with files that are no maps", _install_what_is_no_map, "quirk"),
+    _socket_row("a port that is taken", _serve_at_a_taken_port, "fault"),
+    *(
+        _row("khala sc2 info", f"SC2PATH is {what}", partial(_info, make=make), kind)
+        for what, (make, kind) in SC2PATHS.items()
+    ),
 )  # fmt: skip

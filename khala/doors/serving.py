@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import uvicorn
 
-from khala.doors.listening import MOST_CONNECTIONS, Patience
+from khala_protocol.listening import MOST_CONNECTIONS, Patience
 
 if TYPE_CHECKING:
     from khala.doors.asgi import Application

@@ -6,17 +6,22 @@ One record per line, in a fixed order, so that a change of the tables is a small
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from khala.knowledge.abilities import ability_facts
 from khala.knowledge.buffs import buff_facts
 from khala.knowledge.units import unit_facts
 from khala.knowledge.upgrades import upgrade_facts
 from khala_bridge import data
+from khala_protocol.files import MB, read_limited, write_together
 from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+
+MOST_BYTES: Final = 4 * MB
+"""Of a file of facts; the largest has 0.2 MB."""
 
 
 def facts(version: str) -> dict[str, str]:
@@ -38,22 +43,30 @@ def facts(version: str) -> dict[str, str]:
 def outdated(version: str) -> list[str]:
     """Return the names of the files of a version that differ from what would be written now."""
     where = directory(version)
-    return [n for n, text in facts(version).items() if not (where / n).exists() or (where / n).read_text() != text]
+    return [name for name, text in facts(version).items() if _bytes(where / name) != text.encode()]
 
 
 def write(version: str) -> list[Path]:
-    """Write every file of a version; return their paths."""
+    """Write the files of a version, all of them or none; return their paths."""
     where = directory(version)
     where.mkdir(parents=True, exist_ok=True)
     made = {where / name: text for name, text in facts(version).items()}
-    for path, text in made.items():
-        path.write_text(text, encoding="utf-8")
+    write_together({path: text.encode() for path, text in made.items()})
+    for path in made:
+        path.chmod(0o644)  # no secret: a part of the package, which all of its users read
     return list(made)
 
 
 def directory(version: str) -> Path:
     """Return the directory of the facts of a game version."""
     return data.path("knowledge") / version
+
+
+def _bytes(path: Path) -> bytes | None:
+    try:
+        return read_limited(path, MOST_BYTES)
+    except OSError:
+        return None
 
 
 def _text(version: str, build: int, records: dict[str, dict[str, Any]]) -> str:

@@ -18,13 +18,13 @@ from starlette.applications import Starlette
 from starlette.routing import Mount
 
 from khala.doors.asgi import Guarded, head_of
-from khala.doors.listening import bound
 from khala.doors.rules import TOKEN, Door, token_of
 from khala.doors.serving import uvicorn_config
 from khala.exit_codes import SIGNALLED
 from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
 from khala_protocol.commandline import say
+from khala_protocol.listening import bound
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:

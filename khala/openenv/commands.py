@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from khala.doors.listening import bound
 from khala.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
+from khala_protocol.listening import bound
 from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:

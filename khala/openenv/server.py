@@ -34,7 +34,6 @@ from starlette.websockets import WebSocketDisconnect
 
 from khala import __version__
 from khala.doors.asgi import Guarded
-from khala.doors.listening import MOST_CONNECTIONS
 from khala.doors.rules import Door, is_same, token_of
 from khala.doors.serving import uvicorn_config
 from khala.openenv.environment import KhalaEnvironment, NoEpisode
@@ -44,6 +43,7 @@ from khala.openenv.settings import Settings
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import KhalaError
+from khala_protocol.listening import MOST_CONNECTIONS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, get_args
 from aiohttp import web
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
-from khala.doors.listening import Patience, bound
 from khala.doors.pages import guarded
 from khala.doors.rules import Door
+from khala_protocol.listening import Patience, bound
 from khala_protocol.messages import Report, Result
 from khala_protocol.service import MatchState
 

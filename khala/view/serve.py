@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 from aiohttp import web
 
-from khala.doors.listening import Patience, bound
 from khala.doors.rules import TOKEN
 from khala.exit_codes import SIGNALLED
 from khala.view.export import export
@@ -31,6 +30,7 @@ from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import read_limited
 from khala_protocol.joining import client_config
+from khala_protocol.listening import Patience, bound
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ the consoles of `khala_orchestrator.console`; nothing else writes to a terminal.
 from __future__ import annotations
 
 import errno
+import io
 import sys
 from typing import TYPE_CHECKING, Any, Final
 
@@ -45,6 +46,7 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
         command: reads the options and does the work.
         errors: further types of such errors, in addition to `KhalaError`.
     """
+    _escape_unknown_characters()
     user_errors: tuple[type[Exception], ...] = (KhalaError, *errors)
     all_errors: tuple[type[Exception], ...] = (*user_errors, OSError)
     faults: list[BaseException] = []
@@ -59,6 +61,13 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
         say(f"{name}: {_words(fault)}", err=True)
     if faults:  # not within `except*`: early Pythons 3.11 raise an exit there as a part of a group
         sys.exit(1)
+
+
+def _escape_unknown_characters() -> None:
+    """Print what the encoding of a terminal lacks as an escape: in ASCII, `→` would end the command in a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _is_of_the_machine(error: BaseException) -> bool:

@@ -28,23 +28,24 @@ from pydantic_core import to_json
 
 from khala_agents.scripted.faults import Faults
 from khala_agents.scripted.players import PLAYERS
-from khala_protocol.errors import KhalaError
+from khala_protocol.bus.config import is_loopback
+from khala_protocol.listening import Patience, bound
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from aiohttp.typedefs import Handler
 
 log = logging.getLogger(__name__)
 
 NONSENSE = "As an AI I would <Attack_Unit(> them all, \x00 <<MessageTo()> and Team : [ 3, ("
 MAX_BODY_BYTES = 32 * 2**20
+MOST_CONNECTIONS = 512
+"""A connection for each agent of a large team, and half of the files that a process may open by default."""
 DRIPS = 10
 CHARACTERS_PER_TOKEN = 4
 TOKENS_PER_IMAGE = 85
 """Tokens of a picture, whatever its size."""
-
-
-class EndpointError(KhalaError):
-    """The endpoint cannot be opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +81,13 @@ class Endpoint:
         self._behaviour = behaviour or Behaviour()
         self._address = host, port
         self._runner: web.AppRunner | None = None
+        self._server: asyncio.Server | None = None
 
     async def __aenter__(self) -> Self:
-        application = web.Application(client_max_size=MAX_BODY_BYTES)
+        host, port = self._address
+        listening = bound(host, port)
+        guard = _guard_near if is_loopback(host) else _guard
+        application = web.Application(client_max_size=MAX_BODY_BYTES, middlewares=[guard])
         application.router.add_post("/v1/chat/completions", self._complete)
         application.router.add_get("/v1/models", _models)
         application.router.add_get("/health", _health)
@@ -94,19 +99,17 @@ class Endpoint:
             handler_cancellation=True,  # a stalled answer ends when its client has gone
         )
         await self._runner.setup()
-        host, port = self._address
-        try:
-            await web.TCPSite(self._runner, host, port, backlog=1024).start()
-        except OSError as error:
-            await self._runner.cleanup()
-            why = error.strerror or str(error)
-            raise EndpointError(f"cannot listen on {host}:{port}: {why}; take another port, or --port 0") from None
+        assert self._runner.server is not None
+        accepting = Patience(self._runner.server, most=MOST_CONNECTIONS)
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(accepting, sock=listening, backlog=1024)
         name = f"[{host}]" if ":" in host else host
-        self.base_url = f"http://{name}:{self._runner.addresses[0][1]}/v1"
+        self.base_url = f"http://{name}:{listening.getsockname()[1]}/v1"
         return self
 
     async def __aexit__(self, *error: object) -> None:
-        if self._runner is not None:
+        if self._server is not None and self._runner is not None:
+            self._server.close()
             await self._runner.cleanup()
 
     async def _complete(self, request: web.Request) -> web.StreamResponse:
@@ -258,6 +261,24 @@ def _stream(body: bytes) -> web.StreamResponse:
     response = web.StreamResponse(headers={"Content-Type": "application/json"})
     response.content_length = len(body)
     return response
+
+
+@web.middleware
+async def _guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Refuse what no program that asks a model would send: a request of a page, and a body beyond all prompts."""
+    if "Origin" in request.headers or request.headers.get("Sec-Fetch-Site", "none") != "none":
+        return _refusal(403, "a page asked this: the scripted model answers programs alone", "forbidden")
+    if (request.content_length or 0) > MAX_BODY_BYTES:
+        return _refusal(413, f"the body is longer than {MAX_BODY_BYTES} bytes: send less at a time", "too_large")
+    return await handler(request)
+
+
+@web.middleware
+async def _guard_near(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Refuse other names as well, for a server of this machine alone: somebody may point them here for a page."""
+    if not is_loopback((request.url.host or "").casefold()):
+        return _refusal(403, "this server is not asked under this name: write 127.0.0.1 or localhost", "forbidden")
+    return await _guard(request, handler)
 
 
 async def _models(request: web.Request) -> web.Response:

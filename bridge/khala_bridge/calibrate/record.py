@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import json
 import statistics
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import read_limited, write_private
 from khala_protocol.messages import Frozen
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,16 +22,28 @@ if TYPE_CHECKING:
 
 _MOST_BYTES: Final = 64 * 2**20
 _DIGITS: Final = 6
+_LARGEST: Final = 1e12
+"""Beyond all that a game has; statistics of the largest floats overflow."""
+
+Line = Annotated[str, AfterValidator(visible_line)]
+"""Words of another machine: on one line, so that they add no heading to a report, nor a row to its tables."""
+Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)]
 
 
 class Values(Frozen):
     """All that was measured under one name."""
 
-    samples: tuple[float, ...]
-    mean: float
-    sd: float
+    samples: tuple[Number, ...]
+    mean: Number
+    sd: Number
     """Of the samples; 0 for a single one."""
     n: int
+
+    @model_validator(mode="after")
+    def _check_n(self) -> Self:
+        if self.n != len(self.samples):
+            raise ValueError(f"n is {self.n}, and there are {len(self.samples)} samples")
+        return self
 
     @classmethod
     def of(cls, samples: Iterable[float]) -> Values:
@@ -45,17 +58,17 @@ class Values(Frozen):
 class Measured(Frozen):
     """What one probe found."""
 
-    unit: str
+    unit: Line
     exact: bool
     """Whether the game repeats it to the last digit, apart from `resolution`."""
-    resolution: float
+    resolution: Number
     run_s: float
     """Seconds that it took."""
     loops: int
     """Game loops that it played; of a probe with games of its own, those of the last one."""
-    failed: str = ""
+    failed: Line = ""
     """Why it found nothing: an error of the game, or a unit that did not do what the probe expects."""
-    values: dict[str, Values] = Field(default_factory=dict)
+    values: dict[Line, Values] = Field(default_factory=dict)
 
 
 class Calibration(Frozen):
@@ -63,17 +76,17 @@ class Calibration(Frozen):
 
     kind: Literal["khala-calibration"] = "khala-calibration"
     format: Literal[1] = 1
-    khala: str
+    khala: Line
     """Version of Khala."""
-    game: str
+    game: Line
     """Such as `StarCraft II`, or the simulator by its name."""
-    version: str
+    version: Line
     """That the game tells, such as 4.10.0."""
     build: int
-    data_version: str
-    platform: str
+    data_version: Line
+    platform: Line
     seed: int
-    probes: dict[str, Measured] = Field(default_factory=dict)
+    probes: dict[Line, Measured] = Field(default_factory=dict)
     """By id."""
 
     def with_probe(self, name: str, measured: Measured) -> Calibration:

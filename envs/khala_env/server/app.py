@@ -12,8 +12,8 @@ import os
 
 import uvicorn
 
-from khala.doors.listening import bound
 from khala.openenv.server import OPENENV_OPEN, app_of, openenv_door, server_config
+from khala_protocol.listening import bound
 
 app = app_of(door=openenv_door(is_open=os.environ.get(OPENENV_OPEN, "") not in {"", "0", "false"}))
 

@@ -15,6 +15,7 @@ from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509.oid import NameOID
 
 from khala_protocol.errors import BusError
+from khala_protocol.files import MB, read_limited
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 DAY = timedelta(days=1)
 SOON_DAYS = 30
 """A certificate with fewer days left is worth a word."""
+MOST_BYTES = 1 * MB
+"""Of a PEM file, far above a chain of certificates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +103,17 @@ def read(path: Path, what: str = "certificate") -> Certificate:
     """
     try:
         found = x509.load_pem_x509_certificate(_bytes(path, what))
-    except ValueError:
-        raise BusError(f"the TLS {what} {path} holds no certificate in PEM") from None
-    names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    name = str(names[0].value) if names else ""
-    return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
+        names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+        name = str(names[0].value) if names else ""
+        return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
+    except (
+        ValueError,
+        TypeError,
+        x509.InvalidVersion,
+        x509.DuplicateExtension,
+        x509.UnsupportedGeneralNameType,
+    ):  # parsed when asked for
+        raise BusError(f"the TLS {what} {path} holds no certificate in PEM: is the file whole?") from None
 
 
 def check_valid(path: Path, what: str = "certificate") -> None:
@@ -140,7 +149,7 @@ def check_key(path: Path, certificate: Path) -> None:
 
 def _bytes(path: Path, what: str) -> bytes:
     try:
-        return path.read_bytes()
+        return read_limited(path, MOST_BYTES)
     except OSError as error:
         raise BusError(f"cannot read the TLS {what} {path}: {error.strerror or error}") from None
 

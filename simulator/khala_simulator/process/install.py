@@ -94,7 +94,7 @@ def is_installed(directory: Path | str) -> bool:
 
 def installed_version(directory: Path | str) -> str | None:
     """Return the version of the game that an install of the simulator is, or None where there is no install."""
-    root = Path(directory).expanduser()
+    root = Path(os.path.expanduser(directory))  # noqa: PTH111  # Path's raises for a user that is not there
     return next((version for version in BUILD_OF_VERSION if _is_ours(root / _launcher(version))), None)
 
 
@@ -115,6 +115,8 @@ def _refuse_real_game(root: Path) -> None:
 
 
 def _is_ours(executable: Path) -> bool:
+    if not executable.is_file():  # to open a pipe would wait for its writer
+        return False
     try:
         with executable.open("rb") as file:
             return _MARK.encode() in file.read(256)

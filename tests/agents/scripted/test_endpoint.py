@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import aiohttp
 import pytest
 
-from khala_agents.scripted.endpoint import Behaviour, Endpoint, EndpointError, count_tokens
+from khala_agents.scripted.endpoint import Behaviour, Endpoint, count_tokens
 from khala_agents.scripted.faults import Faults, parse_faults
 from khala_protocol.errors import ConfigError
 
@@ -94,12 +94,11 @@ async def test_latency_is_kept_for_many_requests_at_once(http: aiohttp.ClientSes
 async def test_an_address_in_use_is_one_clear_sentence() -> None:
     async with Endpoint() as first:
         port = int(first.base_url.split(":")[2].split("/")[0])
-        with pytest.raises(EndpointError) as caught:
+        with pytest.raises(ConfigError) as caught:
             async with Endpoint(port=port):
                 pass
-    text = f"cannot listen on 127.0.0.1:{port}: "
-    assert str(caught.value).startswith(text)
-    assert str(caught.value).endswith("take another port, or --port 0")
+    assert f"cannot listen on 127.0.0.1:{port}: " in str(caught.value)
+    assert str(caught.value).endswith("--port names another port")
 
 
 @pytest.mark.parametrize(("text", "tokens"), [("", 0), ("a", 1), ("four", 1), ("fives", 2), ("ünïç", 1)])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.doors.listening import HEAD_S, MOST_HEAD_BYTES, Patience, bound
+from khala_protocol.listening import HEAD_S, MOST_HEAD_BYTES, Patience, bound
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
