@@ -34,7 +34,7 @@ DOORS: Final[dict[str, tuple[str, ...]]] = {
         "khala serve",
     ),
     "money": ("endpoint",),
-    "validity": ("khala run",),
+    "validity": ("khala run", "khala experiment run"),
     "endpoints": (
         "endpoint",
         "model file",
