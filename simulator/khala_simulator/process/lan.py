@@ -306,7 +306,7 @@ class Peers:
 
     def _part(self, error: LockstepError) -> None:
         """End the game for every member: it is no longer one game."""
-        words = ascii(str(error))  # it may quote another process
+        words = str(error).encode("unicode_escape").decode()  # it may quote another process
         print(f"StarCraft II simulator: {words}; the game ends", file=sys.stderr)  # noqa: T201  # there is no other log
         for link in tuple(self._links):
             link.close()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-import os
 import signal
-from contextlib import suppress
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
@@ -88,39 +87,40 @@ async def test_a_model_that_costs_nothing_is_asked_under_any_budget() -> None:
     await spend(Budget(0.0), 0.0)
 
 
-async def _hold(path: Path, times: int) -> None:
-    budget = Budget(1.0, ledger=Ledger(path))
-    with suppress(LimitExceeded):
-        for _ in range(times):
-            await spend(budget, 0.01)
+SPENDING = """
+import sys
+from pathlib import Path
+from khala_agents.llm.money import Ledger, Overdrawn
+ledger = Ledger(Path(sys.argv[1]))
+try:
+    for _ in range(70):
+        ledger.settle(ledger.hold("", 0.01, 1.0), 0.01)
+except Overdrawn:
+    pass
+"""
+DYING = """
+import os, signal, sys
+from pathlib import Path
+from khala_agents.llm.money import Ledger
+Ledger(Path(sys.argv[1])).hold("", 0.25, 1.0)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
-def _hold_in_a_process(path: Path) -> None:
-    asyncio.run(_hold(path, 70))
+def start(code: str, path: Path) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", code, str(path)])
 
 
 def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
-    spawn = multiprocessing.get_context("spawn")
-    processes = [spawn.Process(target=_hold_in_a_process, args=(path,)) for _ in range(2)]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join(60)
+    processes = [start(SPENDING, path) for _ in range(2)]
+    assert [process.wait(60) for process in processes] == [0, 0]
     assert Ledger(path).booked_usd() == pytest.approx(1.0)
-
-
-def _die_while_asking(path: Path) -> None:
-    Ledger(path).hold("", 0.25, 1.0)
-    os.kill(os.getpid(), signal.SIGKILL)
 
 
 async def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
-    process = multiprocessing.get_context("spawn").Process(target=_die_while_asking, args=(path,))
-    process.start()
-    process.join(60)
-    assert process.exitcode == -signal.SIGKILL
+    assert start(DYING, path).wait(60) == -signal.SIGKILL
     assert Ledger(path).booked_usd() == pytest.approx(0.25)
     with pytest.raises(LimitExceeded):
         await spend(Budget(1.0, ledger=Ledger(path)), 0.8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 import socket
 import sys
 import threading
@@ -19,6 +20,7 @@ from khala_bridge.game.guest import Guest
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.manners import LanPorts
 from khala_bridge.task.opponent import Opponent
+from khala_protocol.trust import Untrusted, trust
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -162,5 +164,8 @@ def test_a_match_that_is_given_up_waits_for_no_guest() -> None:
 )
 def test_a_guest_that_does_not_start_says_why(command: list[str], error: str, tmp_path: Path) -> None:
     invitation = Invitation(log=tmp_path / "guest.log")
+    with pytest.raises(Untrusted), invited(None, invitation, command=command):
+        pass
+    trust(shlex.join(command))
     with pytest.raises(GameError, match=error), invited(None, invitation, command=command):
         pass

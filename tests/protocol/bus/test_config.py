@@ -121,7 +121,7 @@ def test_with_tls_a_router_may_listen_anywhere(tls: TlsFiles) -> None:
     ("broken", "content", "text"),
     [
         ("ca", None, "cannot read the TLS ca {}: No such file or directory"),
-        ("certificate", "hello", "the TLS certificate {} holds no certificate in PEM"),
+        ("certificate", "hello", "the TLS certificate {} holds no certificate in PEM: is the file whole?"),
         ("key", "-----BEGIN CERTIFICATE-----", "the TLS key {} holds no private key in PEM"),
         ("key", "-----BEGIN PRIVATE KEY-----", "the TLS key {} cannot be read: is the file whole?"),
         (
