@@ -11,8 +11,15 @@ from bench.results import Machine, Results, Series
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 MACHINE = Machine(cpu="a quick one", cores=2, memory_gb=8, system="Linux", python="3.11.9")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave the rows of the doors out where no long test is asked for: to list them takes each worker five seconds."""
+    is_short = config.getoption("markexpr") == "not slow"
+    return True if is_short and collection_path.name == "test_door_rows.py" else None
 
 
 @pytest.fixture
