@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +12,7 @@ from khala.experiment.job import Job
 from khala.minds import groups_of, share_budget
 from khala.spending import paid_usd
 from khala_orchestrator.fork import advice_of, write_beginning
+from khala_protocol.files import make_private
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 
@@ -96,16 +99,25 @@ class Plan:
         return (minds for _, minds, _ in groups_of(self.trunk.config.task, self.minds))
 
     def forks(self, step: int, times: int) -> list[Fork]:
-        """Return forks at a step, in directories that are not there yet.
+        """Return forks at a step, each in a new directory.
 
         Raises:
             KhalaError: there is no such step, or the advice or the memory is wrong.
         """
-        first = 1 + max((int(path.name.rpartition("-")[2]) for path in self.out.glob(f"fork-{step}-[0-9]*")), default=0)
-        return [self._fork(step, number) for number in range(first, first + times)]
+        return [self._fork(step) for _ in range(times)]
 
-    def _fork(self, step: int, number: int) -> Fork:
-        directory = f"fork-{step}-{number}"
+    def _reserve(self, step: int) -> str:
+        """Make a directory that no other process has, and return its name."""
+        make_private(self.out)
+        first = 1 + max((int(path.name.rpartition("-")[2]) for path in self.out.glob(f"fork-{step}-[0-9]*")), default=0)
+        for number in itertools.count(first):
+            with contextlib.suppress(FileExistsError):
+                (self.out / f"fork-{step}-{number}").mkdir(mode=0o700)
+                break
+        return f"fork-{step}-{number}"
+
+    def _fork(self, step: int) -> Fork:
+        directory = self._reserve(step)
         run = f"{self.trunk.config.run[:LONGEST_NAME]}-{directory}"
         config = self.trunk.fork(step, run, memory=self.memory)
         config = config.model_copy(update={"record": self.out / directory / "recording.mcap"})
