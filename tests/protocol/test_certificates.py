@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import ssl
 import subprocess
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from khala_protocol.bus import certificate
 from khala_protocol.bus.config import BusConfig, check
@@ -128,6 +131,16 @@ def test_an_expired_certificate_is_refused_with_the_command_for_a_new_one(
     later -= timedelta(days=3750)
     with pytest.raises(BusError, match=r"is valid from .* on: is the clock here right"):
         check(BusConfig(tls=files))
+
+
+def test_a_certificate_with_a_serial_number_below_zero_is_none(keys: Path) -> None:
+    path = files_of(keys, "host").certificate
+    found = x509.load_pem_x509_certificate(path.read_bytes())
+    serial = found.serial_number.to_bytes((found.serial_number.bit_length() + 8) // 8, "big")
+    der = found.public_bytes(Encoding.DER).replace(serial, bytes([serial[0] | 0x80]) + serial[1:])
+    path.write_text(ssl.DER_cert_to_PEM_cert(der))
+    with pytest.raises(BusError, match="holds no certificate in PEM: is the file whole"):
+        certificate.read(path)
 
 
 def test_what_cannot_be_made_is_refused(keys: Path, tmp_path: Path) -> None:

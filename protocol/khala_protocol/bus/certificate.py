@@ -6,12 +6,14 @@ them, shows them. Only these two know a library for them.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from cryptography.utils import CryptographyDeprecationWarning
 from cryptography.x509.oid import NameOID
 
 from khala_protocol.errors import BusError
@@ -101,8 +103,11 @@ def read(path: Path, what: str = "certificate") -> Certificate:
     Raises:
         BusError: the file cannot be read, or holds none.
     """
+    content = _bytes(path, what)
     try:
-        found = x509.load_pem_x509_certificate(_bytes(path, what))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", CryptographyDeprecationWarning)  # refused by later releases of the library
+            found = x509.load_pem_x509_certificate(content)
         names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
         name = str(names[0].value) if names else ""
         return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
@@ -112,6 +117,7 @@ def read(path: Path, what: str = "certificate") -> Certificate:
         x509.InvalidVersion,
         x509.DuplicateExtension,
         x509.UnsupportedGeneralNameType,
+        CryptographyDeprecationWarning,
     ):  # parsed when asked for
         raise BusError(f"the TLS {what} {path} holds no certificate in PEM: is the file whole?") from None
 
