@@ -6,6 +6,7 @@ them, shows them. Only these two know a library for them.
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -20,6 +21,7 @@ from khala_protocol.errors import BusError
 from khala_protocol.files import MB, read_limited
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 DAY = timedelta(days=1)
@@ -103,23 +105,11 @@ def read(path: Path, what: str = "certificate") -> Certificate:
     Raises:
         BusError: the file cannot be read, or holds none.
     """
-    content = _bytes(path, what)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", CryptographyDeprecationWarning)  # refused by later releases of the library
-            found = x509.load_pem_x509_certificate(content)
+    with _broken_refused(path, what):
+        found = x509.load_pem_x509_certificate(_bytes(path, what))
         names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
         name = str(names[0].value) if names else ""
         return Certificate(path, name, _hosts(found), found.not_valid_before_utc, found.not_valid_after_utc)
-    except (
-        ValueError,
-        TypeError,
-        x509.InvalidVersion,
-        x509.DuplicateExtension,
-        x509.UnsupportedGeneralNameType,
-        CryptographyDeprecationWarning,
-    ):  # parsed when asked for
-        raise BusError(f"the TLS {what} {path} holds no certificate in PEM: is the file whole?") from None
 
 
 def check_valid(path: Path, what: str = "certificate") -> None:
@@ -149,8 +139,28 @@ def check_key(path: Path, certificate: Path) -> None:
         key = load_pem_private_key(text, password=None)
     except (ValueError, TypeError):
         raise BusError(f"the TLS key {path} cannot be read: is the file whole?") from None
-    if key.public_key() != x509.load_pem_x509_certificate(_bytes(certificate, "certificate")).public_key():
+    with _broken_refused(certificate, "certificate"):
+        certified = x509.load_pem_x509_certificate(_bytes(certificate, "certificate")).public_key()
+    if key.public_key() != certified:
         raise BusError(f"the TLS key {path} is not that of the certificate {certificate}: copy both again")
+
+
+@contextlib.contextmanager
+def _broken_refused(path: Path, what: str) -> Iterator[None]:
+    """Refuse what the library cannot parse, now or in later releases; it finds out when a part is asked for."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", CryptographyDeprecationWarning)
+            yield
+    except (
+        ValueError,
+        TypeError,
+        x509.InvalidVersion,
+        x509.DuplicateExtension,
+        x509.UnsupportedGeneralNameType,
+        CryptographyDeprecationWarning,
+    ):
+        raise BusError(f"the TLS {what} {path} holds no certificate in PEM: is the file whole?") from None
 
 
 def _bytes(path: Path, what: str) -> bytes:
