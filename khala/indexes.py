@@ -102,19 +102,6 @@ def faults(path: Path) -> Iterator[None]:
         raise
 
 
-@contextlib.contextmanager
-def transaction(db: sqlite3.Connection) -> Iterator[None]:
-    """Write all or nothing."""
-    db.execute("begin immediate")
-    try:
-        yield
-        db.execute("commit")
-    except BaseException:
-        with contextlib.suppress(sqlite3.Error):  # SQLite has rolled back by itself if the disk is full
-            db.execute("rollback")
-        raise
-
-
 def _statements(schema: str) -> list[str]:
     return [statement.strip() for statement in schema.split(";") if statement.strip()]
 

@@ -18,6 +18,7 @@ from khala import indexes
 from khala.experiment.measures import CallCount, Measures
 from khala.experiment.plan import FACTOR
 from khala.experiment.played import Played
+from khala_protocol.transaction import transaction
 
 if TYPE_CHECKING:
     import sqlite3
@@ -92,7 +93,7 @@ def add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
     values = [getattr(played, name) for name in Played.__slots__]
     plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
     names = list(result_columns())
-    with indexes.transaction(index):
+    with transaction(index):
         for table in ("results", "calls"):
             index.execute(f"delete from {table} where match = ?", (played.key,))  # noqa: S608
         index.execute(f"insert or replace into matches values {_places(plain)}", plain)  # noqa: S608  # question marks

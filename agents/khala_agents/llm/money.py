@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Self
 
 from khala_agents.llm.client import LimitExceeded
 from khala_protocol.errors import ConfigError
+from khala_protocol.transaction import transaction
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
@@ -116,13 +117,8 @@ class Ledger:
         try:
             if self._database is None:
                 self._database = self._open()
-            self._database.execute("begin immediate")
-            try:
+            with transaction(self._database):
                 yield self._database
-            except BaseException:
-                self._database.execute("rollback")
-                raise
-            self._database.execute("commit")
         except (sqlite3.Error, OSError) as error:
             fault = f"this ledger of what was spent cannot be kept, and no model is asked without it ({error}): remove "
             fault += "it if you know what was spent, or record elsewhere with --out"
