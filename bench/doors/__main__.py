@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, get_args
 
 import bench.doors
 from bench.doors.commands import missing
+from bench.doors.ending import end_on_sigterm
 from bench.doors.registry import DOORS, load_rows
 from bench.doors.rows import Kind
 from bench.tables import print_table
@@ -104,4 +105,5 @@ def summary(played: Sequence[tuple[Row, Outcome]]) -> str:
 
 
 if __name__ == "__main__":
+    end_on_sigterm()
     sys.exit(main())

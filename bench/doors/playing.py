@@ -9,11 +9,11 @@ import multiprocessing
 import tempfile
 import time
 import traceback
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bench.doors.ending import end_on_sigterm
 from bench.doors.registry import load_rows
 from bench.doors.rows import Skipped
 
@@ -76,11 +76,11 @@ def play_all(rows: Sequence[Row], numbers: Sequence[int], jobs: int) -> Iterator
         return
     # rows hold functions that cannot be sent, so each process loads them; a session of Zenoh survives no fork
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        playing = {pool.submit(_play_row, rows[number].door, rows[number].what): number for number in numbers}
-        for done in as_completed(playing):
-            yield playing[done], done.result()
+    with context.Pool(jobs, initializer=end_on_sigterm) as pool:  # ends its processes when it is left
+        chosen = [(number, rows[number].door, rows[number].what) for number in numbers]
+        yield from pool.imap_unordered(_play_row, chosen)
 
 
-def _play_row(door: str, what: str) -> Outcome:
-    return play(next(row for row in load_rows(door) if (row.door, row.what) == (door, what)))
+def _play_row(given: tuple[int, str, str]) -> tuple[int, Outcome]:
+    number, door, what = given
+    return number, play(next(row for row in load_rows(door) if (row.door, row.what) == (door, what)))

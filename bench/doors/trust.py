@@ -130,7 +130,7 @@ async def _at_the_command(
     try:
         async with asyncio.timeout(PATIENCE_S):
             said, _ = await process.communicate()
-    except TimeoutError:
+    except (TimeoutError, asyncio.CancelledError):
         process.terminate()
         said, _ = await process.communicate()
     if (directory / "it-ran").exists():

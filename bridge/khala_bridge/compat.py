@@ -98,9 +98,10 @@ def protobuf_kind() -> str:
 
 with old_shuffle(), quiet_pygame(), late_video(), warnings.catch_warnings():
     warnings.simplefilter("ignore")
+    import portpicker
     from pysc2 import run_configs
     from pysc2.env import environment, lan_sc2_env, sc2_env
-    from pysc2.lib import actions, buffs, features, point, portspicker, protocol, remote_controller, units, upgrades
+    from pysc2.lib import actions, buffs, features, point, protocol, remote_controller, units, upgrades
     from pysc2.maps import lib as maps
 
 __all__ = [
@@ -113,7 +114,7 @@ __all__ = [
     "maps",
     "old_shuffle",
     "point",
-    "portspicker",
+    "portpicker",
     "protobuf_kind",
     "protocol",
     "quiet_pygame",

@@ -29,7 +29,7 @@ from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 TOKEN: Final = "token"  # noqa: S105  # its name in the address
 MOST_BODY_BYTES: Final = 16_384
@@ -170,7 +170,7 @@ class Door:
         if not (self.token or self.password) or head.path in self.open_paths:
             return None
         scheme, credential = _authorization(head)
-        given = [*_cookies(head, self.cookie), *parse_qs(head.query).get(TOKEN, ()), credential]
+        given = [*cookies(head.all("cookie"), self.cookie), *parse_qs(head.query).get(TOKEN, ()), credential]
         # the token cannot be guessed, so whoever has it never waits for what others try
         if self.token and any(is_same(secret, self.token) for secret in given):
             return None
@@ -218,19 +218,20 @@ def host_of(header: str) -> str:
     return (name if port.isdigit() else header).casefold().removeprefix("[").removesuffix("]")
 
 
-def is_same(given: str, right: str) -> bool:
-    """Return whether two secrets are the same, in a time that does not tell how much of them is."""
-    return hmac.compare_digest(given.encode("utf-8", "surrogateescape"), right.encode())
-
-
-def _cookies(head: RequestHead, name: str) -> Iterator[str]:
-    for header in head.all("cookie"):
+def cookies(headers: Iterable[str], name: str) -> Iterator[str]:
+    """Yield the values of a cookie in the `Cookie` headers of a request; a malformed header has none."""
+    for header in headers:
         try:
             found = SimpleCookie(header).get(name)
         except CookieError:
             continue
         if found is not None:
             yield found.value
+
+
+def is_same(given: str, right: str) -> bool:
+    """Return whether two secrets are the same, in a time that does not tell how much of them is."""
+    return hmac.compare_digest(given.encode("utf-8", "surrogateescape"), right.encode())
 
 
 def _authorization(head: RequestHead) -> tuple[str, str]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 from functools import partial
-from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Annotated, Final
 
 from mcp.server.mcpserver import Context, Image, MCPServer
@@ -18,6 +17,7 @@ from mcp.types import ToolAnnotations
 from pydantic import Field
 
 from khala import __version__
+from khala.doors.rules import cookies
 from khala.mcp.holder import Holder
 from khala.mcp.words import briefing_page, instructions, page, step_line
 from khala_bridge.knowledge.lookup import find, long
@@ -184,10 +184,8 @@ def client_of(headers: Mapping[str, str]) -> str:
     """Return what names the client of a request: its session, or its cookie; "" if it has neither."""
     if session := headers.get(SESSION):
         return f"session {session}"
-    cookies = SimpleCookie()
-    with contextlib.suppress(CookieError):
-        cookies.load(headers.get("cookie", ""))
-    return f"cookie {cookies[CLIENT].value}" if CLIENT in cookies else ""
+    cookie = next(cookies([headers.get("cookie", "")], CLIENT), "")
+    return cookie and f"cookie {cookie}"
 
 
 @contextlib.contextmanager

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from absl import flags
 
 from khala_bridge.compat import maps, sc2_env
+from khala_bridge.game.ports import pick_port, pick_ports
 from khala_bridge.game.processes import environment_of, explained, new_process, pointed_to, settle_flags
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
     """Who the opponent says it is; "" if the task knows it."""
     forfeit: Forfeit | None = None
     """How the opponent went away."""
+    _ports: list[int]
     _is_alone = False
     """Whether its process is one that any game for one player can use."""
     _processes: Processes | None = None
@@ -49,12 +51,17 @@ class Env(sc2_env.SC2Env):  # type: ignore[misc]  # PySC2 is untyped
         draws = any(interface.HasField("render") for interface in self._interface_options)
         if self._num_agents > 1 or draws:  # several players have ports in their command lines
             self._run_config.env = environment_of(self._run_config, self._config.environment)
-            super()._launch_game()
+            self._ports = pick_ports(2 * self._num_agents) if self._num_agents > 1 else []
+            self._sc2_procs = [
+                self._run_config.start(extra_ports=self._ports, want_rgb=interface.HasField("render"), port=pick_port())
+                for interface in self._interface_options
+            ]
+            self._controllers = [process.controller for process in self._sc2_procs]
             return
         process = self._processes and self._processes.take(self._config.sc2path)
         process = process or new_process(self._config.sc2path, self._config.environment)
         self._is_alone = True
-        self._ports: list[int] = []
+        self._ports = []
         self._sc2_procs = [process]
         self._controllers = [process.controller]
 

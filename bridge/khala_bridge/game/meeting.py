@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.compat import features, portspicker, run_configs, sc2_env
+from khala_bridge.compat import features, run_configs, sc2_env
 from khala_bridge.errors import GameError
 from khala_bridge.game.env import Env, started
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.lan import LanGame
 from khala_bridge.game.manners import LanPorts
+from khala_bridge.game.ports import pick_port, pick_ports
 from khala_bridge.game.processes import environment_of
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ class _MeetingEnv(Env):
         self._run_config.env = environment_of(self._run_config, self._config.environment)
         (interface,) = self._interface_options
         ports = list(self._lan_ports[2:])
-        process = self._run_config.start(extra_ports=ports, want_rgb=interface.HasField("render"))
+        draws = interface.HasField("render")
+        process = self._run_config.start(extra_ports=ports, want_rgb=draws, port=pick_port())
         self._sc2_procs, self._controllers = [process], [process.controller]
         process.controller._client._sock.settimeout(None)  # noqa: SLF001  # `Patience` says how long a step may take
 
@@ -104,7 +106,7 @@ class GuestEnv(_MeetingEnv):
         super().close()
 
     def _launch_game(self) -> None:
-        self._ports = portspicker.pick_contiguous_unused_ports(len(LanPorts._fields))
+        self._ports = pick_ports(len(LanPorts._fields))
         self._lan_ports = LanPorts(*self._ports)
         super()._launch_game()
 
@@ -112,7 +114,7 @@ class GuestEnv(_MeetingEnv):
         from khala_bridge.game.guest import Guest  # noqa: PLC0415  # aiohttp: 0.3 s, for guests alone
 
         (host,) = self._controllers
-        theirs = self._run_config.start(extra_ports=list(self._lan_ports[2:]), want_rgb=False)
+        theirs = self._run_config.start(extra_ports=list(self._lan_ports[2:]), want_rgb=False, port=pick_port())
         self._sc2_procs = [self._sc2_procs[0], theirs]
         self._guest = guest = Guest(theirs, self._lan_ports, self._config.opponent, self._invitation)
         data = self._maps[0].data(self._run_config)

@@ -17,6 +17,7 @@ from absl import flags
 from khala_bridge.compat import remote_controller, run_configs
 from khala_bridge.errors import GameError
 from khala_bridge.game.game import check_install
+from khala_bridge.game.ports import pick_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,7 +59,7 @@ class Launched:
         with pointed_to(sc2path), explained("the game could not be started"):
             run_config = run_configs.get()
             run_config.env = environment_of(run_config, environment)
-            self._process: Any = run_config.start(want_rgb=False, connect=False)
+            self._process: Any = run_config.start(want_rgb=False, connect=False, port=pick_port())
         self._sc2path = sc2path
         self._started_s = time.monotonic()
 
