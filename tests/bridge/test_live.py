@@ -134,7 +134,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
         pytest.param("MoveToBeacon", {"Marine": 1}, marks=pytest.mark.slow),
         ("smac_MMM", {"Marine": 7, "Marauder": 2, "Medivac": 1}),
         pytest.param("pvz_task4_level1", {"Stalker": 12}, marks=pytest.mark.slow),
-        ("Simple64", {"Probe": 12, "Base": 0}),
+        pytest.param("Simple64", {"Probe": 12, "Base": 0}, marks=pytest.mark.slow),
     ],
 )
 def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name: str, units: dict[str, int]) -> None:
@@ -145,7 +145,7 @@ def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name:
     assert battle.now.outcome is None
 
 
-@pytest.mark.parametrize("executor", ["raw", "screen"])
+@pytest.mark.parametrize("executor", ["raw", pytest.param("screen", marks=pytest.mark.slow)])
 def test_a_battle_is_played_to_its_end(executor: str, start: Play, finished: Battle) -> None:
     battle = finished if executor == "raw" else start(executor).to_the_end()
     assert battle.now.outcome in ("win", "loss")  # five against five do not last until the time is up
@@ -157,6 +157,7 @@ def test_a_battle_is_played_to_its_end(executor: str, start: Play, finished: Bat
     assert len(dead) >= 5
 
 
+@pytest.mark.slow
 def test_both_executors_give_the_same_orders(start: Play) -> None:
     battles = [start("raw"), start("screen")]
     for battle in battles:
@@ -174,6 +175,7 @@ def _orders(battle: Battle) -> dict[int, list[tuple[int, int]]]:
     return {u.tag: [(o.ability_id, o.target_unit_tag) for o in u.orders] for u in battle.now.own}
 
 
+@pytest.mark.slow
 def test_the_same_seed_and_replies_give_the_same_observations(start: Play, finished: Battle) -> None:
     assert start("raw").to_the_end().texts == finished.texts
 

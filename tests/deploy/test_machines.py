@@ -175,6 +175,7 @@ async def _host(first: Machine, *options: str, task: str = TASK) -> Command:
     return await first.khala("host", task, "--run", RUN, *where, "--json", *options)
 
 
+@pytest.mark.slow
 async def test_agents_of_another_machine_play_a_match(machines: tuple[Machine, Machine, Machine]) -> None:
     first, second, _ = machines
     agents = await _router_and_agents(first, second, latency_s=0)

@@ -154,6 +154,7 @@ def test_two_versions_differ_in_the_damage_of_types_that_the_patch_changed_only(
     assert [one.name for one in found.differences if all(map(same, one.name.split(" > ")))] == []
 
 
+@pytest.mark.slow
 def test_every_random_measurement_can_be_found_to_differ() -> None:
     """Holm's correction divides the level by their number, and a permutation test has a least p."""
     same = {str(i): (0, 1, 0, 1, 0, 1) for i in range(1, MOST_COMPARISONS)}

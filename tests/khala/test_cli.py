@@ -273,6 +273,7 @@ def decide(briefing, observation):
 PLAYED = ("run", "2s3z_pair", "--policy", "deadly:decide", "--max-steps", "5", "--max-wait", "20", "--json")
 
 
+@pytest.mark.slow
 @pytest.mark.game
 def test_a_process_that_is_killed_is_started_again_and_no_step_is_lost(tmp_path: Path) -> None:
     (tmp_path / "deadly.py").write_text(DEADLY.format(always=False))

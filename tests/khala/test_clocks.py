@@ -20,6 +20,7 @@ pytestmark = pytest.mark.game
 SPEED = 8.0
 
 
+@pytest.mark.slow
 async def test_the_tokens_of_a_match_and_not_the_time_they_took_decide_it(tmp_path: Path) -> None:
     (row,) = await measure("2s3z_pair", [1], tmp_path, rules=("token",), max_steps=4)
     assert row.violations() == []

@@ -124,6 +124,7 @@ async def test_no_unit_that_the_fog_hides_is_under_a_key_of_the_other_side(tmp_p
     assert not tags["blue"] & tags["red"]
 
 
+@pytest.mark.slow
 async def test_a_recorded_duel_plays_again_byte_for_byte(duel: Recording) -> None:
     assert await replay_host(duel.path) == []
 

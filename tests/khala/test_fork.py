@@ -72,6 +72,7 @@ def seen_in(recording: Recording, steps: range) -> list[bytes]:
 # --- on the simulator -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.game
 async def test_the_recorded_future_comes_about_again(golden: Trunk, tmp_path: Path) -> None:
     again = await repeated(golden, tmp_path, game="simulator")

@@ -40,6 +40,7 @@ def evaluated(name: str, tmp_path: Path, *, answers: str = "skilled", **given: o
     return read_eval_log(str(path))
 
 
+@pytest.mark.slow
 @game
 def test_a_model_plays_all_agents_of_a_side_and_is_scored(tmp_path: Path) -> None:
     from inspect_ai.event import InfoEvent, ModelEvent

@@ -136,6 +136,7 @@ async def check_resources(client: Client, observed: CallToolResult) -> None:
     assert seen.text.startswith("Game\n    Time: 0:00")
 
 
+@pytest.mark.slow
 @game
 async def test_what_cannot_be_done_is_said_with_what_can_and_another_episode_is_played() -> None:
     async with client_of(table(STALKERS, max_steps=1, episodes=2)) as client:
@@ -162,6 +163,7 @@ async def test_what_cannot_be_done_is_said_with_what_can_and_another_episode_is_
         assert (await said(client, "observe")).startswith("The match is over.")
 
 
+@pytest.mark.slow
 @game
 async def test_a_player_that_was_too_slow_must_look_before_it_answers() -> None:
     slow = table(STALKERS, hurried=True, max_wait_s=1.0, max_steps=2)

@@ -132,6 +132,7 @@ async def test_a_second_client_is_refused_and_is_briefed_once_it_may_play(
             assert "Observation of step 2" in await said(second, "act", reply="")
 
 
+@pytest.mark.slow
 @game
 async def test_a_client_of_an_older_protocol_that_ends_its_session_frees_the_seat_at_once(
     capsys: pytest.CaptureFixture[str],

@@ -63,6 +63,7 @@ class Looking(Policy):
         return f"Actions:\n{teams}"
 
 
+@pytest.mark.slow
 async def test_a_battle_with_pictures_is_recorded_and_replayed_to_the_pixel(tmp_path: Path) -> None:
     config = MatchConfig(task=task_with_pictures(), run="live", record=tmp_path / "r.mcap")
     assert config.task.render_px == 256

@@ -52,6 +52,7 @@ async def test_the_agents_say_what_they_said_then(replay_agents: Replay) -> None
     assert await replay_agents(GOLDEN) == []
 
 
+@pytest.mark.slow
 async def test_another_reply_leads_to_another_observation(replay_host: Replay, tmp_path: Path) -> None:
     def change(message: Wire) -> Wire:
         if isinstance(message, Reply) and message.step == 3:
@@ -63,6 +64,7 @@ async def test_another_reply_leads_to_another_observation(replay_host: Replay, t
     assert "in episode 0, step 4: recorded …" in str(first)
 
 
+@pytest.mark.slow
 async def test_another_seed_is_noticed_by_its_first_difference(replay_host: Replay, tmp_path: Path) -> None:
     def change(message: Wire) -> Wire:
         return message.model_copy(update={"seed": 2}) if isinstance(message, Run) else message

@@ -34,7 +34,8 @@ def test_there_are_33_of_them() -> None:
     assert scenarios("pvz_task8*") == ["pvz_task8_level1", "pvz_task8_level2", "pvz_task8_level3"]
 
 
-@pytest.mark.parametrize("task", [SHORT[0], *(pytest.param(task, marks=pytest.mark.slow) for task in SHORT[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("task", SHORT)
 def test_the_skilled_player_wins(task: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     row = played(task, "skilled", tmp_path, monkeypatch)
     assert row.outcomes == {"win": 1}

@@ -86,6 +86,7 @@ async def test_a_turn_asks_all_agents_of_the_caller_and_reports_what_became_of_t
         assert again.reports == ()
 
 
+@pytest.mark.slow
 @game
 async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
     asked = config("duel_3m", max_steps=3)

@@ -78,12 +78,20 @@ def files() -> tuple[Path, ...]:
 
 def in_code(file: Path, source: str) -> Iterator[Mention]:
     """The docstrings and comments of a module."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            yield Mention(file, node.body[0].lineno if node.body else 1, ast.get_docstring(node) or "")
+    yield from documented(file, ast.parse(source))
     for number, line in enumerate(source.splitlines(), start=1):
         if "#" in line:
             yield Mention(file, number, line.partition("#")[2])
+
+
+def documented(file: Path, node: ast.AST) -> Iterator[Mention]:
+    """The docstrings of a node and of what is defined within its statements; expressions are not looked at."""
+    if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+        yield Mention(file, node.body[0].lineno if node.body else 1, ast.get_docstring(node) or "")
+    for part in ("body", "orelse", "handlers", "finalbody"):
+        inside = getattr(node, part, ())
+        for statement in inside if isinstance(inside, list) else ():
+            yield from documented(file, statement)
 
 
 @functools.cache
@@ -157,6 +165,7 @@ def stale(mention: Mention) -> list[str]:
     )
 
 
+@pytest.mark.slow  # it imports every module that is named
 def test_what_is_named_exists() -> None:
     found = [
         f"{mention.file.relative_to(ROOT)}:{mention.line}: {name}" for mention in mentions() for name in stale(mention)

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 def kind(name: str) -> object:
-    """Return the kind of an action: one of each function and subject, with and without rule, stands for the others."""
+    """Return the kind of an action: one of each function of PySC2 stands for the others."""
     action = cases()[name].action
-    return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind
+    return action.pysc2.kind if action.pysc2 else None
 
 
 @pytest.mark.parametrize("group", by_caster(lambda name: not reason(name, BY_SCREEN), kind))

@@ -80,6 +80,7 @@ def test_it_has_what_the_player_does_not_see(game: PySC2Game) -> None:
     assert not any(unit.is_remembered for unit in whole.known.values())
 
 
+@pytest.mark.slow
 def test_no_byte_of_what_a_player_is_told_depends_on_it(sc2path: Path) -> None:
     with started(sc2path) as game:
         without = observations(game, lambda: None)
@@ -149,6 +150,7 @@ def test_a_game_that_dies_of_it_is_an_error(game: PySC2Game) -> None:
         game.whole()
 
 
+@pytest.mark.slow
 def test_there_is_none_of_a_game_that_is_over(sc2path: Path) -> None:
     with started(sc2path, "2s3z") as game:
         game.reset()

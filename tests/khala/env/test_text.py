@@ -105,6 +105,7 @@ def test_an_episode_follows_in_the_same_match_and_a_picture_shows_it(pair: TextP
     assert {info["observation"].episode for info in infos.values()} == {1}
 
 
+@pytest.mark.slow
 @game
 def test_new_matches_share_a_process_and_are_those_of_new_processes() -> None:
     env, read = words.parallel_env("2s3z", max_cycles=3), list[list[str]]()
@@ -133,6 +134,7 @@ def test_an_environment_that_is_dropped_ends_its_match_and_its_game() -> None:
     process.wait(10)
 
 
+@pytest.mark.slow
 @game
 def test_one_side_is_played_against_another_that_a_script_plays() -> None:
     env = words.parallel_env("duel_3m", agents=["red/Captain"], others="focus-fire", max_cycles=2)

@@ -78,6 +78,7 @@ async def test_a_team_plays_over_a_websocket_what_the_host_recorded(serving: Ser
     assert [one.text for one in recording.of(Reply, agent="Zealots")][:1] == [skilled(first.agents["Zealots"].text)]
 
 
+@pytest.mark.slow
 async def test_one_agent_plays_and_others_decide_for_the_rest(serving: Serving) -> None:
     async with serving() as address, KhalaEnv(address) as env:
         first = await env.reset(seed=1, agents=["Stalkers"], others="silent", max_steps=2)
@@ -96,6 +97,7 @@ async def test_one_agent_plays_and_others_decide_for_the_rest(serving: Serving) 
             await env.step(KhalaAction(reply=""))
 
 
+@pytest.mark.slow
 async def test_sessions_are_apart_seeded_and_no_more_than_the_server_has(serving: Serving) -> None:
     options = {"seed": 5, "task": "2s3z", "max_steps": 3}
     async with (

@@ -105,6 +105,7 @@ def test_a_stranger_sees_who_plays_and_who_wins(context: BrowserContext, golden:
     assert asked_hosts(page) == {golden.origin}
 
 
+@pytest.mark.slow
 def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: BrowserContext, golden: Viewer) -> None:
     page = opened(context, golden.address)
     page.get_by_role("slider", name="Moment").focus()
@@ -121,6 +122,7 @@ def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: Brow
     page.wait_for_function("() => location.hash.includes('s=20')")
 
 
+@pytest.mark.slow
 def test_a_link_holds_though_the_address_is_written_over_before_the_page_hears_of_it(
     context: BrowserContext, golden: Viewer
 ) -> None:
@@ -133,6 +135,7 @@ def test_a_link_holds_though_the_address_is_written_over_before_the_page_hears_o
     page.wait_for_selector("canvas[data-step='9']")
 
 
+@pytest.mark.slow
 def test_play_moves_the_clock_to_the_end_and_stops_there(context: BrowserContext, golden: Viewer) -> None:
     page = opened(context, golden.address)
     page.get_by_label("Speed").select_option(label="×16")
@@ -162,6 +165,7 @@ def test_what_stands_on_the_page_is_what_the_recording_says(context: BrowserCont
         assert units == json.loads(scenes[step].model_dump_json())["units"]
 
 
+@pytest.mark.slow
 def test_two_runs_stand_on_one_clock(context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path) -> None:
     for name in ("a", "b"):
         shutil.copy(GOLDEN, tmp_path / f"{name}.mcap")
@@ -170,6 +174,7 @@ def test_two_runs_stand_on_one_clock(context: BrowserContext, view: Callable[...
     assert re.search(r"#a=\w+&b=\w+", page.url) or "b=" in page.url
 
 
+@pytest.mark.slow
 def test_a_list_of_runs_leads_to_a_match(context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path) -> None:
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
@@ -260,6 +265,7 @@ def test_everybody_can_read_and_reach_it(browser: Browser, golden: Viewer, schem
     context.close()
 
 
+@pytest.mark.slow
 def test_the_keyboard_alone_reaches_everything(context: BrowserContext, golden: Viewer) -> None:
     page = opened(context, golden.address)
     reached = set()

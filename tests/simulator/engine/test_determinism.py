@@ -71,7 +71,7 @@ def by_lot(name: str, loops: int, hash_seed: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["MMM2", "Simple64"])
+@pytest.mark.parametrize("name", ["MMM2", pytest.param("Simple64", marks=pytest.mark.slow)])
 def test_random_orders_of_every_kind_break_nothing_and_end_the_same_in_two_processes(name: str) -> None:
     assert by_lot(name, 150, "1") == by_lot(name, 150, "2")
 

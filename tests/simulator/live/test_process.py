@@ -69,7 +69,11 @@ async def test_the_data_version_of_the_command_line_is_told(launch: Launch, port
 
 
 @pytest.mark.parametrize(
-    "how", ["quit", pytest.param("SIGTERM", marks=pytest.mark.slow), "SIGTERM in a step", "SIGTERM in a LAN wait"]
+    "how",
+    [
+        "quit",
+        *(pytest.param(f"SIGTERM{when}", marks=pytest.mark.slow) for when in ("", " in a step", " in a LAN wait")),
+    ],
 )
 async def test_the_process_ends_at_once(launch: Launch, port: int, how: str) -> None:
     process = launch(port)

@@ -15,15 +15,14 @@ pytestmark = pytest.mark.game
 
 SHORT = [
     "tests.ping_test.TestPing.test_ping",
+    "tests.obs_spec_test.TestObservationSpec.test_observation_matches_obs_spec",
+]
+SLOW = [
     "tests.protocol_error_test.TestProtocolError.test_error",
     "tests.general_actions_test.TestGeneralActions.test_general_actions",
     "tests.render_test.TestRender.test_render",
     "tests.step_mul_override_test.StepMulOverrideTest.test_respects_override",
     "tests.obs_test.ObsTest.test_camera_movement_delay",
-    "tests.obs_spec_test.TestObservationSpec.test_observation_matches_obs_spec",
-]
-"""One for each part of the API that PySC2 tests by itself, but games over LAN, which `test_python_sc2` plays."""
-SLOW = [
     "tests.protocol_error_test.TestProtocolError.test_replay_a_replay",
     "tests.debug_test.DebugTest.test_multi_player",
     "tests.versions_test.TestVersions.test_version_numbers",

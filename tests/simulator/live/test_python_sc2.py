@@ -28,6 +28,7 @@ def play(game: str, directory: Path) -> dict[str, Any]:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sc2", "no_process_left")
 def test_a_bot_settles_on_a_melee_map(tmp_path: Path) -> None:
     seen = play("melee", tmp_path)
