@@ -1,4 +1,6 @@
-"""Build the compiled systems, where there is a C compiler; without one the simulator plays in numpy.
+"""Compile the rules of the engine, where there is a C compiler; without one the interpreter plays them.
+
+A rule is compiled if a file of its name with the suffix ``.pxd`` stands beside it.
 
 ``KHALA_ENGINE=compiled`` in the environment makes a failed build an error, ``KHALA_ENGINE=python`` builds nothing.
 """
@@ -14,17 +16,19 @@ from pathlib import Path
 from setuptools import Extension, setup
 
 ENGINE = os.environ.get("KHALA_ENGINE") or "auto"
-MEMBERS = sorted(Path("khala_simulator/compiled").glob("*.pyx"))
+PACKAGE = Path("khala_simulator")
 # Products and sums are rounded one by one, as numpy does, and square roots set no errno.
 FLAGS = ["/O2"] if sys.platform == "win32" else ["-O2", "-g0", "-ffp-contract=off", "-fno-math-errno", "-w"]
 DIRECTIVES = {
     "language_level": 3,
-    "boundscheck": False,
-    "wraparound": False,
+    "boundscheck": True,  # of lists and tuples; memory is read by pointers, which nothing checks
+    "wraparound": True,
     "cdivision": True,
     "initializedcheck": False,
     "binding": False,
     "embedsignature": False,
+    "infer_types": True,
+    "annotation_typing": False,  # a rule's annotations are for readers and type checkers; its .pxd has the types of C
 }
 
 
@@ -35,6 +39,14 @@ def compiler() -> str | None:
     return shutil.which((os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0])
 
 
+def members() -> list[Path]:
+    """Return the files to be compiled: kernels, and rules that have a ``.pxd``."""
+    kernels = set(PACKAGE.rglob("*.pyx"))
+    rules = {types.with_suffix(".py") for types in PACKAGE.rglob("*.pxd")}
+    taken = {kernel.with_suffix(".py") for kernel in kernels}
+    return sorted(kernels | {rule for rule in rules - taken if rule.exists()})
+
+
 def extensions() -> list[Extension]:
     """Return the modules to be compiled: none without a compiler."""
     if ENGINE == "python" or not (compiler() or ENGINE == "compiled"):
@@ -43,6 +55,11 @@ def extensions() -> list[Extension]:
     import numpy as np  # noqa: PLC0415  # only what compiles needs these two
     from Cython.Build import cythonize  # noqa: PLC0415
 
+    sys.path.insert(0, str(Path.cwd()))
+    from khala_simulator.native import declare  # noqa: PLC0415  # it reads the columns of a world
+
+
+    declare.write()
     modules = [
         Extension(
             ".".join(member.with_suffix("").parts),
@@ -52,7 +69,7 @@ def extensions() -> list[Extension]:
             extra_compile_args=FLAGS,
             optional=ENGINE != "compiled",
         )
-        for member in MEMBERS
+        for member in members()
     ]
     jobs = os.cpu_count() or 1
     return list(cythonize(modules, compiler_directives=DIRECTIVES, nthreads=jobs if sys.platform == "linux" else 0))

@@ -2,3 +2,7 @@
 
 It stands alone: it imports no other package of this project, and no other package imports it.
 """
+
+from khala_simulator.native.engine import choose
+
+choose()

@@ -68,14 +68,15 @@ def strikes(world: World, sight: Sight) -> Strikes:
 
 def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlight | None:
     """Return the missiles that a player sees now, None if there are none."""
-    if not len(world.missiles):
+    missiles = world.missiles
+    if not missiles:
         return None
-    rows = world.missiles.rows
-    pos = rows["pos"]
-    seen = np.ones(len(rows), np.bool_) if through_fog else sees(world, player, pos)
-    owner = rows["owner"][seen]
+    pos = np.array([(missile.x, missile.y) for missile in missiles])
+    goal = np.array([(missile.shot.goal_x, missile.shot.goal_y) for missile in missiles])
+    seen = np.ones(len(missiles), np.bool_) if through_fog else sees(world, player, pos)
+    owner = np.array([missile.shot.owner for missile in missiles])[seen]
     told = np.where(owner == NEUTRAL, API_NEUTRAL, owner)
-    return InFlight(pos[seen], rows["goal"][seen], told, alliance_of(owner, player))
+    return InFlight(pos[seen], goal[seen], told, alliance_of(owner, player))
 
 
 @functools.cache

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
 from khala_simulator.world.columns import NOBODY
@@ -19,13 +18,15 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from khala_simulator.native.columns import Columns
     from khala_simulator.tables.records import Affects, Search
     from khala_simulator.tables.stats import Damage
-    from khala_simulator.world.columns import Ints
     from khala_simulator.world.shots import Shot
     from khala_simulator.world.world import World
 
-BEHIND = 1e-9
+BEHIND: Final = 1e-9
+DAMAGE_MIN: Final = MECHANICS.damage_min
+ALL_ROUND_DEG: Final = 360.0
 
 IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {}
 """What a hit does to its target in addition to its damage, by the hit's effect: a function of the world, the attacker
@@ -35,14 +36,15 @@ IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {}
 def hit_with(world: World, shot: Shot) -> None:
     """Carry out one hit: on its target, in the rings around it, or on the units that a second search finds."""
     damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
-    if damage.hit.kills_self:
+    hit = damage.hit
+    if hit.kills_self:
         _give_life(world, shot.source)
-    elif damage.hit.search is not None and not damage.hit.bounce:
-        for slot in found_by(world, damage.hit.search, shot):
+    elif hit.search is not None and not hit.bounce:
+        for slot in found_by(world, hit.search, shot):
             strike(world, shot.source, shot.owner, slot, damage)
-    elif damage.hit.area:
+    elif hit.area:
         _splash(world, shot, damage)
-        if damage.hit.area_affects.not_target:
+        if hit.area_affects.not_target:
             hit_target(world, shot)
     else:
         hit_target(world, shot)
@@ -68,14 +70,22 @@ def _give_life(world: World, slot: int) -> None:
 
 def strike(world: World, source: int, owner: int, victim: int, damage: Damage, fraction: float = 1.0) -> None:
     """Take one hit's damage from one unit and count it in both players' scores."""
-    attributes = int(world.stats.attribute_bits[world.type[victim]])
-    amount = damage.against(attributes) * fraction
-    kind = "splash" if fraction < 1.0 else damage.hit.kind
+    c = columns.columns_of(world)
+    attributes = memory.ints(world.stats.attribute_bits)[c.type[victim]]
+    amount = _against(damage, attributes) * fraction
     if source != NOBODY:
-        if world.bonus_bits[source] & attributes:
-            amount += float(world.bonus_add[source]) * fraction
-        amount *= float(world.dealt_factor[source])
+        if c.bonus_bits[source] & attributes:
+            amount += c.bonus_add[source] * fraction
+        amount *= c.dealt_factor[source]
+    kind = "splash" if fraction < 1.0 else damage.hit.kind
     apply_damage(world, source, owner, victim, amount, kind=kind, ignores_armor=damage.hit.ignores_armor)
+
+
+def _against(damage: Damage, attributes: int) -> float:
+    """Return the damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
+    if not damage.bonus:
+        return damage.amount
+    return damage.amount + max([value for bit, value in damage.bonus if attributes & bit], default=0.0)
 
 
 def apply_damage(
@@ -101,35 +111,41 @@ def apply_damage(
         ignores_armor: Whether armor does not count.
         shield_bonus: More damage that only shields take.
     """
-    if not world.targetable[victim] or world.life[victim] <= 0.0 or amount <= 0.0 >= shield_bonus:
+    c = columns.columns_of(world)
+    if not c.targetable[victim] or c.life[victim] <= 0.0 or amount <= 0.0 >= shield_bonus:
         return
-    row, side = int(world.type[victim]), int(world.owner[victim])
-    answer = world.ranged_add if kind == "ranged" else world.melee_add if kind == "melee" else None
-    if answer is not None and answer[victim]:
-        amount = max(amount + float(answer[victim]), MECHANICS.damage_min)
-    amount *= float(world.taken_factor[victim])
-    if source != NOBODY and kind != "spell" and world.plane_bits[source] & AIR_PLANE:
-        amount *= float(world.air_taken_factor[victim])
-    if world.barrier[victim] > 0.0:
-        held = min(float(world.barrier[victim]), amount)
-        world.barrier[victim] -= held
+    side = c.owner[victim]
+    answer = c.ranged_add[victim] if kind == "ranged" else c.melee_add[victim] if kind == "melee" else 0.0
+    if answer != 0.0:
+        amount = max(amount + answer, DAMAGE_MIN)
+    amount *= c.taken_factor[victim]
+    if source != NOBODY and kind != "spell" and c.plane_bits[source] & AIR_PLANE:
+        amount *= c.air_taken_factor[victim]
+    if c.barrier[victim] > 0.0:
+        held = min(c.barrier[victim], amount)
+        c.barrier[victim] -= held
         amount -= held
-    shield_armor = 0.0 if ignores_armor else float(world.stats.shield_armor[side, row] + world.shield_armor_add[victim])
-    armor = 0.0 if ignores_armor else float(world.stats.armor[side, row] + world.armor_add[victim])
-    shields, life = float(world.shields[victim]), float(world.life[victim])
-    least = MECHANICS.damage_min if amount > 0.0 else 0.0
-    absorbed, rest = 0.0, amount
-    if shields > 0.0:
+    shield_armor = 0.0
+    armor = 0.0
+    if not ignores_armor:
+        numbers = world.stats
+        at = side * len(world.catalog.units) + c.type[victim]
+        shield_armor = memory.floats(numbers.shield_armor)[at] + c.shield_armor_add[victim]
+        armor = memory.floats(numbers.armor)[at] + c.armor_add[victim]
+    least = DAMAGE_MIN if amount > 0.0 else 0.0
+    absorbed = 0.0
+    rest = amount
+    if c.shields[victim] > 0.0:
         reduced = max(amount + shield_bonus - shield_armor, least)
-        absorbed = min(shields, reduced)
+        absorbed = min(c.shields[victim], reduced)
         rest = max(min(reduced, amount) - absorbed, 0.0)
-    wounded = min(life, max(rest - armor, least)) if rest > 0.0 else 0.0
-    world.shields[victim] = shields - absorbed
-    world.life[victim] = life - wounded
-    world.damaged_loop[victim] = world.loop
+    wounded = min(c.life[victim], max(rest - armor, least)) if rest > 0.0 else 0.0
+    c.shields[victim] -= absorbed
+    c.life[victim] -= wounded
+    c.damaged_loop[victim] = world.loop
     _count(world, owner, side, absorbed, wounded)
     if source != NOBODY:
-        world.attacker[victim] = source
+        c.attacker[victim] = source
         world.hurt.append((victim, source))
 
 
@@ -145,26 +161,37 @@ def _count(world: World, owner: int, side: int, absorbed: float, wounded: float)
 
 def _splash(world: World, shot: Shot, damage: Damage) -> None:
     """Damage every unit in the rings around the impact, with the fraction of its innermost ring."""
-    hit = damage.hit
-    near = affected(world, hit.area_affects, shot)
-    offset = world.pos[near] - shot.goal
-    edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
-    forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
-    bodies = zip(near.tolist(), edge.tolist(), world.radius[near].tolist(), offset.tolist(), strict=True)
-    for slot, distance, radius, (x, y) in bodies:
-        for ring in hit.area:
-            if distance <= ring.radius and in_arc(x, y, radius, *forward, ring.arc_deg):
-                strike(world, shot.source, shot.owner, slot, damage, ring.fraction)
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    affects = damage.hit.area_affects
+    rings = [(ring.radius, ring.fraction, ring.arc_deg) for ring in damage.hit.area]
+    widest = max([radius for radius, _, _ in rings])
+    forward_x = shot.goal_x - shot.start_x
+    forward_y = shot.goal_y - shot.start_y
+    for i in range(len(live)):
+        slot = slots[i]
+        x = c.pos[slot].x - shot.goal_x
+        y = c.pos[slot].y - shot.goal_y
+        edge = memory.length(x, y) - c.radius[slot]
+        if edge > widest or not touches(c, affects, shot, slot):
+            continue
+        for radius, fraction, arc_deg in rings:
+            if edge <= radius and in_arc(x, y, c.radius[slot], forward_x, forward_y, arc_deg):
+                strike(world, shot.source, shot.owner, slot, damage, fraction)
                 break
 
 
 def in_arc(x: float, y: float, radius: float, forward_x: float, forward_y: float, arc_deg: float) -> bool:
     """Return whether a body touches the sector of an arc, at most 180 degrees or all round, in the shot's direction."""
-    if arc_deg >= 360.0:
+    if arc_deg >= ALL_ROUND_DEG:
         return True
     length = math.hypot(forward_x, forward_y)
-    along, across = x * forward_x + y * forward_y, abs(x * forward_y - y * forward_x)
-    cosine, sine = math.cos(math.radians(arc_deg / 2.0)), math.sin(math.radians(arc_deg / 2.0))
+    along = x * forward_x + y * forward_y
+    across = abs(x * forward_y - y * forward_x)
+    half = math.radians(arc_deg / 2.0)
+    cosine = math.cos(half)
+    sine = math.sin(half)
     beyond = across * cosine - along * sine <= (radius + BEHIND) * length  # from the edge of the sector
     return (beyond and along * cosine + across * sine >= 0.0) or math.hypot(x, y) <= radius
 
@@ -174,43 +201,38 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
 
     The unit that the shot bounced from is not found again.
     """
-    near = affected(world, search.affects, shot)
-    forward = (shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1])
-    radius, origin = search.radius, shot.goal
-    if search.origin == "source":
-        radius += float(world.radius[shot.source]) if shot.source != NOBODY else 0.0
-        origin = shot.start
-    offset = world.pos[near] - origin
-    edge = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2) - world.radius[near]
-    order = np.argsort(edge, kind="stable").tolist()
-    found = [
-        int(near[i])
-        for i in order
-        if edge[i] <= radius
-        and near[i] != shot.prior
-        and in_arc(offset[i, 0], offset[i, 1], float(world.radius[near[i]]), *forward, search.arc_deg)
-    ]
-    return found[: search.max_count] if search.max_count else found
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    from_source = search.origin == "source"
+    origin_x = shot.start_x if from_source else shot.goal_x
+    origin_y = shot.start_y if from_source else shot.goal_y
+    reach = search.radius + (c.radius[shot.source] if from_source and shot.source != NOBODY else 0.0)
+    forward_x = shot.goal_x - shot.start_x
+    forward_y = shot.goal_y - shot.start_y
+    found = []
+    for i in range(len(live)):
+        slot = slots[i]
+        if slot == shot.prior or not touches(c, search.affects, shot, slot):
+            continue
+        x = c.pos[slot].x - origin_x
+        y = c.pos[slot].y - origin_y
+        edge = memory.length(x, y) - c.radius[slot]
+        if edge <= reach and in_arc(x, y, c.radius[slot], forward_x, forward_y, search.arc_deg):
+            found.append((edge, slot))
+    nearest = [slot for _, slot in sorted(found)]
+    return nearest[: search.max_count] if search.max_count else nearest
 
 
-def affected(world: World, affects: Affects, shot: Shot) -> Ints:
-    """Return the living units that a splash, a search or a sweep may touch."""
-    slots = world.live
-    chosen = world.targetable[slots] & (world.life[slots] > 0.0)
-    if not affects.allies:
-        chosen &= world.owner[slots] != shot.owner
-    if not affects.neutral:
-        chosen &= world.owner[slots] != 0
-    if affects.plane != "any":
-        bit = GROUND_PLANE if affects.plane == "ground" else AIR_PLANE
-        chosen &= (world.plane_bits[slots] & bit) != 0
-    if affects.only == "structure":
-        chosen &= world.walled[slots]
-    if affects.excluding == "structure":
-        chosen &= ~world.walled[slots]
-    if affects.not_self:
-        chosen &= slots != shot.source
-    if affects.not_target:
-        chosen &= slots != shot.target
-    found: Ints = slots[chosen]
-    return found
+def touches(c: Columns, affects: Affects, shot: Shot, slot: int) -> bool:
+    """Return whether a splash, a search or a sweep may touch a living unit."""
+    if not c.targetable[slot] or not c.life[slot] > 0.0:
+        return False
+    if not affects.allies and c.owner[slot] == shot.owner or not affects.neutral and c.owner[slot] == 0:
+        return False
+    if affects.only == "structure" and not c.walled[slot] or affects.excluding == "structure" and c.walled[slot]:
+        return False
+    if affects.not_self and slot == shot.source or affects.not_target and slot == shot.target:
+        return False
+    plane = affects.plane
+    return plane == "any" or c.plane_bits[slot] & (GROUND_PLANE if plane == "ground" else AIR_PLANE) != 0

@@ -7,12 +7,15 @@ fires.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING
 
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
     from khala_simulator.tables.records import Weapon
     from khala_simulator.world.world import World
 
@@ -24,14 +27,17 @@ def weapon_for(world: World, slot: int, target: int) -> int:
 
     A Colossus is on the ground and in the air: the better of the weapons that fit is aimed at it.
     """
-    planes, victim = int(world.plane_bits[target]), world.unit_type(target)
-    ground = int(world.ground_weapon[slot]) if planes & GROUND_PLANE else -1
-    air = int(world.air_weapon[slot]) if planes != GROUND_PLANE else -1
-    weapons = world.catalog.weapons
+    c = columns.columns_of(world)
+    planes = c.plane_bits[target]
+    ground = c.ground_weapon[slot] if planes & GROUND_PLANE else -1
+    air = c.air_weapon[slot] if planes != GROUND_PLANE else -1
     row = max(ground, air)
-    if min(ground, air) >= 0 and ground != air:
-        row = max((ground, air), key=lambda each: weapons[each].rate_against(victim))
-    return -1 if row >= 0 and weapons[row].excluding in victim.attributes else row
+    if row < 0:
+        return -1
+    weapons, victim = world.catalog.weapons, world.catalog.units[c.type[target]]
+    if ground >= 0 and air >= 0 and ground != air:
+        row = ground if weapons[ground].rate_against(victim) >= weapons[air].rate_against(victim) else air
+    return -1 if weapons[row].excluding in victim.attributes else row
 
 
 def engage(world: World, slot: int, target: int) -> bool:
@@ -39,32 +45,33 @@ def engage(world: World, slot: int, target: int) -> bool:
     row = weapon_for(world, slot, target)
     if row < 0:
         return False
-    if world.target[slot] != target:
+    c = columns.columns_of(world)
+    if c.target[slot] != target:
         drop_attack(world, slot)
     weapon = world.catalog.weapons[row]
-    world.target[slot] = target
-    world.weapon[slot] = row
+    c.target[slot] = target
+    c.weapon[slot] = row
     measure_reach(world, slot)
-    bites = world.close_weapon[slot] >= 0
-    world.reach_min[slot] = -math.inf if bites or not weapon.min_range else weapon.min_range
-    world.slop[slot] = weapon.slop
-    world.rolling[slot] = weapon.moves == "moving"
-    world.turreted[slot] = weapon.turret_deg_n is not None
-    fixed = weapon.turret_deg_n is None and world.unit_type(slot).unturnable
-    world.aim_cos[slot] = -1.0 if fixed else aim_cosine(weapon)
-    world.nav_loop[slot] = 0
+    c.reach_min[slot] = -math.inf if c.close_weapon[slot] >= 0 or not weapon.min_range else weapon.min_range
+    c.slop[slot] = weapon.slop
+    c.rolling[slot] = weapon.moves == "moving"
+    c.turreted[slot] = weapon.turret_deg_n is not None
+    fixed = not c.turreted[slot] and world.catalog.units[c.type[slot]].unturnable
+    c.aim_cos[slot] = -1.0 if fixed else aim_cosine(weapon.arc_deg, weapon.arc_slop_deg)
+    c.nav_loop[slot] = 0
     return True
 
 
-def aim_cosine(weapon: Weapon) -> float:
-    """Return the cosine of how far off its target a weapon may point when it fires."""
-    return math.cos(math.radians(min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)))
+@cache
+def aim_cosine(arc_deg: float, slop_deg: float) -> float:
+    """Return the cosine of how far off its target a weapon with this arc may point when it fires."""
+    return math.cos(math.radians(min(arc_deg / 2.0 + slop_deg, WIDEST_AIM_DEG)))
 
 
 def take_other_weapon(world: World, slot: int) -> None:
     """Go on with a fight with the weapons of another type, or end it when none fits."""
     drop_attack(world, slot)
-    if not engage(world, slot, int(world.target[slot])):
+    if not engage(world, slot, world.target[slot]):
         disengage(world, slot)
 
 
@@ -74,27 +81,41 @@ def measure_reach(world: World, slot: int) -> None:
     Bodies of some types, such as Siege Tanks and Sentries, keep others farther off than their edges; a unit that
     touches one reaches it.
     """
-    plain, more = float(world.stats.range[world.owner[slot], world.weapon[slot]]), float(world.range_add[slot])
-    touch, target = 0.0, world.target[slot]
+    c = columns.columns_of(world)
+    plain = memory.floats(world.stats.range)[c.owner[slot] * len(world.catalog.weapons) + c.weapon[slot]]
+    touch = 0.0
+    target = c.target[slot]
     if target != NOBODY:
-        bodies = world.separation[slot] + world.separation[target]
-        touch = float(bodies - world.radius[slot] - world.radius[target])
-    world.reach[slot] = max(plain + more, min(plain, 0.0), touch)  # reductions leave melee range
+        touch = c.separation[slot] + c.separation[target] - c.radius[slot] - c.radius[target]
+    c.reach[slot] = max(plain + c.range_add[slot], min(plain, 0.0), touch)  # reductions leave melee range
 
 
 def disengage(world: World, slot: int) -> None:
     """Make a unit stop fighting; its shots stay under way."""
     drop_attack(world, slot)
-    world.target[slot] = NOBODY
-    world.weapon[slot] = -1
-    world.rolling[slot] = world.turreted[slot] = False
-    world.nav_loop[slot] = 0
+    c = columns.columns_of(world)
+    c.target[slot] = NOBODY
+    c.weapon[slot] = -1
+    c.rolling[slot] = False
+    c.turreted[slot] = False
+    c.nav_loop[slot] = 0
     world.scan_now = True
 
 
 def drop_attack(world: World, slot: int) -> None:
     """Drop an attack that is started and has not taken effect; it leaves no cooldown."""
-    world.beaming[slot] = False
-    if world.windup[slot] >= 0.0:
-        world.windup[slot] = -1.0
-        world.cooldown[slot] = 0.0
+    c = columns.columns_of(world)
+    c.beaming[slot] = False
+    if c.windup[slot] >= 0.0:
+        c.windup[slot] = -1.0
+        c.cooldown[slot] = 0.0
+
+
+def inside_zone(c: Columns, slot: int, target: int) -> bool:
+    """Return whether a target touches the only circle in which a unit fires; most units fire anywhere."""
+    reach = c.zone_radius[slot]
+    if reach <= 0.0:
+        return True
+    middle = c.zone[slot]
+    place = c.pos[target]
+    return memory.length(place.x - middle.x, place.y - middle.y) <= reach + c.radius[target]

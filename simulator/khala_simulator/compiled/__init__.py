@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import functools
 import importlib
-import os
 from typing import TYPE_CHECKING, Any, Final
+
+from khala_simulator.native.engine import VARIABLE, wanted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -21,10 +22,7 @@ if TYPE_CHECKING:
 
     System = Callable[[World], None]
 
-ENGINES: Final = ("auto", "compiled", "python")
-VARIABLE: Final = "KHALA_ENGINE"
 SYSTEMS: Final = (
-    "acquire",
     "autocast",
     "avoidance",
     "buffs",
@@ -34,26 +32,13 @@ SYSTEMS: Final = (
     "death",
     "engagement",
     "harvest",
-    "hits",
-    "missiles",
     "movement",
     "navigation",
     "orders",
-    "regeneration",
-    "sweeps",
     "triggers",
     "vision",
-    "weapons",
 )
 """The systems that have a module here."""
-
-
-def wanted() -> str:
-    """Return which engine the environment asks for; raise ``ValueError`` if that is none."""
-    engine = os.environ.get(VARIABLE) or "auto"
-    if engine not in ENGINES:
-        raise ValueError(f"{VARIABLE}={engine} is no engine: say {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
-    return engine
 
 
 @functools.cache
@@ -76,11 +61,6 @@ def part(name: str) -> Any | None:
                 f"{VARIABLE}=compiled, but {error.name} was not built: install with a C compiler"
             ) from error
         return None
-
-
-def engine() -> str:
-    """Return which engine plays: ``compiled`` or ``python``."""
-    return "python" if part("columns") is None else "compiled"
 
 
 def chosen(rules: Iterable[System]) -> tuple[System, ...]:

@@ -1,7 +1,7 @@
 """Autocast, compiled: who has nothing to use; `systems.autocast` has the rules."""
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
 
 from khala_simulator.abilities import casting
 from khala_simulator.economy.requirements import missing_to_all

@@ -3,7 +3,8 @@ cimport cython
 cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.flanking cimport lead
 from khala_simulator.compiled.numbers cimport count, floats, ints, length, most, new_floats, new_ints, new_points
 from khala_simulator.compiled.sums cimport pairwise

@@ -1,5 +1,5 @@
 """Casts, compiled: in most loops nobody casts; `systems.casts` has the rules."""
-from khala_simulator.compiled.columns cimport Columns, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
 
 from khala_simulator.systems import casts as rules
 

@@ -3,7 +3,8 @@ cimport numpy as cnp
 from libc.math cimport floor
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.contacts cimport Crowd, crowd_of
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_ints, new_points
 from khala_simulator.compiled.pushing cimport push_apart

@@ -1,6 +1,6 @@
 """Construction, compiled: in most loops nothing is being built; `systems.construction` has the rules."""
 
-from khala_simulator.compiled.columns cimport Columns, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
 
 from khala_simulator.systems import construction as rules
 

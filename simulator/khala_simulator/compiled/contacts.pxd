@@ -2,7 +2,8 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point
+from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
 
 cdef struct Pair:
     int one  # indices into the living slots

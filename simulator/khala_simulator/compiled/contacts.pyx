@@ -5,7 +5,8 @@ The order of the pairs is that of the rules, as forces are summed up in it.
 from libc.stdint cimport int64_t
 from libc.stdlib cimport free, realloc
 
-from khala_simulator.compiled.columns cimport Columns, Point
+from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.numbers cimport most
 
 from khala_simulator.movement import contacts as rules

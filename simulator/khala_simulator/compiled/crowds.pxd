@@ -1,7 +1,7 @@
 """When a walker whose way is blocked by others is near enough to its goal, as `movement.arrival` has it."""
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns
+from khala_simulator.native.columns cimport Columns
 
 cdef struct Crowd:
     int64_t* live  # slots

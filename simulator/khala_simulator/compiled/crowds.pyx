@@ -2,7 +2,7 @@
 from libc.stdint cimport int64_t
 from libc.stdlib cimport free, malloc
 
-from khala_simulator.compiled.columns cimport Columns
+from khala_simulator.native.columns cimport Columns
 from khala_simulator.compiled.sums cimport pairwise
 
 from khala_simulator.movement import arrival as rules

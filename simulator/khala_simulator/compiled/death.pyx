@@ -2,7 +2,7 @@
 cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
 from khala_simulator.compiled.numbers cimport count, ints
 
 from khala_simulator.systems import death as rules

@@ -3,9 +3,10 @@ cimport numpy as cnp
 from libc.math cimport fabs
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport boolean
 from khala_simulator.compiled.numbers cimport floats, ints, least, length, most, new_ints
-from khala_simulator.compiled.targets cimport inside_zone
+from khala_simulator.combat.targets cimport inside_zone
 
 from khala_simulator.economy import harvesting
 from khala_simulator.systems import engagement as rules

@@ -2,13 +2,12 @@
 cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.acquire cimport is_foe, rank_of
-from khala_simulator.compiled.columns cimport Columns
+from khala_simulator.systems.acquire cimport is_foe, rank_of
+from khala_simulator.native.columns cimport Columns
 from khala_simulator.compiled.flow cimport Flow, Walker, flow_around
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_floats, new_ints
 from khala_simulator.compiled.surfaces cimport grid_of
 
-from khala_simulator.systems import acquire
 from khala_simulator.systems import flanking as rules
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import GROUND_PLANE as _GROUND_PLANE
@@ -19,7 +18,7 @@ cdef int64_t NOBODY = -1
 cdef int64_t AIR = rules.AIR
 cdef int64_t LED = rules.LED
 cdef int64_t GROUND_PLANE = _GROUND_PLANE
-cdef double RANK_STEP = acquire.RANK_STEP
+cdef double RANK_STEP = rules.RANK_STEP
 cdef double REACH = MECHANICS.flank_reach
 cdef double LOOK = MECHANICS.flank_look
 cdef double SQUEEZE = MECHANICS.flank_squeeze

@@ -4,7 +4,7 @@ from libc.stdint cimport int64_t, uint8_t, uint64_t
 from libc.stdlib cimport calloc, free, malloc
 from libc.string cimport memcpy, memset
 
-from khala_simulator.compiled.columns cimport Point, boolean
+from khala_simulator.native.memory cimport Point, boolean
 from khala_simulator.compiled.numbers cimport least, length, most
 from khala_simulator.compiled.surfaces cimport Grid
 

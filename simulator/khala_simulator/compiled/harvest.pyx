@@ -1,7 +1,7 @@
 """Harvesting, compiled: which workers are due for the next phase of their round; `systems.harvest` leads them."""
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
 
 from khala_simulator.economy.harvesting import Phase
 from khala_simulator.systems.harvest import STEPS

@@ -2,7 +2,8 @@
 cimport numpy as cnp
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_floats, new_ints
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, centre_of, grid_of
 from khala_simulator.compiled.ways cimport Line, Way, clear, find_corners

@@ -1,7 +1,8 @@
 """How bodies push each other apart, compiled; `systems.collision` has the rules."""
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Columns, Point
+from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.contacts cimport Crowd, Pair
 from khala_simulator.compiled.numbers cimport least, length, most
 

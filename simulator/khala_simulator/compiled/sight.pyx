@@ -2,7 +2,8 @@
 cimport numpy as cnp
 from libc.stdint cimport int32_t, int64_t, uint8_t
 
-from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport boolean
 from khala_simulator.compiled.heights cimport Heights
 from khala_simulator.compiled.numbers cimport floats, ints, least, most, new_floats, new_ints, new_points
 

@@ -2,7 +2,7 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.compiled.columns cimport Point, boolean
+from khala_simulator.native.memory cimport Point, boolean
 
 @cython.final
 cdef class Grid:

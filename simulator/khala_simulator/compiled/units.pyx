@@ -4,7 +4,8 @@ from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 from libc.stdlib cimport free, malloc, realloc
 from libc.string cimport memcpy
 
-from khala_simulator.compiled.columns cimport Columns, boolean, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport boolean
 from khala_simulator.compiled.heights cimport Heights
 from khala_simulator.compiled.numbers cimport least, most
 

@@ -3,7 +3,8 @@ cimport numpy as cnp
 from libc.stdint cimport int16_t, int64_t, uint8_t, uint16_t
 from libc.string cimport memcmp, memcpy, memset
 
-from khala_simulator.compiled.columns cimport Columns, Point, boolean, columns_of
+from khala_simulator.native.columns cimport Columns, columns_of
+from khala_simulator.native.memory cimport Point, boolean
 from khala_simulator.compiled.numbers cimport count, floats, ints, new_ints
 
 import numpy as np

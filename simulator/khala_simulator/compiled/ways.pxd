@@ -1,5 +1,5 @@
 """Lines and shortest ways over a surface, compiled; `movement.pathfinding` has the rules."""
-from khala_simulator.compiled.columns cimport Point
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.surfaces cimport Grid
 from libc.stdint cimport int64_t
 

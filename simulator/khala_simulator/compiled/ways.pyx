@@ -5,7 +5,7 @@ from libc.math cimport INFINITY, floor
 from libc.stdint cimport int64_t, uint8_t
 from libc.stdlib cimport calloc, free, malloc, realloc
 
-from khala_simulator.compiled.columns cimport Point
+from khala_simulator.native.memory cimport Point
 from khala_simulator.compiled.numbers cimport floats, least, length, most, new_floats
 from khala_simulator.compiled.surfaces cimport Grid, cell_at, centre_of
 

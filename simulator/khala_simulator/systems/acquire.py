@@ -10,13 +10,12 @@ does not fight back runs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat.targets import disengage, engage
-from khala_simulator.numeric.arrays import some, which
-from khala_simulator.systems.engagement import inside_zone
+from khala_simulator.combat import targets
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
 from khala_simulator.world.census import census
@@ -24,227 +23,283 @@ from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
-    from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.world.world import World
 
-IDLE, ATTACK_MOVE, PATROL = int(OrderKind.IDLE), int(OrderKind.ATTACK_MOVE), int(OrderKind.PATROL)
-PRIORITY_WEIGHT = 1000.0
-THREAT_WEIGHT = 500.0
-TOP_RANK = 20 * PRIORITY_WEIGHT + THREAT_WEIGHT  # an army unit that threatens: nothing is better
-RANK_STEP = 250.0  # less than any difference in rank, more than any distance
-OUT_OF_SIGHT = -1e9
+IDLE: Final = int(OrderKind.IDLE)
+ATTACK_MOVE: Final = int(OrderKind.ATTACK_MOVE)
+PATROL: Final = int(OrderKind.PATROL)
+PRIORITY_WEIGHT: Final = 1000.0
+THREAT_WEIGHT: Final = 500.0
+TOP_RANK: Final = 20 * PRIORITY_WEIGHT + THREAT_WEIGHT  # an army unit that threatens: nothing is better
+RANK_STEP: Final = 250.0  # less than any difference in rank, more than any distance
+OUT_OF_SIGHT: Final = -1e9
+ROUNDING: Final = 1e-6  # more than roundings make of a distance on any map
+SCAN_PERIOD: Final = MECHANICS.scan_period
+LOOK_UP_PERIOD: Final = MECHANICS.look_up_period
+HELP_PERIOD: Final = MECHANICS.help_period
+HELP_RADIUS: Final = MECHANICS.help_radius
+LEASH_RADIUS: Final = MECHANICS.leash_radius
+LEASH_RESET: Final = MECHANICS.leash_reset
+SWITCH_GAIN: Final = MECHANICS.switch_gain
 
 
 def choose_targets(world: World) -> None:
     """Answer attacks, give up lost targets, and look for targets with the units that are due."""
+    c = columns.columns_of(world)
     if world.hurt:
-        _answer(world)
-    period = MECHANICS.scan_period
-    if not world.scan_now and world.loop % period:
+        _answer(world, c)
+    loop = world.loop
+    if not world.scan_now and loop % SCAN_PERIOD:
         return
     world.scan_now = False
-    n = world.top
-    due = world.looks_around[:n] | (world.guns_walking[:n] & world.walks[:n])
-    due &= world.acquires[:n]
-    due &= world.scan_loop[:n] <= world.loop
-    due &= world.windup[:n] < 0.0
-    if some(workers := due & world.defensive[:n]):
-        due &= ~(workers & ~_seeks_fights(world.order_kind[:n]))
-    content = world.in_reach[:n] & (world.target[:n] != NOBODY)
-    if world.loop % MECHANICS.look_up_period == 0:
-        content &= world.rank[:n] >= TOP_RANK
-    due &= ~content
-    if some(world.leashed[:n]):
-        _slip_leash(world)
-        due &= ~world.leashed[:n]
-    seekers = which(due)
-    if not seekers.size:
+    looks_up = loop % LOOK_UP_PERIOD == 0
+    seekers = []
+    for slot in range(world.top):
+        if c.leashed[slot]:
+            _slip_leash(c, slot)
+        if _is_due(c, slot, loop, looks_up):
+            seekers.append(slot)
+    if not seekers:
         return
-    _give_up(world, seekers)
-    world.scan_loop[seekers] = world.loop + period - world.loop % period
-    owner = world.owner.take(seekers)
+    for slot in seekers:
+        if c.target[slot] != NOBODY and _gives_up(c, slot):
+            targets.disengage(world, slot)
+        c.scan_loop[slot] = loop + SCAN_PERIOD - loop % SCAN_PERIOD
     for player in range(1, len(world.players)):
-        mine = seekers[owner == player]
-        if mine.size:
-            _seek(world, player, mine)
+        _seek(world, c, player, seekers)
 
 
-def _seeks_fights(order: Ints) -> Bools:
-    """Return whether workers with these orders pick fights by themselves."""
-    seeks: Bools = (order == ATTACK_MOVE) | (order == PATROL)
-    return seeks
+def _is_due(c: Columns, slot: int, loop: int, looks_up: bool) -> bool:
+    """Return whether a unit looks for a target now: the best one there is, if it has one in reach, rarely."""
+    if not (c.looks_around[slot] or c.guns_walking[slot] and c.walks[slot]):
+        return False
+    if not c.acquires[slot] or c.scan_loop[slot] > loop or not c.windup[slot] < 0.0 or c.leashed[slot]:
+        return False
+    if c.defensive[slot] and not _seeks_fights(c, slot):
+        return False
+    return not (c.in_reach[slot] and c.target[slot] != NOBODY and (not looks_up or c.rank[slot] >= TOP_RANK))
 
 
-def _give_up(world: World, seekers: Ints) -> None:
-    """Drop targets that went out of sight, that a holding unit can't reach, or that led too far away."""
-    chasing = seekers[world.target.take(seekers) != NOBODY]
-    if not chasing.size:
-        return
-    offset = world.pos[chasing] - world.guard[chasing]
-    idle = world.order_kind[chasing] == IDLE
-    too_far = idle & (offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_radius**2)
-    world.leashed[chasing] = too_far
-    lost = too_far | (_stays(world, chasing) & ~world.in_reach.take(chasing)) | ~_seen(world, chasing)
-    for slot in chasing[lost].tolist():
-        disengage(world, slot)
+def _seeks_fights(c: Columns, slot: int) -> bool:
+    """Return whether a worker with this order picks fights by itself."""
+    return c.order_kind[slot] == ATTACK_MOVE or c.order_kind[slot] == PATROL
 
 
-def _slip_leash(world: World) -> None:
-    """End the leash of units that gave up a chase when they are nearly back, or have another order."""
-    slots = which(world.leashed[: world.top])
-    offset = world.guard.take(slots, 0) - world.pos.take(slots, 0)
-    away = offset[:, 0] ** 2 + offset[:, 1] ** 2 > MECHANICS.leash_reset**2
-    world.leashed[slots] = away & (world.order_kind.take(slots) == IDLE) & world.returning.take(slots)
+def _stays(c: Columns, slot: int) -> bool:
+    """Return whether a unit chases no target: it holds its place, or fires only at what it passes."""
+    return c.holds[slot] or not c.looks_around[slot]
 
 
-def _stays(world: World, slots: Ints) -> Bools:
-    """Return whether each unit chases no target: it holds its place, or fires only at what it passes."""
-    stays: Bools = world.holds.take(slots) | ~world.looks_around.take(slots)
-    return stays
+def _squared_distance_from_guard(c: Columns, slot: int) -> float:
+    """Return the square of a unit's distance from where it stood before a fight."""
+    x = c.pos[slot].x - c.guard[slot].x
+    y = c.pos[slot].y - c.guard[slot].y
+    return x * x + y * y
 
 
-def _seen(world: World, slots: Ints) -> Bools:
-    """Return whether each unit's owner sees its target."""
-    target = world.target[slots]
-    seen: Bools = world.visible[world.owner[slots], target]
-    return seen
+def _gives_up(c: Columns, slot: int) -> bool:
+    """Return whether a unit drops its target, which led it too far, that it stays away from, or that it can't see."""
+    too_far = c.order_kind[slot] == IDLE and _squared_distance_from_guard(c, slot) > LEASH_RADIUS * LEASH_RADIUS
+    c.leashed[slot] = too_far
+    return (
+        too_far
+        or _stays(c, slot) and not c.in_reach[slot]
+        or not c.visible[c.owner[slot] * c.capacity + c.target[slot]]
+    )
 
 
-def _seek(world: World, player: int, seekers: Ints) -> None:
+def _slip_leash(c: Columns, slot: int) -> None:
+    """End the leash of a unit that gave up a chase when it is nearly back, or has another order."""
+    away = _squared_distance_from_guard(c, slot) > LEASH_RESET * LEASH_RESET
+    c.leashed[slot] = away and c.order_kind[slot] == IDLE and c.returning[slot]
+
+
+class _Foes:
+    """The enemies that a player sees and can aim at."""
+
+    def __init__(self, world: World, player: int) -> None:
+        c = columns.columns_of(world)
+        live = world.live
+        slots = memory.ints(live)
+        self.arrays = (memory.new_ints(len(live)), memory.new_floats(len(live)), memory.new_ints(len(live)))
+        self.slot = memory.ints(self.arrays[0])
+        self.rank = memory.floats(self.arrays[1])
+        self.threatens = memory.ints(self.arrays[2])
+        self.count = 0
+        self.widest = 0.0
+        for i in range(len(live)):
+            slot = slots[i]
+            if is_foe(c, player, slot):
+                self.slot[self.count] = slot
+                self.rank[self.count] = c.priority[slot] * PRIORITY_WEIGHT
+                self.threatens[self.count] = _threatened_planes(c, slot)
+                self.widest = max(self.widest, c.radius[slot])
+                self.count += 1
+        self.weapons = len(world.catalog.weapons)
+        self.ranges = memory.floats(world.stats.range[player])
+        self.filters = census(world).weapons_with_filters
+        self.zones = bool(world.area_effects)
+
+
+def is_foe(c: Columns, player: int, slot: int) -> bool:
+    """Return whether a unit is an enemy of a player that it sees and can aim at."""
+    return (
+        c.owner[slot] != player
+        and c.owner[slot] != 0
+        and c.targetable[slot]
+        and c.visible[player * c.capacity + slot]
+    )
+
+
+def rank_of(c: Columns, seeker: int, foe: int) -> float:
+    """Return the rank that comes before distance: the foe's priority, and whether it threatens its seeker."""
+    threat = THREAT_WEIGHT if _threatened_planes(c, foe) & c.plane_bits[seeker] else 0.0
+    return c.priority[foe] * PRIORITY_WEIGHT + threat
+
+
+def _threatened_planes(c: Columns, foe: int) -> int:
+    """Return the planes that a foe threatens; workers are no threat as long as they do not fight."""
+    return 0 if c.defensive[foe] and c.target[foe] == NOBODY else c.threat_bits[foe]
+
+
+def _seek(world: World, c: Columns, player: int, seekers: list[int]) -> None:
     """Give each seeker of a player the best target it can see, if that is better than what it has."""
-    foes = foes_of(world, player)
-    if not foes.size:
+    mine = [slot for slot in seekers if c.owner[slot] == player]
+    if not mine:
         return
-    gap, worth = _worth(world, seekers, foes)
-    best = np.argmax(worth, axis=1)
-    rows = np.arange(len(seekers))
-    worth, gap, best = worth[rows, best], gap[rows, best], foes[best]
-    now = world.target.take(seekers)
-    world.rank[seekers] = rank_now = np.where(now == NOBODY, OUT_OF_SIGHT, rank_of(world, seekers, now))
-    rise = worth + gap - rank_now
-    handy = _reaches(world, seekers, best, gap) | (world.gap.take(seekers) - gap > MECHANICS.switch_gain)
-    handy &= ~world.in_reach.take(seekers)
-    better = (rise > RANK_STEP) | (handy & (rise > -RANK_STEP))
-    better &= (worth > OUT_OF_SIGHT) & (best != now)
-    for i in which(better).tolist():
-        _take(world, int(seekers[i]), int(best[i]))
-        world.rank[seekers[i]] = worth[i] + gap[i]
-
-
-def foes_of(world: World, player: int) -> Ints:
-    """Return the enemies of a player that it sees and can aim at."""
-    foes = world.live
-    foes = foes[(world.owner[foes] != player) & (world.owner[foes] != 0)]
-    seen: Ints = foes[world.targetable[foes] & world.visible[player, foes]]
-    return seen
-
-
-def rank_of(world: World, seekers: Ints, foes: Ints) -> Floats:
-    """Return the ranks that come before distance: each foe's priority, and whether it threatens its seeker."""
-    rank: Floats = world.priority.take(foes) * PRIORITY_WEIGHT
-    rank += THREAT_WEIGHT * ((_threatened_planes(world, foes) & world.plane_bits.take(seekers)) != 0)
-    return rank
-
-
-def _threatened_planes(world: World, foes: Ints) -> Ints:
-    """Return the planes that each foe threatens; workers are no threat as long as they do not fight."""
-    calm = world.defensive.take(foes) & (world.target.take(foes) == NOBODY)
-    planes: Ints = np.where(calm, 0, world.threat_bits.take(foes))
-    return planes
-
-
-def _worth(world: World, seekers: Ints, foes: Ints) -> tuple[Floats, Floats]:
-    """Return (k, m) edge distances, and the worth of every foe to every seeker."""
-    at, there = world.pos.take(seekers, 0), world.pos.take(foes, 0)
-    gap = at[:, 0, None] - there[:, 0]
-    gap *= gap
-    dy = at[:, 1, None] - there[:, 1]
-    dy *= dy
-    gap += dy
-    np.sqrt(gap, out=gap)
-    gap -= world.radius.take(seekers)[:, None]
-    gap -= world.radius.take(foes)
-    sight = _sight(world, seekers, world.plane_bits.take(foes))
-    holding = _stays(world, seekers)
-    if some(holding):
-        sight = np.where(holding[:, None], np.minimum(sight, _longest_reach(world, seekers)[:, None]), sight)
-    wanted = gap <= sight
-    if census(world).weapons_with_filters:
-        wanted &= (gap >= world.least_range[seekers, None]) | (world.least_range[seekers, None] <= 0.0)
-        wanted &= ~(world.spares_structures[seekers, None] & world.walled.take(foes))
-    if world.area_effects and some(world.zone_radius.take(seekers) > 0.0):
-        k, m = wanted.shape
-        wanted &= inside_zone(world, np.repeat(seekers, m), np.tile(foes, k)).reshape(k, m)
-    rank = world.priority.take(foes) * PRIORITY_WEIGHT
-    threat = (_threatened_planes(world, foes) & world.plane_bits.take(seekers)[:, None]) != 0
-    worth = THREAT_WEIGHT * threat
-    worth += rank
-    worth -= gap
-    np.copyto(worth, OUT_OF_SIGHT, where=~wanted)
-    return gap, worth
-
-
-def _sight(world: World, seekers: Ints, planes: Ints) -> Floats:
-    """Return (k, m) how far each seeker looks for foes on some planes (m,); (k, 1) if all are on the ground alone."""
-    on_ground = world.ground_scan.take(seekers)[:, None]
-    if np.count_nonzero(planes == GROUND_PLANE) == len(planes):
-        return on_ground
-    in_air = world.air_scan.take(seekers)[:, None]
-    sight: Floats = np.maximum(
-        np.where(planes & GROUND_PLANE, on_ground, -1.0), np.where(planes & AIR_PLANE, in_air, -1.0)
-    )
-    return sight
-
-
-def _longest_reach(world: World, slots: Ints) -> Floats:
-    owner = world.owner[slots]
-    ground, air = world.ground_weapon[slots], world.air_weapon[slots]
-    reach: Floats = np.maximum(
-        np.where(ground >= 0, world.stats.range[owner, ground], 0.0),
-        np.where(air >= 0, world.stats.range[owner, air], 0.0),
-    )
-    reach += world.range_add.take(slots)
-    return reach
-
-
-def _reaches(world: World, seekers: Ints, foes: Ints, gap: Floats) -> Bools:
-    """Return whether each seeker could fire at its foe from where it stands."""
-    owner = world.owner[seekers]
-    on_ground = (world.plane_bits[foes] & GROUND_PLANE != 0) & (world.ground_weapon[seekers] >= 0)
-    weapon = np.where(on_ground, world.ground_weapon[seekers], world.air_weapon[seekers])
-    touch = world.separation.take(seekers) + world.separation[foes] - world.radius.take(seekers) - world.radius[foes]
-    reaches: Bools = gap <= np.maximum(world.stats.range[owner, weapon] + world.range_add.take(seekers), touch)
-    return reaches
-
-
-def _take(world: World, slot: int, target: int) -> None:
-    """Start a fight by the unit's own choice; an idle one remembers where it stood."""
-    if world.order_kind[slot] == IDLE and world.target[slot] == NOBODY and not world.returning[slot]:
-        world.guard[slot] = world.pos[slot]
-        world.returning[slot] = True
-    world.rank[slot] = OUT_OF_SIGHT  # a scan that found it knows better
-    engage(world, slot, target)
-
-
-def _answer(world: World) -> None:
-    """Turn attacked units on their attackers, and call their idle friends."""
-    hurt, world.hurt = world.hurt, []
-    for victim, attacker in hurt:
-        if not (world.alive[victim] and world.alive[attacker]) or world.owner[victim] == world.owner[attacker]:
+    foes = _Foes(world, player)
+    if not foes.count:
+        return
+    chosen = []
+    for slot in mine:
+        now = c.target[slot]
+        rank_now = rank_of(c, slot, now) if now != NOBODY else OUT_OF_SIGHT
+        c.rank[slot] = rank_now
+        foe, gap, worth = _find_best(c, foes, slot)
+        if foe == NOBODY or foe == now or not _is_better(c, foes, slot, foe, gap, worth + gap - rank_now):
             continue
-        helpers = [victim]
-        if world.loop - world.help_loop[victim] >= MECHANICS.help_period:
-            world.help_loop[victim] = world.loop
-            helpers += _friends_near(world, victim)
-        for slot in helpers:
-            if _free_to_answer(world, slot) and world.visible[world.owner[slot], attacker]:
-                _take(world, slot, attacker)
-        if world.flees[victim] and world.order_kind[victim] == IDLE and not world.returning[victim]:
-            flee(world, victim, attacker)
+        chosen.append((slot, foe, worth + gap))
+    for slot, foe, rank in chosen:
+        _take(world, c, slot, foe)
+        c.rank[slot] = rank
 
 
-def flee(world: World, victim: int, attacker: int) -> None:
+def _is_better(c: Columns, foes: _Foes, slot: int, foe: int, gap: float, rise: float) -> bool:
+    """Return whether a foe is better than the target that a unit has, whose rank it exceeds by ``rise``."""
+    if rise > RANK_STEP:
+        return True
+    if not rise > -RANK_STEP or c.in_reach[slot]:
+        return False
+    return c.gap[slot] - gap > SWITCH_GAIN or _reaches(c, foes, slot, foe, gap)
+
+
+def _find_best(c: Columns, foes: _Foes, slot: int) -> tuple[int, float, float]:
+    """Return the foe that is worth most to a seeker, the first of several, its distance and its worth.
+
+    NOBODY if there is none in sight.
+    """
+    planes = c.plane_bits[slot]
+    on_ground = c.ground_scan[slot]
+    in_air = c.air_scan[slot]
+    if _stays(c, slot):
+        longest = _longest_reach(c, foes, slot)
+        on_ground = min(on_ground, longest)
+        in_air = min(in_air, longest)
+    best = NOBODY
+    best_gap = 0.0
+    best_worth = OUT_OF_SIGHT
+    farthest = max(on_ground, in_air) + c.radius[slot] + foes.widest + ROUNDING
+    if farthest < 0.0:
+        return best, best_gap, best_worth
+    for i in range(foes.count):
+        foe = foes.slot[i]
+        x = c.pos[slot].x - c.pos[foe].x
+        y = c.pos[slot].y - c.pos[foe].y
+        if x * x + y * y > farthest * farthest:
+            continue
+        gap = memory.length(x, y) - c.radius[slot] - c.radius[foe]
+        sight = max(
+            on_ground if c.plane_bits[foe] & GROUND_PLANE else -1.0, in_air if c.plane_bits[foe] & AIR_PLANE else -1.0
+        )
+        worth = ((THREAT_WEIGHT if foes.threatens[i] & planes else 0.0) + foes.rank[i]) - gap
+        if gap > sight or worth <= best_worth:
+            continue
+        if foes.filters:
+            if c.least_range[slot] > 0.0 and gap < c.least_range[slot] or c.spares_structures[slot] and c.walled[foe]:
+                continue
+        if foes.zones and not targets.inside_zone(c, slot, foe):
+            continue
+        best = foe
+        best_gap = gap
+        best_worth = worth
+    return best, best_gap, best_worth
+
+
+def _longest_reach(c: Columns, foes: _Foes, slot: int) -> float:
+    """Return how far the farther of a unit's weapons reaches."""
+    ground = foes.ranges[c.ground_weapon[slot]] if c.ground_weapon[slot] >= 0 else 0.0
+    air = foes.ranges[c.air_weapon[slot]] if c.air_weapon[slot] >= 0 else 0.0
+    return max(ground, air) + c.range_add[slot]
+
+
+def _reaches(c: Columns, foes: _Foes, slot: int, foe: int, gap: float) -> bool:
+    """Return whether a unit could fire at a foe from where it stands."""
+    on_ground = c.plane_bits[foe] & GROUND_PLANE != 0 and c.ground_weapon[slot] >= 0
+    row = c.ground_weapon[slot] if on_ground else c.air_weapon[slot]
+    if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
+        row += foes.weapons
+    touch = c.separation[slot] + c.separation[foe] - c.radius[slot] - c.radius[foe]
+    return gap <= max(foes.ranges[row] + c.range_add[slot], touch)
+
+
+def _take(world: World, c: Columns, slot: int, target: int) -> None:
+    """Start a fight by the unit's own choice; an idle one remembers where it stood."""
+    if c.order_kind[slot] == IDLE and c.target[slot] == NOBODY and not c.returning[slot]:
+        c.guard[slot] = c.pos[slot]
+        c.returning[slot] = True
+    c.rank[slot] = OUT_OF_SIGHT  # a scan that found it knows better
+    targets.engage(world, slot, target)
+
+
+def _answer(world: World, c: Columns) -> None:
+    """Turn attacked units on their attackers, and call their idle friends."""
+    hurt = world.hurt
+    world.hurt = []
+    loop = world.loop
+    live = world.live
+    slots = memory.ints(live)
+    for victim, attacker in hurt:
+        if not (c.alive[victim] and c.alive[attacker]) or c.owner[victim] == c.owner[attacker]:
+            continue
+        _turn_on(world, c, victim, attacker)
+        if loop - c.help_loop[victim] >= HELP_PERIOD:
+            c.help_loop[victim] = loop
+            for i in range(len(live)):
+                friend = slots[i]
+                if friend != victim and c.owner[friend] == c.owner[victim] and _hears(c, friend, victim):
+                    _turn_on(world, c, friend, attacker)
+        if c.flees[victim] and c.order_kind[victim] == IDLE and not c.returning[victim]:
+            _flee(world, victim, attacker)
+
+
+def _hears(c: Columns, friend: int, victim: int) -> bool:
+    """Return whether a friend is near enough to answer a call for help."""
+    x = c.pos[friend].x - c.pos[victim].x
+    y = c.pos[friend].y - c.pos[victim].y
+    return x * x + y * y <= HELP_RADIUS * HELP_RADIUS
+
+
+def _turn_on(world: World, c: Columns, slot: int, attacker: int) -> None:
+    """Make a unit that is free to do so fight an attacker that it sees."""
+    roams = c.looks_around[slot] and not (c.holds[slot] or c.leashed[slot]) and c.step_max[slot] > 0.0
+    is_free = c.acquires[slot] and c.target[slot] == NOBODY and (not c.defensive[slot] or _seeks_fights(c, slot))
+    if roams and is_free and c.visible[c.owner[slot] * c.capacity + attacker]:
+        _take(world, c, slot, attacker)
+
+
+def _flee(world: World, victim: int, attacker: int) -> None:
     """Make an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
     x0, y0, x1, y1 = world.map.terrain.playable
     offset = world.pos[victim] - world.pos[attacker]
@@ -252,17 +307,3 @@ def flee(world: World, victim: int, attacker: int) -> None:
     world.guard[victim] = np.clip(world.pos[victim] + away * MECHANICS.flee_distance, (x0, y0), (x1, y1))
     world.returning[victim] = True
     world.nav_loop[victim] = 0
-
-
-def _friends_near(world: World, victim: int) -> list[int]:
-    friends = world.units_of(int(world.owner[victim]))
-    offset = world.pos[friends] - world.pos[victim]
-    near = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= MECHANICS.help_radius**2
-    found: list[int] = friends[near & (friends != victim)].tolist()
-    return found
-
-
-def _free_to_answer(world: World, slot: int) -> bool:
-    roams = world.looks_around[slot] and not (world.holds[slot] or world.leashed[slot]) and world.step_max[slot] > 0.0
-    free = world.acquires[slot] and world.target[slot] == NOBODY
-    return bool(roams and free and (not world.defensive[slot] or _seeks_fights(world.order_kind[slot])))

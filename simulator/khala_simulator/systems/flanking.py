@@ -9,7 +9,7 @@ of this is an estimate.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from khala_simulator.movement import pathfinding
 from khala_simulator.movement.flow import Flow
 from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some, which
-from khala_simulator.systems.acquire import RANK_STEP, foes_of, rank_of
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import GROUND_PLANE
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import World
 
+RANK_STEP: Any = 250.0
+foes_of: Any = None
+rank_of: Any = None
 LED = 2  # times the side in ``detour`` of those that follow a flow
 ANY = -1
 AIR = int(Layer.AIR)

@@ -9,39 +9,57 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from khala_simulator.combat import damage
-from khala_simulator.numeric.arrays import some
+from khala_simulator.native import columns, memory
 from khala_simulator.systems import missiles, sweeps
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import shots_of
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
+    from khala_simulator.world.shots import PendingHit
     from khala_simulator.world.world import World
 
 
 def fall_due(world: World) -> None:
     """Carry out every hit that is due."""
-    pending = world.pending
-    if not len(pending):
+    if not world.pending:
         return
-    due = pending.rows["due"] <= world.loop
-    if not some(due):
+    loop = world.loop
+    due = [pending for pending in world.pending if _is_due(pending, loop)]
+    if not due:
         return
-    homing = (pending.target != NOBODY) & ~world.stats.kamikaze[pending.rows["weapon"]]
-    pending.rows["goal"] = np.where(homing[:, None], world.pos.take(pending.target, 0), pending.goal)
-    rows = pending.rows[due]
-    pending.keep(~due)
-    for shot, begun, single in zip(shots_of(rows), rows["due"].tolist(), rows["single"].tolist(), strict=True):
-        if shot.source == NOBODY:
-            continue
-        hit = world.catalog.weapons[shot.weapon].hits[shot.hit]
-        if single:
-            damage.hit_target(world, shot)
-        elif hit.missile_speed_n is not None:
-            missiles.launch(world, shot, hit)
-        elif hit.sweep is not None:
-            sweeps.begin(world, shot, begun)
-        else:
-            damage.hit_with(world, shot)
+    c = columns.columns_of(world)
+    kamikaze = memory.bools(world.stats.kamikaze)
+    for pending in world.pending:
+        _follow(c, kamikaze, pending)
+    world.pending = [pending for pending in world.pending if not _is_due(pending, loop)]
+    for pending in due:
+        if pending.shot.source != NOBODY:
+            _carry_out(world, pending)
+
+
+def _is_due(pending: PendingHit, loop: int) -> bool:
+    return pending.due <= loop
+
+
+def _follow(c: Columns, kamikaze: Cells, pending: PendingHit) -> None:
+    """Aim a hit at where its target is now; a suicide attacker is the middle of its own."""
+    shot = pending.shot
+    if shot.target != NOBODY and not kamikaze[shot.weapon]:
+        shot.goal_x = c.pos[shot.target].x
+        shot.goal_y = c.pos[shot.target].y
+
+
+def _carry_out(world: World, pending: PendingHit) -> None:
+    """Carry out one hit: at once, as a missile or as a sweep."""
+    shot = pending.shot
+    hit = world.catalog.weapons[shot.weapon].hits[shot.hit]
+    if pending.single:
+        damage.hit_target(world, shot)
+    elif hit.missile_speed_n is not None:
+        missiles.launch(world, shot, hit)
+    elif hit.sweep is not None:
+        sweeps.begin(world, shot, pending.due)
+    else:
+        damage.hit_with(world, shot)

@@ -6,62 +6,72 @@ A missile that bounces goes on from its victim to the next enemy near it that it
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Final
 
 from khala_simulator.combat import damage
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.stats import INSTANT_ACCELERATION_N
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import Shot, shots_of
+from khala_simulator.world.shots import Missile, Shot
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
     from khala_simulator.tables.records import Hit
     from khala_simulator.world.world import World
+
+NO_DISTANCE: Final = 1e-12
 
 
 def fly(world: World) -> None:
     """Move all missiles by one loop and carry out the hits of those that arrive."""
-    missiles = world.missiles
-    if not len(missiles):
+    if not world.missiles:
         return
-    shots = missiles.rows
-    target = shots["target"]
-    homing = target != NOBODY
-    body = world.radius.take(target) * homing
-    shots["goal"] = np.where(homing[:, None], world.pos.take(target, 0), shots["goal"])
-    step = shots["step"] = np.minimum(shots["step"] + shots["gain"], shots["top"])
-    offset = shots["goal"] - shots["pos"]
-    distance = geometry.length(offset)
-    arriving = distance - body <= step
-    shots["pos"] += offset * (step / np.maximum(distance, 1e-12))[:, None]
-    if some(arriving):
-        arrived = shots_of(shots[arriving])
-        missiles.keep(~arriving)
-        for shot in arrived:
-            damage.hit_with(world, shot)
-            bounce(world, shot)
+    c = columns.columns_of(world)
+    onward = []
+    arrived = []
+    for missile in world.missiles:
+        if _step(c, missile):
+            arrived.append(missile.shot)
+        else:
+            onward.append(missile)
+    world.missiles = onward
+    for shot in arrived:
+        damage.hit_with(world, shot)
+        _bounce(world, shot)
+
+
+def _step(c: Columns, missile: Missile) -> bool:
+    """Move a missile by one loop; return whether it arrives."""
+    shot = missile.shot
+    body = 0.0
+    if shot.target != NOBODY:
+        body = c.radius[shot.target]
+        shot.goal_x = c.pos[shot.target].x
+        shot.goal_y = c.pos[shot.target].y
+    missile.step = min(missile.step + missile.gain, missile.top)
+    x = shot.goal_x - missile.x
+    y = shot.goal_y - missile.y
+    distance = memory.length(x, y)
+    share = missile.step / max(distance, NO_DISTANCE)
+    missile.x += x * share
+    missile.y += y * share
+    return distance - body <= missile.step
 
 
 def launch(world: World, shot: Shot, hit: Hit) -> None:
     """Send the missile of a hit on its way."""
-    step, top, gain = speeds(hit)
-    world.missiles.append(1, **shot._asdict(), pos=shot.start, step=step, top=top, gain=gain)
-
-
-def speeds(hit: Hit) -> tuple[float, float, float]:
-    """Return the first and the highest speed of a hit's missile, and its acceleration, in world units and loops."""
     top = (hit.missile_speed_n or 0.0) / LOOPS_PER_NORMAL_SECOND
+    step = top
+    gain = math.inf
     gain_n = hit.missile_acceleration_n
-    if gain_n is None or gain_n >= INSTANT_ACCELERATION_N:
-        return top, top, math.inf
-    return 0.0, top, gain_n / LOOPS_PER_NORMAL_SECOND**2
+    if gain_n is not None and gain_n < INSTANT_ACCELERATION_N:
+        step = 0.0
+        gain = gain_n / LOOPS_PER_NORMAL_SECOND**2
+    world.missiles.append(Missile(shot, shot.start_x, shot.start_y, step, top, gain))
 
 
-def bounce(world: World, shot: Shot) -> None:
+def _bounce(world: World, shot: Shot) -> None:
     """Send on a missile that bounces; one whose target died on the way is lost."""
     hits = world.catalog.weapons[shot.weapon].hits
     if shot.target == NOBODY or shot.hit + 1 >= len(hits) or not hits[shot.hit + 1].bounce:
@@ -70,6 +80,10 @@ def bounce(world: World, shot: Shot) -> None:
     if onward.search is None:
         return
     for slot in damage.found_by(world, onward.search, shot):
-        x, y = world.pos[slot].tolist()
-        after = shot._replace(target=slot, prior=shot.target, hit=shot.hit + 1, start=shot.goal, goal=(x, y))
+        after = shot.at(slot)
+        after.prior = shot.target
+        after.hit = shot.hit + 1
+        after.start_x = shot.goal_x
+        after.start_y = shot.goal_y
+        after.goal_x, after.goal_y = world.pos[slot].tolist()
         launch(world, after, onward)

@@ -4,42 +4,31 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from khala_simulator.numeric.arrays import which
+from khala_simulator.native import columns
 
 if TYPE_CHECKING:
-    from khala_simulator.numeric.geometry import Floats
     from khala_simulator.world.world import World
 
 
 def regenerate(world: World) -> None:
     """Give every unit this loop's shields, life and energy, up to what its type holds."""
     shields, life, energy = world.regenerating
-    if shields:
-        _regain(world, world.shields, world.shields_max, world.shield_regen, world.shield_delay)
-    if life:
-        _regain(world, world.life, world.life_max, world.life_regen, world.life_delay)
-    if energy:
-        _regain(world, world.energy, world.energy_max, world.energy_regen, None)
-        _drain(world)
-
-
-def _regain(world: World, amount: Floats, most: Floats, rate: Floats, delay: Floats | None) -> None:
-    n = world.top
-    slots = which(amount[:n] < most[:n])
-    slots = slots[rate.take(slots) > 0.0]
-    if delay is not None and slots.size:
-        slots = slots[world.damaged_loop.take(slots) < world.loop - delay.take(slots)]
-    if not slots.size:
+    if not (shields or life or energy):
         return
-    slots = slots[world.life.take(slots) > 0.0]
-    amount[slots] = np.minimum(amount.take(slots) + rate.take(slots), most.take(slots))
-
-
-def _drain(world: World) -> None:
-    """Take energy from units that spend more than they regain; the rule that makes them spend checks the rest."""
-    n = world.top
-    slots = which(world.energy_regen[:n] < 0.0)
-    if slots.size:
-        world.energy[slots] = np.maximum(world.energy.take(slots) + world.energy_regen.take(slots), 0.0)
+    c = columns.columns_of(world)
+    loop = world.loop
+    for slot in range(world.top):
+        if c.life[slot] <= 0.0:
+            continue
+        if shields and c.shields[slot] < c.shields_max[slot] and c.shield_regen[slot] > 0.0:
+            if c.damaged_loop[slot] < loop - c.shield_delay[slot]:
+                c.shields[slot] = min(c.shields[slot] + c.shield_regen[slot], c.shields_max[slot])
+        if life and c.life[slot] < c.life_max[slot] and c.life_regen[slot] > 0.0:
+            if c.damaged_loop[slot] < loop - c.life_delay[slot]:
+                c.life[slot] = min(c.life[slot] + c.life_regen[slot], c.life_max[slot])
+        if energy and c.energy[slot] < c.energy_max[slot] and c.energy_regen[slot] > 0.0:
+            c.energy[slot] = min(c.energy[slot] + c.energy_regen[slot], c.energy_max[slot])
+    if energy:
+        for slot in range(world.top):
+            if c.energy_regen[slot] < 0.0:  # the rule that makes it spend checks the rest
+                c.energy[slot] = max(c.energy[slot] + c.energy_regen[slot], 0.0)

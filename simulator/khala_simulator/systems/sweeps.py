@@ -6,25 +6,20 @@ of the way of spines; it is hit once per sweep, some loops later where the game 
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Final
 
 from khala_simulator.combat import damage
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
+from khala_simulator.native import columns, memory
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import Sweep
+from khala_simulator.world.shots import PendingHit, Shot, Sweep
 
 if TYPE_CHECKING:
-    from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.tables import records
-    from khala_simulator.world.columns import Bools
-    from khala_simulator.world.shots import Shot
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Points
+    from khala_simulator.tables.records import SweepRecord
     from khala_simulator.world.world import World
 
-ON_TARGET = 1e-9
+ON_TARGET: Final = 1e-9
 
 
 def begin(world: World, shot: Shot, begun: float) -> None:
@@ -45,10 +40,11 @@ def run(world: World) -> None:
 
 
 def _drop_ended(world: World) -> None:
+    """Forget the sweeps that are at their end, or whose attacker is gone."""
     world.sweeps = [s for s in world.sweeps if s.shot.source != NOBODY and s.ahead < len(_line(world, s.shot).points)]
 
 
-def _line(world: World, shot: Shot) -> records.SweepRecord:
+def _line(world: World, shot: Shot) -> SweepRecord:
     line = world.catalog.weapons[shot.weapon].hits[shot.hit].sweep
     assert line is not None, "only hits with a sweep are begun"
     return line
@@ -57,52 +53,76 @@ def _line(world: World, shot: Shot) -> records.SweepRecord:
 def _draw(world: World, sweep: Sweep) -> None:
     """Touch the units at the points that are due."""
     shot = sweep.shot
-    line = _line(world, shot)
     if shot.source == NOBODY:
         return
+    line = _line(world, shot)
     first = sweep.ahead
     while sweep.ahead < len(line.points) and sweep.begun + _delay(line, sweep.ahead) <= world.loop:
         sweep.ahead += 1
     if sweep.ahead == first:
         return
-    points = _places(world, shot, line, first, sweep.ahead)
-    near = damage.affected(world, line.affects, shot)
-    offset = world.pos[near][:, None, :] - points
-    reached: Bools = geometry.length(offset) <= line.radius + world.radius[near][:, None]
-    for i in which(np.logical_or.reduce(reached, axis=1)).tolist():
-        slot = int(near[i])
-        if slot not in sweep.touched:
+    c = columns.columns_of(world)
+    room = memory.new_points(sweep.ahead - first)
+    places = memory.points(room)
+    drawn = _place(world, shot, line, first, sweep.ahead, places)
+    live = world.live
+    slots = memory.ints(live)
+    radius = line.radius
+    for i in range(len(live)):
+        slot = slots[i]
+        if not damage.touches(c, line.affects, shot, slot):
+            continue
+        reached = _first_within(c, places, drawn, slot, radius + c.radius[slot])
+        if reached < drawn and slot not in sweep.touched:
             sweep.touched.append(slot)
-            _touch(world, sweep, slot, line, sweep.begun + _delay(line, first + int(np.argmax(reached[i]))))
+            _touch(world, sweep, slot, line, sweep.begun + _delay(line, first + reached))
 
 
-def _delay(line: records.SweepRecord, point: int) -> float:
+def _delay(line: SweepRecord, point: int) -> float:
     """Return the loops from the damage point until a point of the line touches."""
     return line.points[point][0] - line.lag_loops
 
 
-def _places(world: World, shot: Shot, line: records.SweepRecord, first: int, end: int) -> Floats:
-    """Return (k, 2) where the points from ``first`` up to ``end`` are, without those past the weapon's reach."""
-    fx, fy = shot.goal[0] - shot.start[0], shot.goal[1] - shot.start[1]
-    distance = math.sqrt(fx * fx + fy * fy)
-    fx, fy = (fx / distance, fy / distance) if distance > ON_TARGET else (0.0, -1.0)
-    drawn = np.array(line.points[first:end])
-    across, along = drawn[:, 1], drawn[:, 2]
-    origin = shot.goal
-    if line.origin == "source":
-        origin = shot.start
-        reach = world.stats.range[shot.owner, shot.weapon] + line.past_range
-        across, along = across[-along <= reach], along[-along <= reach]
-    return np.array(origin) + np.stack([across * fy - along * fx, -across * fx - along * fy], axis=1)
+def _place(world: World, shot: Shot, line: SweepRecord, first: int, end: int, places: Points) -> int:
+    """Write where some points of a line are, without those past the weapon's reach; return how many are left."""
+    from_source = line.origin == "source"
+    x = shot.start_x if from_source else shot.goal_x
+    y = shot.start_y if from_source else shot.goal_y
+    forward_x = shot.goal_x - shot.start_x
+    forward_y = shot.goal_y - shot.start_y
+    distance = memory.length(forward_x, forward_y)
+    if distance > ON_TARGET:
+        forward_x = forward_x / distance
+        forward_y = forward_y / distance
+    else:
+        forward_x = 0.0
+        forward_y = -1.0
+    reach = world.stats.range[shot.owner, shot.weapon] + line.past_range
+    drawn = 0
+    for i in range(first, end):
+        _, across, along = line.points[i]
+        if from_source and not -along <= reach:
+            continue
+        at_x = x + (across * forward_y - along * forward_x)
+        at_y = y + (-across * forward_x - along * forward_y)
+        places[drawn] = memory.point(at_x, at_y)
+        drawn += 1
+    return drawn
 
 
-def _touch(world: World, sweep: Sweep, slot: int, line: records.SweepRecord, moment: float) -> None:
+def _first_within(c: Columns, places: Points, drawn: int, slot: int, reach: float) -> int:
+    """Return the first place within a distance from a unit's middle; behind the last one if there is none."""
+    for i in range(drawn):
+        if memory.length(c.pos[slot].x - places[i].x, c.pos[slot].y - places[i].y) <= reach:
+            return i
+    return drawn
+
+
+def _touch(world: World, sweep: Sweep, slot: int, line: SweepRecord, moment: float) -> None:
     """Hit a unit now, or when the lag has passed."""
-    shot = sweep.shot._replace(target=slot)
+    shot = sweep.shot.at(slot)
     if line.lag_loops <= 0.0:
         damage.hit_target(world, shot)
         return
-    point = world.pos[slot]
-    world.pending.append(
-        1, **shot._replace(goal=(point[0], point[1]))._asdict(), due=moment + line.lag_loops, single=True
-    )
+    shot.goal_x, shot.goal_y = world.pos[slot].tolist()
+    world.pending.append(PendingHit(shot, moment + line.lag_loops, single=True))

@@ -13,149 +13,146 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.combat.launchers import LAUNCHERS
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.native import columns, memory
+from khala_simulator.numeric import turning
 from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.census import census
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import PendingHit, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.tables.records import Hit, Weapon
-    from khala_simulator.world.columns import Bools, Floats, Ints
+    from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
 
-NOT_STARTED = -1.0
+NOT_STARTED: Final = -1.0
 LARGE_RADIUS = 1.25  # the catalog's validators TargetRadiusSmall and TargetRadiusLarge
 
 
 def fire(world: World) -> None:
     """Start attacks, carry out those whose damage point has come, and count down."""
+    c = columns.columns_of(world)
     n = world.top
-    cooldown, windup, backswing = world.cooldown[:n], world.windup[:n], world.backswing[:n]
-    cooldown -= cooldown > 0.0
-    backswing -= backswing > 0.0
-    started = windup >= 0.0
-    if some(started):
-        windup -= started
-        _drop_lost(world, which(started & ~world.in_reach[:n]))
-    fighters = world.fighters
-    if fighters.size:
-        if census(world).turrets:
-            _turn_turrets(world, fighters[world.turreted.take(fighters)])
-        ready = world.in_reach.take(fighters)
-        ready &= cooldown.take(fighters) <= 0.0
-        ready &= ~started.take(fighters)
-        if some(ready):
-            starting = fighters[ready]
-            _start(world, starting[_aimed(world, starting)])
-        effective = which((windup <= 0.0) & (windup > NOT_STARTED))
-        if effective.size:
-            _take_effect(world, effective)
-    np.maximum(cooldown, 0.0, out=cooldown)  # a fraction is carried over only into the very next attack
-
-
-def _drop_lost(world: World, lost: Ints) -> None:
-    """Drop attacks whose target got away before the damage point; they leave no cooldown."""
-    if lost.size:
-        world.windup[lost] = NOT_STARTED
-        world.cooldown[lost] = 0.0
+    started = memory.new_bools(n)
+    in_windup = memory.bools(started)
+    lost = False
+    for slot in range(n):
+        if c.cooldown[slot] > 0.0:
+            c.cooldown[slot] -= 1.0
+        if c.backswing[slot] > 0.0:
+            c.backswing[slot] -= 1.0
+        if c.windup[slot] >= 0.0:
+            in_windup[slot] = True
+            c.windup[slot] -= 1.0
+            if not c.in_reach[slot]:  # the target got away before the damage point; that leaves no cooldown
+                c.windup[slot] = NOT_STARTED
+                c.cooldown[slot] = 0.0
+                lost = True
+    if lost:
         world.scan_now = True
+    if len(world.fighters):
+        _start_attacks(world, c, in_windup)
+        attackers = [slot for slot in range(n) if _takes_effect(c, slot)]
+        if attackers:
+            _take_effect(world, attackers)
+            c = columns.columns_of(world)
+    for slot in range(n):
+        if c.cooldown[slot] < 0.0:
+            c.cooldown[slot] = 0.0  # a fraction is carried over only into the very next attack
 
 
-def _turn_turrets(world: World, slots: Ints) -> None:
-    """Turn the turrets of units that fight towards their targets."""
-    if not slots.size:
-        return
-    world.turret[slots] = geometry.turn_towards(
-        world.turret.take(slots, 0),
-        world.toward.take(slots, 0),
-        world.turret_cos.take(slots),
-        world.turret_sin.take(slots),
-    )
+def _takes_effect(c: Columns, slot: int) -> bool:
+    """Return whether the damage point of an attack has come."""
+    return c.windup[slot] <= 0.0 and c.windup[slot] > NOT_STARTED
 
 
-def _aimed(world: World, slots: Ints) -> Bools:
-    """Return whether each unit's body, or its turret, faces its target within the weapon's arc."""
-    least = world.aim_cos.take(slots)
-    any_way = least <= -1.0
-    if np.count_nonzero(any_way) == len(any_way):
-        return any_way
-    facing = world.heading.take(slots, 0)
-    turreted = world.turreted.take(slots)
-    if some(turreted):
-        facing = np.where(turreted[:, None], world.turret.take(slots, 0), facing)
-    along = world.toward.take(slots, 0) * facing
-    aimed: Bools = any_way | (along[:, 0] + along[:, 1] >= least)
-    return aimed
-
-
-def _start(world: World, slots: Ints) -> None:
-    """Begin attacks: the cooldown of the next one runs from here."""
-    for slot in slots.tolist():
-        row = _weapon_at_hand(world, slot)
-        weapon = world.catalog.weapons[row]
-        rate = float(world.attack_rate[slot])
+def _start_attacks(world: World, c: Columns, in_windup: Cells) -> None:
+    """Turn turrets, and begin the attacks of units that are ready and aim at what they reach."""
+    fighters = world.fighters
+    slots = memory.ints(fighters)
+    turrets = census(world).turrets
+    weapons = world.catalog.weapons
+    period = memory.floats(world.stats.period)
+    for i in range(len(fighters)):
+        slot = slots[i]
+        if turrets and c.turreted[slot]:
+            c.turret[slot] = turning.turned(c.turret[slot], c.toward[slot], c.turret_cos[slot], c.turret_sin[slot])
+        if not c.in_reach[slot] or c.cooldown[slot] > 0.0 or in_windup[slot] or not _is_aimed(c, slot):
+            continue
+        row = _choose_weapon(c, slot)
+        if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
+            row += len(weapons)
+        weapon = weapons[row]
         delay = 0.0
         if not weapon.is_beam:
             low, high = weapon.jitter_loops
             delay = low + (high - low) * world.rng.random()
-        world.cooldown[slot] += world.stats.period[world.owner[slot], row] / rate + delay
-        world.windup[slot] = weapon.damage_point_loops / rate
+        c.cooldown[slot] += period[c.owner[slot] * len(weapons) + row] / c.attack_rate[slot] + delay
+        c.windup[slot] = weapon.damage_point_loops / c.attack_rate[slot]
 
 
-def _weapon_at_hand(world: World, slot: int) -> int:
+def _is_aimed(c: Columns, slot: int) -> bool:
+    """Return whether a unit's body, or its turret, faces its target within the weapon's arc."""
+    if c.aim_cos[slot] <= -1.0:
+        return True
+    facing = c.turret[slot] if c.turreted[slot] else c.heading[slot]
+    return c.toward[slot].x * facing.x + c.toward[slot].y * facing.y >= c.aim_cos[slot]
+
+
+def _choose_weapon(c: Columns, slot: int) -> int:
     """Return the row of the weapon for this attack: the one for close targets when the target stands that close."""
-    close = int(world.close_weapon[slot])
-    if close >= 0 and world.weapon[slot] in (close, world.ground_weapon[slot]):
-        near = world.gap[slot] <= world.close_range[slot]
-        world.weapon[slot] = close if near else world.ground_weapon[slot]
-    return int(world.weapon[slot])
+    near = c.close_weapon[slot]
+    if near >= 0 and (c.weapon[slot] == near or c.weapon[slot] == c.ground_weapon[slot]):
+        c.weapon[slot] = near if c.gap[slot] <= c.close_range[slot] else c.ground_weapon[slot]
+    return c.weapon[slot]
 
 
-def _take_effect(world: World, slots: Ints) -> None:
+def _take_effect(world: World, attackers: list[int]) -> None:
     """Put the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
-    rows = world.weapon[slots]
-    moment = world.loop + world.windup[slots]
-    for row in dict.fromkeys(rows.tolist()):
+    c = columns.columns_of(world)
+    users: dict[int, list[tuple[int, float]]] = {}
+    for slot in attackers:
+        users.setdefault(c.weapon[slot], []).append((slot, world.loop + c.windup[slot]))
+    for row, attacks in users.items():
         weapon = world.catalog.weapons[row]
-        mine = rows == row
+        is_beam = weapon.is_beam
         for index in range(len(weapon.hits)):
-            _lay(world, weapon, index, slots[mine], moment[mine])
-        world.backswing[slots[mine]] = weapon.backswing_loops
-        world.beaming[slots[mine]] = weapon.is_beam
+            _lay(world, weapon, index, attacks)
+        for slot, _ in attacks:
+            c.backswing[slot] = weapon.backswing_loops
+            c.beaming[slot] = is_beam
         launcher = LAUNCHERS.get(weapon.id)
         if launcher is not None:
-            for slot in slots[mine].tolist():
-                launcher(world, slot, int(world.target[slot]))
-    world.windup[slots] = NOT_STARTED
+            for slot, _ in attacks:
+                launcher(world, slot, columns.columns_of(world).target[slot])
+            c = columns.columns_of(world)
+    for slot in attackers:
+        c.windup[slot] = NOT_STARTED
 
 
-def _lay(world: World, weapon: Weapon, index: int, slots: Ints, moment: Floats) -> None:
-    """Put one hit of the attacks whose damage point was at ``moment`` (k,); bounces follow from the hit before."""
+def _lay(world: World, weapon: Weapon, index: int, attacks: list[tuple[int, float]]) -> None:
+    """Put one hit of the attacks, each with its attacker and its damage point, into ``pending``."""
     hit = weapon.hits[index]
-    if hit.bounce:
+    if hit.bounce:  # these follow from the hit before
         return
-    target = world.target[slots]
     if hit.when:
-        chosen = branch(world, hit, weapon, slots, target)
-        slots, target, moment = slots[chosen], target[chosen], moment[chosen]
-    if slots.size:
-        at = slots if weapon.is_kamikaze else target  # a suicide attacker is the middle of it
-        world.pending.append(
-            len(slots),
-            source=slots,
-            owner=world.owner[slots],
-            target=target,
-            prior=NOBODY,
-            weapon=weapon.row,
-            hit=index,
-            due=moment + (0.0 if hit.sweep is not None else hit.delay_loops),
-            single=False,
-            goal=world.pos[at],
-            start=world.pos[slots],
-        )
+        sources = np.array([slot for slot, _ in attacks])
+        taken = branch(world, hit, weapon, sources, world.target[sources])
+        attacks = [attack for attack, is_taken in zip(attacks, taken.tolist(), strict=True) if is_taken]
+    c = columns.columns_of(world)
+    delay = 0.0 if hit.sweep is not None else hit.delay_loops
+    is_kamikaze = weapon.is_kamikaze
+    for slot, moment in attacks:
+        target = c.target[slot]
+        at = slot if is_kamikaze or target == NOBODY else target  # a suicide attacker is the middle of it
+        start = (c.pos[slot].x, c.pos[slot].y)
+        goal = (c.pos[at].x, c.pos[at].y)
+        shot = Shot(slot, c.owner[slot], target, NOBODY, weapon.row, index, start, goal)
+        world.pending.append(PendingHit(shot, moment + delay))
 
 
 # branches of the game's own switches ----------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some, which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
+from khala_simulator.world import shots
 from khala_simulator.world.active_buffs import ActiveBuffs
 from khala_simulator.world.caches import WorldCaches
 from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
@@ -29,7 +30,6 @@ from khala_simulator.world.ground import Ground
 from khala_simulator.world.orders import ATTACK, Order, OrderKind
 from khala_simulator.world.players import NEUTRAL, GameResult, Player, PlayerSetup
 from khala_simulator.world.script_memory import ScriptMemory
-from khala_simulator.world.shots import Missiles, PendingHits, Sweep
 from khala_simulator.world.snapshots import FogMemory
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.area_effects import AreaEffect
     from khala_simulator.world.casts import Cast
     from khala_simulator.world.jobs import Job
+    from khala_simulator.world.shots import Missile, PendingHit, Sweep
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
@@ -126,8 +127,8 @@ class World(UnitColumns, WorldCaches):
         self.visible: Bools  # (players, capacity) whether a player sees the unit, cloak and burrow looked at
         self.visible = np.zeros((len(self.players), 0), dtype=np.bool_)
         self.memories = [FogMemory() for _ in self.players]  # each player's memory of what the fog covers
-        self.missiles = Missiles()
-        self.pending = PendingHits()
+        self.missiles: list[Missile] = []
+        self.pending: list[PendingHit] = []
         self.sweeps: list[Sweep] = []
         self.buffs = ActiveBuffs()
         self.area_effects: list[AreaEffect] = []
@@ -192,8 +193,10 @@ class World(UnitColumns, WorldCaches):
         self.timers.pop(slot, None)
         self.autocast.pop(slot, None)
         self.hurt = [pair for pair in self.hurt if slot not in pair]
-        self.missiles.forget(slot)
-        self.pending.forget(slot)
+        for missile in self.missiles:
+            missile.shot.forget(slot)
+        for hit in self.pending:
+            hit.shot.forget(slot)
         for sweep in self.sweeps:
             sweep.forget(slot)
         self.ground.unblock(slot)
@@ -354,7 +357,7 @@ class World(UnitColumns, WorldCaches):
         sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
         sha.update(repr([player.counters() for player in self.players]).encode())
         sha.update(repr(self.script.content()).encode())
-        sha.update(self.missiles.content() + self.pending.content() + self.buffs.content())
+        sha.update(shots.content(self.missiles) + shots.content(self.pending) + self.buffs.content())
         sha.update(repr((self.jobs, self.rallies, self.invested)).encode())
         sha.update(repr((self.area_effects, self.timers, self.autocast, self.sweeps)).encode())
         channels = [(c.slot, c.ability.id, c.target, c.begun, c.was) for c in self.channelling.values()]

@@ -9,6 +9,7 @@ import pytest
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, healing
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import PendingHit, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,10 +30,8 @@ def hit(field: Field, attacker: str, victim: int, *, loops: int) -> int:
     world = field.world
     source = field.still(attacker, 2, 30, 30)
     weapon = world.catalog.unit(attacker).weapons[0]
-    world.pending.append(
-        1, source=source, owner=2, target=victim, prior=NOBODY, weapon=weapon.row, hit=0, due=world.loop + loops,
-        single=True, goal=world.pos[victim], start=world.pos[source],
-    )  # fmt: skip
+    shot = Shot(source, 2, victim, NOBODY, weapon.row, 0, world.pos[source], world.pos[victim])
+    world.pending.append(PendingHit(shot, world.loop + loops, single=True))
     return source
 
 
@@ -260,10 +259,8 @@ def test_two_units_that_hit_each_other_in_one_loop_both_die(field: Any) -> None:
     world.life[left] = world.life[right] = 1.0
     for one, other in ((left, right), (right, left)):
         weapon = world.catalog.unit("Marine").weapons[0]
-        world.pending.append(
-            1, source=one, owner=int(world.owner[one]), target=other, prior=NOBODY, weapon=weapon.row, hit=0,
-            due=world.loop + 1, single=True, goal=world.pos[other], start=world.pos[one],
-        )  # fmt: skip
+        shot = Shot(one, world.owner[one], other, NOBODY, weapon.row, 0, world.pos[one], world.pos[other])
+        world.pending.append(PendingHit(shot, world.loop + 1, single=True))
     field.play(1)
     assert not world.alive[left]
     assert not world.alive[right]

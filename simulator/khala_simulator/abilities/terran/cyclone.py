@@ -16,6 +16,7 @@ from khala_simulator.combat.damage import apply_damage
 from khala_simulator.tables.stats import ATTRIBUTES
 from khala_simulator.world.area_effects import AreaEffect
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import PendingHit, Shot
 
 if TYPE_CHECKING:
     from khala_simulator.abilities.skill import AreaEffectRule
@@ -86,19 +87,8 @@ def _shoot(world: World, ability: Ability, slot: int, target: int) -> None:
     if number(ability, "damage_per_tick", 0.0):
         projectiles.launch_at(world, ability, slot, target, weapon.hits[0].missile_speed_n or 0.0)
     else:
-        world.pending.append(
-            1,
-            source=slot,
-            owner=owner,
-            target=target,
-            prior=NOBODY,
-            weapon=weapon.row,
-            hit=0,
-            due=world.loop,
-            single=False,
-            goal=world.pos[target],
-            start=world.pos[slot],
-        )
+        shot = Shot(slot, owner, target, NOBODY, weapon.row, 0, world.pos[slot], world.pos[target])
+        world.pending.append(PendingHit(shot, world.loop))
         world.cooldown[slot] = max(float(world.cooldown[slot]), number(ability, "shot_loops"))
 
 

@@ -17,6 +17,7 @@ from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.area_effects import AreaEffect
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.shots import PendingHit, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,10 +43,8 @@ def _throw(world: World, slot: int, target: int) -> None:
     branch = AT_STRUCTURE if world.unit_type(target).structure else AT_UNIT
     index = next(i for i, hit in enumerate(escort.hits) if hit.when == branch and hit.damage)
     owner = int(world.owner[slot])
-    world.pending.append(
-        1, source=slot, owner=owner, target=target, prior=NOBODY, weapon=escort.row, hit=index, due=float(world.loop),
-        single=False, goal=world.pos[target], start=world.pos[slot],
-    )  # fmt: skip
+    shot = Shot(slot, owner, target, NOBODY, escort.row, index, world.pos[slot], world.pos[target])
+    world.pending.append(PendingHit(shot, world.loop))
     if world.hallucination[slot]:
         return
     (x, y), (a, b) = world.pos[slot].tolist(), world.pos[target].tolist()

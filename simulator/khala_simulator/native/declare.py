@@ -1,6 +1,6 @@
-"""Write how compiled code reaches the world's columns: ``python -m khala_simulator.compiled.declare``.
+"""Write how compiled rules reach the columns of a world: ``columns.pxd`` and ``columns.pyx``, from ``world.columns``.
 
-``columns.pxd`` and ``columns.pyx`` follow from ``world.columns``. A test fails while they do not.
+The build calls it; the two files are not kept.
 """
 
 from __future__ import annotations
@@ -15,15 +15,11 @@ from khala_simulator.world.columns import COLUMNS, Column
 HERE: Final = Path(__file__).parent
 C_TYPES: Final = {np.bool_: "boolean", np.int64: "int64_t", np.float64: "double"}
 DECLARATION: Final = '''\
-# Written by khala_simulator.compiled.declare from world.columns.
-"""The world's columns as pointers, for compiled systems."""
-from libc.stdint cimport int64_t, uint8_t
+# Written by khala_simulator.native.declare from world.columns.
+"""The columns of a world as pointers, for compiled rules; `columns.py` has them for interpreted ones."""
+from libc.stdint cimport int64_t
 
-ctypedef uint8_t boolean
-
-cdef struct Point:
-    double x
-    double y
+from khala_simulator.native.memory cimport Point, boolean
 
 cdef class Columns:
     """One world's columns; they hold until it grows."""
@@ -33,16 +29,15 @@ cdef class Columns:
     cdef boolean* visible  # (players, capacity)
 {pointers}
 
-cdef Columns bound(object world)
+cdef Columns bind(object world)
 
 cdef inline Columns columns_of(object world):
-    """Return the columns of a world, bound now if its arrays are new."""
     native = world.native
-    return bound(world) if native is None else <Columns>native
+    return bind(world) if native is None else <Columns>native
 '''
 DEFINITION: Final = '''\
-# Written by khala_simulator.compiled.declare from world.columns.
-"""The world's columns as pointers, for compiled systems."""
+# Written by khala_simulator.native.declare from world.columns.
+"""The columns of a world as pointers, for compiled rules."""
 cimport numpy as cnp
 from libc.string cimport memcpy
 
@@ -72,7 +67,7 @@ cdef tuple NAMES = (
 cdef tuple EMPTY = tuple(COLUMNS[name].make(1) for name in NAMES)
 
 
-cdef Columns bound(object world):
+cdef Columns bind(object world):
     cdef Columns c = Columns.__new__(Columns)
     cdef tuple arrays = (world.visible, *[getattr(world, name) for name in NAMES])
     for array in arrays:
@@ -107,6 +102,9 @@ def declared() -> dict[str, str]:
     }
 
 
-if __name__ == "__main__":
-    for file, text in declared().items():
-        (HERE / file).write_text(text, encoding="utf-8")
+def write() -> None:
+    """Write the files that are missing or stale."""
+    for name, text in declared().items():
+        file = HERE / name
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")

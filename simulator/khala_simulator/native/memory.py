@@ -1,0 +1,91 @@
+"""Numbers in arrays, and points, for interpreted rules; `memory.pxd` has the same for compiled ones.
+
+Views give and take Python's own numbers, which are as exact as C's.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Cells = memoryview[Any]
+    """The numbers of an array, one after the other: in C a pointer to the first."""
+
+
+class Point(NamedTuple):
+    """A point or a vector, a value: a new one is assigned, never a part of one."""
+
+    x: float
+    y: float
+
+
+class Points:
+    """The points of an array (n, 2): one for every slot."""
+
+    __slots__ = ("_cells",)
+
+    def __init__(self, array: NDArray[np.float64]) -> None:
+        self._cells = memoryview(array.reshape(-1))
+
+    def __getitem__(self, slot: int) -> Point:
+        """Return a point."""
+        return Point(self._cells[2 * slot], self._cells[2 * slot + 1])
+
+    def __setitem__(self, slot: int, point: Point) -> None:
+        """Write a point."""
+        self._cells[2 * slot], self._cells[2 * slot + 1] = point.x, point.y
+
+
+def point(x: float, y: float) -> Point:
+    """Return a point."""
+    return Point(x, y)
+
+
+def bools(array: NDArray[np.bool_]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return memoryview(array.reshape(-1))
+
+
+def ints(array: NDArray[np.int64]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return memoryview(array.reshape(-1))
+
+
+def floats(array: NDArray[np.float64]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return memoryview(array.reshape(-1))
+
+
+def points(array: NDArray[np.float64]) -> Points:
+    """Return the points of an array (n, 2) whose memory is contiguous."""
+    return Points(array)
+
+
+def new_bools(n: int) -> NDArray[np.bool_]:
+    """Return an array (n,) of False."""
+    return np.zeros(n, dtype=np.bool_)
+
+
+def new_ints(n: int) -> NDArray[np.int64]:
+    """Return an array (n,) that is not filled."""
+    return np.empty(n, dtype=np.int64)
+
+
+def new_floats(n: int) -> NDArray[np.float64]:
+    """Return an array (n,) that is not filled."""
+    return np.empty(n, dtype=np.float64)
+
+
+def new_points(n: int) -> NDArray[np.float64]:
+    """Return an array (n, 2) that is not filled."""
+    return np.empty((n, 2), dtype=np.float64)
+
+
+def length(x: float, y: float) -> float:
+    """Return the length of a vector, rounded as everywhere."""
+    return math.sqrt(x * x + y * y)
