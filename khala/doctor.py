@@ -135,18 +135,18 @@ def _some(names: Sequence[str]) -> str:
 
 
 def _engine() -> Iterator[Finding]:
-    from khala_simulator import compiled  # noqa: PLC0415
+    from khala_simulator.native import engine  # noqa: PLC0415
 
     try:
-        engine = compiled.engine()
+        engine.check()
     except (ImportError, ValueError) as error:
-        yield Finding("engine", "wrong", str(error), f"unset {compiled.VARIABLE}, or install with a C compiler")
+        yield Finding("engine", "wrong", str(error), f"unset {engine.VARIABLE}, or say make install")
         return
-    if engine == "compiled" or compiled.wanted() == "python":
-        yield Finding("engine", "ok", engine)
+    if engine.engine() == "compiled" or engine.wanted() == "python":
+        yield Finding("engine", "ok", engine.describe())
         return
-    advice = "with a C compiler (gcc and libc6-dev) `make install` builds one that is several times faster"
-    yield Finding("engine", "note", engine, advice)
+    advice = "the interpreter plays the rules, a hundred times slower: `make install` with a network compiles them"
+    yield Finding("engine", "note", engine.describe(), advice)
 
 
 def _bus() -> Iterator[Finding]:

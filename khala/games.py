@@ -8,9 +8,9 @@ from pathlib import Path
 from khala import __version__
 from khala_bridge.errors import GameMissing
 from khala_bridge.game.game import find_sc2
+from khala_simulator.native.engine import describe
 from khala_simulator.process.install import InstallError, install, is_installed
 
-SIMULATOR = f"Khala simulator {__version__}, as"
 STARCRAFT = "StarCraft II"
 
 
@@ -37,9 +37,13 @@ def find(source: str) -> tuple[Path, str]:
             raise GameMissing(f"the simulator cannot be laid out: {error}; KHALA_CACHE names another place") from None
     else:
         path = find_sc2(source)
-    return path, SIMULATOR if is_installed(path) else STARCRAFT
+    return path, _simulator() if is_installed(path) else STARCRAFT
 
 
 def name_of(source: str) -> str:
     """Return the name of a game for the run card, and do not unpack the simulator for it; errors as in `find`."""
-    return SIMULATOR if source == "simulator" else find(source)[1]
+    return _simulator() if source == "simulator" else find(source)[1]
+
+
+def _simulator() -> str:
+    return f"Khala simulator {__version__} ({describe()}), as"

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator import compiled
+from khala_simulator.native import engine
 from khala_simulator.systems import (
     acquire,
     area_effects,
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
     from khala_simulator.maps.game_map import GameMap
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.players import PlayerSetup
+
+engine.check()
 
 RULES: Final[tuple[Callable[[World], None], ...]] = (
     death.bury,  # what a debug command killed since the last loop

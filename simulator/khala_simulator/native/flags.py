@@ -11,6 +11,8 @@ COMPILER: Final[tuple[str, ...]] = (
     else ("-O2", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined", "-w")
 )
 """Products and sums are rounded one by one, as in the interpreter, and square roots set no errno."""
+DECISIVE: Final = COMPILER[:2] if sys.platform == "win32" else (COMPILER[0], COMPILER[2])
+"""Those on which results depend."""
 CYTHON: Final[dict[str, object]] = {
     "language_level": 3,
     "boundscheck": True,  # of lists and tuples; memory is read by pointers, which nothing checks
