@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from khala_simulator.combat.traits import refresh
-from khala_simulator.world.active_buffs import FOREVER, ROW
+from khala_simulator.world.active_buffs import FOREVER
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
@@ -50,8 +48,7 @@ def apply(
         row["count"] = min(int(row["count"]) + 1, buff.stacks)
         return
     due = world.loop + buff.period_loops if buff.period_loops else FOREVER
-    fresh = np.array([(slot, buff.row, source, owner, world.loop, end, due, 1)], dtype=ROW)
-    table.rows = np.concatenate((table.rows, fresh))
+    table.add((slot, buff.row, source, owner, world.loop, end, due, 1))
     refresh(world, slot)
 
 
@@ -67,7 +64,7 @@ def remove(world: World, slot: int, name: str) -> bool:
     mine = (rows["slot"] == slot) & (rows["buff"] == row)
     if not mine.any():
         return False
-    world.buffs.rows = rows[~mine]
+    world.buffs.keep(~mine)
     refresh(world, slot)
     return True
 

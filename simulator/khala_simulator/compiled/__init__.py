@@ -23,19 +23,10 @@ if TYPE_CHECKING:
     System = Callable[[World], None]
 
 SYSTEMS: Final = (
-    "autocast",
     "avoidance",
-    "buffs",
-    "casts",
     "collision",
-    "construction",
-    "death",
-    "engagement",
-    "harvest",
     "movement",
     "navigation",
-    "orders",
-    "triggers",
     "vision",
 )
 """The systems that have a module here."""

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.combat import buffs
-from khala_simulator.numeric import geometry
+from khala_simulator.economy import touching
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.catalog import Catalog
-    from khala_simulator.tables.records import UnitType
     from khala_simulator.world.columns import Bools, Floats, Ints
     from khala_simulator.world.world import World
 
@@ -54,22 +53,6 @@ def kinds(catalog: Catalog) -> tuple[Bools, Bools, Bools]:
     gas = np.array([u.resource == "vespene" and u.harvest_loops > 0.0 for u in catalog.units])
     halls = np.array([u.structure and "DropOff" in u.placement and not u.flying for u in catalog.units])
     return fields | gas, fields, halls
-
-
-@lru_cache(maxsize=4)
-def outlines(catalog: Catalog) -> Floats:
-    """Return (4, rows) of each type: half its footprint's width and height, |x| + |y| at its corners, its radius."""
-    return np.ascontiguousarray(np.array([_outline(catalog, unit) for unit in catalog.units]).T)
-
-
-def _outline(catalog: Catalog, unit: UnitType) -> tuple[float, float, float, float]:
-    footprint = catalog.footprints.get(unit.footprint)
-    if footprint is None or not footprint.cells:
-        return unit.radius, unit.radius, unit.radius * 2.0, unit.radius_shown
-    width, height = footprint.size
-    corner = max(dx + dy + 2 for dx, dy in footprint.cells)
-    odd = (width % 2 + height % 2) / 2.0
-    return width / 2.0, height / 2.0, corner - odd, unit.radius_shown
 
 
 @lru_cache(maxsize=4)
@@ -115,20 +98,6 @@ def _nearest(world: World, slot: int, candidates: Ints) -> int:
         return NOBODY
     offset = world.pos[candidates] - world.pos[slot]
     return int(candidates[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
-
-
-def reach_of(world: World, slots: Ints, targets: Ints) -> Floats:
-    """Return (k,) distance between centres at which workers touch their resource or town hall from where they are.
-
-    Edges touch at the radius that clients see; before a corner of the walls that stands farther out, at the walls.
-    """
-    half_x, half_y, diagonal, radius = outlines(world.catalog).take(world.type.take(targets), 1)
-    offset = np.abs(world.pos.take(targets, 0) - world.pos.take(slots, 0))
-    distance = np.maximum(geometry.length(offset), 1e-9)
-    across, along = np.maximum(offset.T / distance, 1e-9)
-    walls = np.minimum(np.minimum(half_x / across, half_y / along), diagonal / (across + along))
-    reach: Floats = np.maximum(walls + MECHANICS.harvest_gap, radius) + world.radius.take(slots)
-    return reach
 
 
 # who is where ---------------------------------------------------------------------------------------------------------
@@ -207,8 +176,7 @@ def _door(world: World, slot: int, patch: int) -> tuple[float, float]:
     centre = world.pos[patch]
     towards = (world.pos[hall] if hall != NOBODY else world.pos[slot]) - centre
     length = float(np.hypot(*towards)) or 1.0
-    reach = float(reach_of(world, np.array([slot]), np.array([patch]))[0])
-    x, y = (centre + towards / length * reach).tolist()
+    x, y = (centre + towards / length * touching.distance_in(world, slot, patch)).tolist()
     return x, y
 
 

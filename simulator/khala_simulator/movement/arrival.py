@@ -5,42 +5,97 @@ The game's own rule is not known; this one is an estimate. Used by ``systems.ord
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
+from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
-    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
-BLOCKED_LOOPS = 2
+BLOCKED_LOOPS: Final = 2
+ROUNDING: Final = 1e-9  # more than the order of a sum makes of it, relatively
+CROWD_NEAR: Final = MECHANICS.crowd_near
+CROWD_SHARE: Final = MECHANICS.crowd_share
+CROWD_PATIENCE: Final = MECHANICS.crowd_patience
+CROWD_STALL: Final = MECHANICS.crowd_stall
 
 
-def packed(world: World, slots: Ints) -> Bools:
-    """Return (k,) whether each walker has come as near to its goal as the crowd allows.
+class Crowd:
+    """The bodies in the world at one loop."""
+
+    def __init__(self, world: World) -> None:
+        c = columns.columns_of(world)
+        self.live = world.live
+        self.slots = memory.ints(self.live)
+        self.units = len(self.live)
+        self.loop = world.loop
+        self.area = 0.0  # that all of them fill
+        for i in range(self.units):
+            slot = self.slots[i]
+            self.area += c.separation[slot] * c.separation[slot]
+
+
+def packed(c: Columns, crowd: Crowd, slot: int) -> bool:
+    """Return whether a walker has come as near to its goal as the crowd allows.
 
     That is when it stands before others close to the goal, when friends fill the ground between it and the goal, or
     when it is within the area that all of them would fill and has come no nearer for long.
     """
-    offset = world.nav_goal.take(slots, 0) - world.pos.take(slots, 0)
-    squared = offset[:, 0] ** 2 + offset[:, 1] ** 2
-    blocked = world.blocked.take(slots)
-    near = world.separation.take(slots) + MECHANICS.crowd_near
-    arrived: Bools = (blocked >= MECHANICS.crowd_patience) & (squared < near**2)
-    bodies = world.live
-    area = world.separation.take(bodies) ** 2
-    could = ~arrived & (squared * MECHANICS.crowd_share <= area.sum())  # no walker is packed farther out than this
-    known = world.nav_loop.take(slots) > 0  # the way has been checked since the order
-    arrived |= could & known & (world.loop - world.nav_best_loop.take(slots) > MECHANICS.crowd_stall)
-    worth = np.flatnonzero(could & ~arrived & (blocked >= BLOCKED_LOOPS))
-    if worth.size:
-        one, squared = slots.take(worth), squared.take(worth)
-        offset = world.pos.take(bodies, 0) - world.nav_goal.take(one, 0)[:, None, :]
-        inside = offset[..., 0] ** 2 + offset[..., 1] ** 2 < squared[:, None]
-        inside &= world.owner.take(bodies) == world.owner.take(one)[:, None]
-        inside &= (world.layer_bits.take(bodies) & world.layer_bits.take(one)[:, None]) != 0
-        inside &= bodies != one[:, None]
-        arrived[worth] = np.where(inside, area, 0.0).sum(axis=1) >= MECHANICS.crowd_share * squared
-    return arrived
+    x = c.nav_goal[slot].x - c.pos[slot].x
+    y = c.nav_goal[slot].y - c.pos[slot].y
+    squared = x * x + y * y
+    near = c.separation[slot] + CROWD_NEAR
+    if c.blocked[slot] >= CROWD_PATIENCE and squared < near * near:
+        return True
+    if not _fills(c, crowd, NOBODY, squared, crowd.area):  # no walker is packed farther out than this
+        return False
+    if c.nav_loop[slot] > 0 and crowd.loop - c.nav_best_loop[slot] > CROWD_STALL:
+        return True  # the way has been checked since the order
+    return c.blocked[slot] >= BLOCKED_LOOPS and _is_filled(c, crowd, slot, squared)
+
+
+def _is_filled(c: Columns, crowd: Crowd, slot: int, squared: float) -> bool:
+    """Return whether friends fill the ground between a walker and its goal."""
+    area = 0.0
+    enough = CROWD_SHARE * squared * (1.0 + ROUNDING)
+    for i in range(crowd.units):
+        other = crowd.slots[i]
+        if _is_inside(c, slot, other, squared):
+            area += c.separation[other] * c.separation[other]
+            if area > enough:
+                return True
+    return _fills(c, crowd, slot, squared, area)
+
+
+def _fills(c: Columns, crowd: Crowd, slot: int, squared: float, area: float) -> bool:
+    """Return whether an area is as large as it must be at a distance; where the order of its sum matters, measure."""
+    wanted = CROWD_SHARE * squared
+    if abs(area - wanted) > wanted * ROUNDING:
+        return area > wanted
+    return _area(c, crowd, slot, squared) >= wanted
+
+
+def _is_inside(c: Columns, slot: int, other: int, squared: float) -> bool:
+    """Return whether another body is a friend in the way that is nearer to a walker's goal."""
+    x = c.pos[other].x - c.nav_goal[slot].x
+    y = c.pos[other].y - c.nav_goal[slot].y
+    return (
+        x * x + y * y < squared
+        and c.owner[other] == c.owner[slot]
+        and c.layer_bits[other] & c.layer_bits[slot] != 0
+        and other != slot
+    )
+
+
+def _area(c: Columns, crowd: Crowd, slot: int, squared: float) -> float:
+    """Return the area of the bodies between a walker and its goal, or of all bodies for NOBODY, summed in pairs."""
+    areas = memory.new_floats(crowd.units)
+    cells = memory.floats(areas)
+    for i in range(crowd.units):
+        other = crowd.slots[i]
+        is_inside = slot == NOBODY or _is_inside(c, slot, other, squared)
+        cells[i] = c.separation[other] * c.separation[other] if is_inside else 0.0
+    return float(areas.sum())

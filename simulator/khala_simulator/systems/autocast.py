@@ -6,11 +6,13 @@ one that idles, patrols or attack-moves does it as an order of its own and goes 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.economy.requirements import missing_to_all
+from khala_simulator.native import columns
 from khala_simulator.tables.abilities import Aim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
@@ -22,18 +24,37 @@ if TYPE_CHECKING:
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.world.world import World
 
-FREE = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL, OrderKind.HOLD})
+SCAN_PERIOD: Final = MECHANICS.scan_period
+FREE: Final = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL, OrderKind.HOLD})
 
 
 def look_out(world: World) -> None:
     """Make every unit with autocast use its abilities, in the order of slots."""
-    if not world.autocast or world.loop % MECHANICS.scan_period:
+    loop = world.loop
+    if not world.autocast or loop % SCAN_PERIOD:
         return
+    closed: dict[tuple[int, int], bool] = {}
     for slot in sorted(world.autocast):
-        if world.carrier[slot] == NOBODY and world.can_cast[slot] and not world.casts[slot]:
-            for number in world.autocast[slot]:
-                if attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
-                    break
+        c = columns.columns_of(world)
+        is_free = c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]
+        if is_free and _use_one(world, slot, c.owner[slot], closed):
+            closed.clear()
+
+
+def _use_one(world: World, slot: int, owner: int, closed: dict[tuple[int, int], bool]) -> bool:
+    """Make a unit use the first of its abilities that its player would want now; return whether it does.
+
+    ``closed`` has whether an ability, by owner and id, lacks what it requires, whichever unit uses it.
+    """
+    for number in world.autocast[slot]:
+        is_closed = closed.get((owner, number))
+        if is_closed is None:
+            ability = world.catalog.ability(number)
+            is_closed = ability.effect not in casting.ORDINARY and missing_to_all(world, slot, ability)
+            closed[owner, number] = is_closed
+        if not is_closed and attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
+            return True
+    return False
 
 
 def attempt(world: World, slot: int, ability: Ability) -> bool:

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 def run_out(world: World) -> None:
     """Run the rules of buffs that are due, and remove those whose time is over."""
-    if not len(world.buffs):
+    if not world.buffs.any_due(world.loop):
         return
     _tick(world)
     over = world.buffs.rows["end"] <= world.loop
     if not some(over):
         return
     ended = world.buffs.rows[over]
-    world.buffs.rows = world.buffs.rows[~over]
+    world.buffs.keep(~over)
     for row in ended:
         slot = int(row["slot"])
         refresh(world, slot)

@@ -10,14 +10,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.native import columns
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
-    from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import World
 
 NOT_BEGUN = -1.0
@@ -27,8 +26,9 @@ def carry_on(world: World) -> None:
     """Advance every cast by one loop, in the order of slots."""
     if world.channelling:
         _end_dropped(world)
-    casters: Ints = which(world.casts[: world.top])
-    for slot in casters.tolist():
+    c = columns.columns_of(world)
+    casters = [slot for slot in range(world.top) if c.casts[slot]]
+    for slot in casters:
         if world.casts[slot] and world.carrier[slot] == NOBODY:
             _advance(world, slot)
 

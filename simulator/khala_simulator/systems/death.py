@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_simulator.abilities.registry import DEATHS, FINALS
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.native import columns, memory
+from khala_simulator.numeric.arrays import which
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
 
@@ -19,14 +20,22 @@ NO_KILLER = -1
 
 def bury(world: World) -> None:
     """Remove every unit without life, in the order of slots, and those that their deaths kill in turn."""
+    dead = _find_dead(world)
+    if not dead:
+        return
     killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
-    while True:
-        slots = world.live
-        dead = world.life.take(slots) <= 0.0
-        if not some(dead):
-            return
-        for slot in slots[dead].tolist():
+    while dead:
+        for slot in dead:
             _bury(world, slot, killers)
+        dead = _find_dead(world)
+
+
+def _find_dead(world: World) -> list[int]:
+    """Return the units without life, in the order of slots."""
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    return [slots[i] for i in range(len(live)) if c.life[slots[i]] <= 0.0]
 
 
 def _bury(world: World, slot: int, killers: dict[int, int]) -> None:

@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Final
 from khala_simulator.abilities import commands
 from khala_simulator.economy import harvesting
 from khala_simulator.economy.harvesting import ORDINARY_TRIP, Phase
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.native import columns
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
-TO_RESOURCE, TO_HALL = int(Phase.TO_RESOURCE), int(Phase.TO_HALL)
-AT_RESOURCE, LEAVING = int(Phase.AT_RESOURCE), int(Phase.LEAVING)
+NONE: Final = int(Phase.NONE)
+TO_RESOURCE: Final = int(Phase.TO_RESOURCE)
+TO_HALL: Final = int(Phase.TO_HALL)
 NO_KILLER: Final = -1
 REMEMBERED_LOOPS: Final = 240  # how long deliveries count for the rate of collection
 RETRY_LOOPS: Final = 8  # how often a worker before a taken field looks for another one
@@ -31,22 +33,25 @@ def run(world: World) -> None:
     """Lead every worker that harvests through its round by one loop."""
     if not world.harvesting:
         return
-    n = world.top
-    phase = world.harvest[:n]
-    workers = which(phase > 0)
-    if not workers.size:
-        world.harvesting = False
-        return
-    phase = phase.take(workers)
-    there = (phase == TO_RESOURCE) | (phase == TO_HALL)
-    there &= ~world.wants.take(workers)  # as ``engagement`` measured it
-    there &= world.can_act.take(workers)
-    done = (phase == AT_RESOURCE) | (phase == LEAVING)
-    done &= world.work_until.take(workers) <= world.loop
-    due = there | done
-    if some(due):
-        for slot in workers[due].tolist():
-            STEPS[Phase(int(world.harvest[slot]))](world, slot)
+    c = columns.columns_of(world)
+    loop = world.loop
+    harvests = False
+    due = []
+    for slot in range(world.top):
+        if c.harvest[slot] != NONE:
+            harvests = True
+            if _is_due(c, slot, loop):
+                due.append(slot)
+    world.harvesting = harvests
+    for slot in due:
+        STEPS[int(world.harvest[slot])](world, slot)
+
+
+def _is_due(c: Columns, slot: int, loop: int) -> bool:
+    """Return whether a worker has come to the end of its phase."""
+    if c.harvest[slot] == TO_RESOURCE or c.harvest[slot] == TO_HALL:
+        return not c.wants[slot] and bool(c.can_act[slot])  # as ``engagement`` measured it
+    return bool(c.work_until[slot] <= loop)
 
 
 def _arrive(world: World, slot: int) -> None:
@@ -164,8 +169,8 @@ def deliver(world: World, slot: int) -> None:
 
 
 STEPS: Final = {
-    Phase.TO_RESOURCE: _arrive,
-    Phase.AT_RESOURCE: _take,
-    Phase.LEAVING: _go_home,
-    Phase.TO_HALL: _drop_off,
+    int(Phase.TO_RESOURCE): _arrive,
+    int(Phase.AT_RESOURCE): _take,
+    int(Phase.LEAVING): _go_home,
+    int(Phase.TO_HALL): _drop_off,
 }

@@ -2,64 +2,79 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import commands
-from khala_simulator.movement.arrival import packed
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.movement import arrival
+from khala_simulator.movement.arrival import Crowd
+from khala_simulator.native import columns
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
-CROWD_PERIOD = 2
+CROWD_PERIOD: Final = 2
 """How often the density of the crowd at a goal is checked; of those who look for targets, whenever they have looked."""
+CROWD_STALL: Final = MECHANICS.crowd_stall
+SCAN_PERIOD: Final = MECHANICS.scan_period
+ARRIVAL_RADIUS_SQUARED: Final = MECHANICS.arrival_radius**2
 
 
 def carry_out(world: World) -> None:
     """End every order whose point is reached or whose target is gone, and begin the next one."""
-    for slot in _lost(world) + _arrived(world):
+    c = columns.columns_of(world)
+    finished = _find_lost(world, c)
+    _find_arrived(world, c, finished)
+    for slot in finished:
         commands.begin_next(world, slot)
 
 
-def _lost(world: World) -> list[int]:
+def _find_lost(world: World, c: Columns) -> list[int]:
     """Return slots whose target is dead or out of their owner's sight; where nothing hides only a change does that."""
     if not (world.orders_changed or world.fog or world.hiding):
         return []
     world.orders_changed = False
-    slots = which(world.needs_target[: world.top])
-    if not slots.size:
-        return []
-    target = world.order_target.take(slots)
-    lost = (target == NOBODY) | ~world.visible[world.owner.take(slots), target]
-    return slots[lost].tolist() if some(lost) else []
+    return [slot for slot in range(world.top) if c.needs_target[slot] and _is_lost(c, slot)]
 
 
-def _arrived(world: World) -> list[int]:
-    """Return slots whose walk has reached its point, or as near as the crowd there or the terrain allows.
+def _is_lost(c: Columns, slot: int) -> bool:
+    """Return whether the target of a unit's order is dead or out of its owner's sight."""
+    target = c.order_target[slot]
+    return target == NOBODY or not c.visible[c.owner[slot] * c.capacity + target]
 
-    Units that look for targets on their way have just looked in vain: if not, an attack on a place would end as soon as
-    the first enemy there is dead.
+
+def _find_arrived(world: World, c: Columns, found: list[int]) -> None:
+    """Add slots whose walk has reached its point, or as near as the crowd there or the terrain allows."""
+    loop = world.loop
+    just_looked = loop % SCAN_PERIOD == 1
+    looks_at_crowds = just_looked or loop % CROWD_PERIOD == 0
+    crowd = None
+    for slot in range(world.top):
+        if not c.walks[slot]:
+            continue
+        if c.looks_around[slot] and _goes_on(c, slot, just_looked and c.scan_loop[slot] > loop):
+            continue
+        if _is_there(c, slot):
+            found.append(slot)
+        elif looks_at_crowds and (c.blocked[slot] > 0 or loop - c.nav_best_loop[slot] > CROWD_STALL):
+            if crowd is None:
+                crowd = Crowd(world)
+            if arrival.packed(c, crowd, slot):
+                found.append(slot)
+
+
+def _goes_on(c: Columns, slot: int, just_looked: bool) -> bool:
+    """Return whether a unit that looks for targets on its way goes on: it has one, or has not just looked in vain.
+
+    If it ended without that look, an attack on a place would end as soon as the first enemy there is dead.
     """
-    n = world.top
-    walks, looks = world.walks[:n], world.looks_around[:n]
-    just_looked = world.loop % MECHANICS.scan_period == 1
-    if some(looks & walks):
-        looked = just_looked & (world.scan_loop[:n] > world.loop)
-        walks = walks & (~looks | (world.target[:n] == NOBODY) & (looked | ~world.acquires[:n]))
-    walkers = which(walks)
-    if not walkers.size:
-        return []
-    offset = world.order_point.take(walkers, 0) - world.pos.take(walkers, 0)
-    offset *= offset
-    squared = offset[:, 0] + offset[:, 1]
-    there = squared <= MECHANICS.arrival_radius**2
-    there |= world.nav_end.take(walkers)
-    if just_looked or world.loop % CROWD_PERIOD == 0:
-        stuck = world.blocked.take(walkers) > 0
-        stuck |= world.loop - world.nav_best_loop.take(walkers) > MECHANICS.crowd_stall
-        stuck &= ~there
-        if some(stuck):
-            there[stuck] = packed(world, walkers[stuck])
-    return walkers[there].tolist() if some(there) else []
+    return c.target[slot] != NOBODY or (c.acquires[slot] and not just_looked)
+
+
+def _is_there(c: Columns, slot: int) -> bool:
+    """Return whether a walker has reached its point, or the end of its way."""
+    x = c.order_point[slot].x - c.pos[slot].x
+    y = c.order_point[slot].y - c.pos[slot].y
+    return x * x + y * y <= ARRIVAL_RADIUS_SQUARED or c.nav_end[slot]

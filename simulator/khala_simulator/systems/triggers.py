@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from khala_simulator.maps.game_map import GameMap
+    from khala_simulator.maps.scenario import Scenario
     from khala_simulator.maps.script import Comparison, Condition, EnterSpec, TouchSpec, Trigger, When, Who
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import Death, World
@@ -47,11 +48,10 @@ def start(world: World) -> None:
 def run(world: World) -> None:
     """Run the triggers that are due at this loop, in the scenario's order, until one ends the game."""
     scenario = world.map.scenario
+    if len(world.deaths) == world.deaths_seen and not scenario.watches and not _is_time(scenario, world.loop):
+        return
     deaths = world.deaths[world.deaths_seen :]
     world.deaths_seen = len(world.deaths)
-    timed = world.loop in scenario.moments or any(world.loop % period == 0 for period in scenario.periods)
-    if not (timed or deaths or scenario.watches):
-        return
     for number, trigger in enumerate(scenario.triggers):
         for subject in _occasions(world, number, trigger, deaths):
             if _holds(world, trigger.condition):
@@ -60,6 +60,16 @@ def run(world: World) -> None:
                 return
     if deaths and scenario.melee:
         melee_start.judge(world)
+
+
+def _is_time(scenario: Scenario, loop: int) -> bool:
+    """Return whether a loop is one at which a trigger is due."""
+    if loop in scenario.moments:
+        return True
+    for period in scenario.periods:  # noqa: SIM110  # a generator costs more than the question
+        if loop % period == 0:
+            return True
+    return False
 
 
 def _do(world: World, trigger: Trigger, subject: int) -> None:

@@ -34,17 +34,26 @@ class ActiveBuffs:
     """The buffs in force, a row each, in the order in which they came."""
 
     def __init__(self) -> None:
-        self.rows = np.zeros(0, dtype=ROW)
+        self._rows = np.zeros(0, dtype=ROW)
+        self._first: dict[tuple[int, int], int] | None = None  # (slot, kind) -> its first row, for ``find``
+        self._quiet_until = float(FOREVER)  # the loop before which no period and no end comes, for ``any_due``
 
     @property
     def rows(self) -> NDArray[np.void]:
-        """(k,) the table; rows come and go by a new one, and no unit or kind in it changes."""
+        """(k,) the table; no unit or kind in it changes, and a period or an end is only put off."""
         return self._rows
 
-    @rows.setter
-    def rows(self, rows: NDArray[np.void]) -> None:
-        self._rows = rows
-        self._first: dict[tuple[int, int], int] | None = None  # (slot, kind) -> its first row, for ``find``
+    def add(self, row: tuple[float, ...]) -> None:
+        """Add a row."""
+        fresh = np.array([row], dtype=ROW)
+        self._rows = np.concatenate((self._rows, fresh))
+        self._first = None
+        self._quiet_until = min(self._quiet_until, float(fresh["due"][0]), float(fresh["end"][0]))
+
+    def keep(self, kept: NDArray[np.bool_]) -> None:
+        """Remove all rows but those."""
+        self._rows = self._rows[kept]
+        self._first = None
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -63,10 +72,18 @@ class ActiveBuffs:
                 self._first.setdefault(kind, index)
         return self._first.get((slot, row), -1)
 
+    def any_due(self, loop: int) -> bool:
+        """Return whether a period or an end has come."""
+        if loop < self._quiet_until:
+            return False
+        rows = self._rows
+        self._quiet_until = min(float(rows["due"].min()), float(rows["end"].min())) if len(rows) else FOREVER
+        return loop >= self._quiet_until
+
     def forget(self, slot: int) -> None:
         """Remove the buffs on a unit that is gone; buffs that it cast stay."""
         if len(self.rows):
-            self.rows = self.rows[self.rows["slot"] != slot]
+            self.keep(self.rows["slot"] != slot)
             source = self.rows["source"]
             source[source == slot] = NOBODY
 

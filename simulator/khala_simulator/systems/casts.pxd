@@ -1,0 +1,6 @@
+cimport cython
+
+from khala_simulator.native cimport columns
+
+@cython.locals(slot=Py_ssize_t)
+cpdef carry_on(object world)
