@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SYSTEMS: Final = (
     "avoidance",
     "collision",
-    "movement",
     "navigation",
     "vision",
 )

@@ -8,158 +8,178 @@ facing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.movement import turning
+from khala_simulator.native import columns, memory
 from khala_simulator.world.census import census
 
 if TYPE_CHECKING:
-    from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
-NOBODY_COASTS: Ints = np.zeros(0, dtype=np.int64)
-TURNING_CIRCLES = 4.0  # a flyer this many steps from its goal no longer swings around
+TURNING_CIRCLES: Final = 4.0  # a flyer this many steps from its goal no longer swings around
+NO_DISTANCE: Final = 1e-12
 
 
 def move(world: World) -> None:
     """Choose this loop's steps and turn; writes ``intended``, ``speed`` and ``heading``."""
+    c = columns.columns_of(world)
     n = world.top
-    wants = world.wants[:n]
-    coasting = _coasting(world)
-    if some(wants) or coasting.size:
-        drift = _drift(world, coasting) if coasting.size else None
-        world.speed[:n] *= wants
-        world.intended[:n] = 0.0
-        if drift is not None:
-            world.intended[coasting] = drift
-            world.speed[coasting] = geometry.length(drift)
-        walkers = which(wants)
-        if walkers.size:
-            _walk(world, walkers)
-        world.anyone_moved = True
-    elif world.anyone_moved:
-        world.speed[:n] = 0.0
-        world.intended[:n] = 0.0
-        world.anyone_moved = False
-    _face_targets(world)
+    kinds = census(world)
+    drifts = kinds.drifting_flyers
+    walking = 0
+    anyone = False
+    for slot in range(n):
+        if c.wants[slot]:
+            walking += 1
+        elif drifts and _coasts(c, slot):
+            anyone = True
+    if anyone or walking or world.anyone_moved:
+        for slot in range(n):
+            if c.wants[slot]:
+                continue
+            if drifts and _coasts(c, slot):
+                _drift(c, slot)
+            else:
+                c.speed[slot] = 0.0
+                c.intended[slot] = memory.point(0.0, 0.0)
+        if walking:
+            _walk(world, c, walking, kinds.brakers)
+        world.anyone_moved = anyone or walking > 0
+    _face_targets(world, c)
 
 
-def _face_targets(world: World) -> None:
+def _face_targets(world: World, c: Columns) -> None:
     """Turn units that stand and fight to their target; turrets and units that can't turn keep the body's heading."""
     fighters = world.fighters
-    turning = world.aim_cos.take(fighters) > -1.0
-    turning &= ~world.turreted.take(fighters)
-    turning &= ~world.wants.take(fighters)
-    slots = fighters[turning]
-    if not slots.size:
-        return
-    facing, wanted = world.heading.take(slots, 0), world.toward.take(slots, 0)
-    if np.count_nonzero(facing != wanted):
-        world.heading[slots] = geometry.turn_towards(
-            facing,
-            wanted,
-            world.turn_still_cos.take(slots),
-            world.turn_still_sin.take(slots),
-        )
+    slots = memory.ints(fighters)
+    for i in range(len(fighters)):
+        slot = slots[i]
+        if c.aim_cos[slot] > -1.0 and not c.turreted[slot] and not c.wants[slot]:
+            c.heading[slot] = turning.turned(
+                c.heading[slot], c.toward[slot], c.turn_still_cos[slot], c.turn_still_sin[slot]
+            )
 
 
 # flyers that stop -----------------------------------------------------------------------------------------------------
 
 
-def _coasting(world: World) -> Ints:
-    """Return flyers that have speed left and nowhere to go."""
-    if not census(world).drifting_flyers:
-        return NOBODY_COASTS
-    n = world.top
-    left = (world.speed[:n] > 0.0) & ~world.wants[:n]
-    if some(left):
-        left &= world.glides[:n]
-        left &= world.step_max[:n] > 0.0
-    return which(left)
+def _coasts(c: Columns, slot: int) -> bool:
+    """Return whether a flyer has speed left and nowhere to go."""
+    return c.glides[slot] and c.speed[slot] > 0.0 and not c.wants[slot] and c.step_max[slot] > 0.0
 
 
-def _drift(world: World, slots: Ints) -> Floats:
-    """Return (k, 2) their steps of this loop: as the last one, a little shorter."""
-    last = world.intended.take(slots, 0)
-    speed = np.maximum(world.speed.take(slots) - world.step_loss.take(slots), 0.0)
-    drift: Floats = last * (speed / np.maximum(geometry.length(last), 1e-12))[:, None]
-    return drift
+def _drift(c: Columns, slot: int) -> None:
+    """Write the step of a flyer that coasts: as its last one, a little shorter."""
+    last = c.intended[slot]
+    share = max(c.speed[slot] - c.step_loss[slot], 0.0) / max(memory.length(last.x, last.y), NO_DISTANCE)
+    step = memory.point(last.x * share, last.y * share)
+    c.intended[slot] = step
+    c.speed[slot] = memory.length(step.x, step.y)
 
 
 # walkers --------------------------------------------------------------------------------------------------------------
 
 
-def _walk(world: World, walkers: Ints) -> None:
+class _Walks:
+    """The steps of all walkers; the i-th of each column belongs to the i-th walker."""
+
+    def __init__(self, walkers: int) -> None:
+        self.arrays = (
+            memory.new_ints(walkers),
+            memory.new_points(walkers),
+            memory.new_floats(walkers),
+            memory.new_floats(walkers),
+            memory.new_floats(walkers),
+            memory.new_floats(walkers),
+        )
+        self.slot = memory.ints(self.arrays[0])
+        self.way = memory.points(self.arrays[1])  # unit vectors
+        self.speed = memory.floats(self.arrays[2])
+        self.step = memory.floats(self.arrays[3])
+        self.left = memory.floats(self.arrays[4])  # to the corner or the goal
+        self.error_cos = memory.floats(self.arrays[5])  # between the heading and that way
+
+
+def _walk(world: World, c: Columns, walking: int, brakers: bool) -> None:
     """Choose the steps of all walkers, and turn them."""
-    pos = world.pos.take(walkers, 0)
-    offset = world.nav_point.take(walkers, 0) - pos
-    distance = geometry.length(offset)
-    direction = offset / np.maximum(distance, 1e-12)[:, None]
-    straight = world.nav_straight.take(walkers)
-    left = np.maximum(distance - world.stop_at.take(walkers) * straight, 0.0)
-    speed = np.minimum(world.speed.take(walkers) + world.step_gain.take(walkers), _top_speed(world, walkers, pos))
-    speed = _braked(world, walkers, speed, left, straight)
-    aside = world.aside.take(walkers, 0)
-    if np.count_nonzero(aside):
-        turned: Bools = (aside[:, 0] != 0.0) | (aside[:, 1] != 0.0)
-        turned &= world.detour.take(walkers) != 0
-        direction = np.where(turned[:, None], aside, direction)
-    step = np.minimum(speed, left)
-    moving = step > 0.0
-    if np.count_nonzero(moving) < len(moving):
-        direction = np.where(moving[:, None], direction, world.heading.take(walkers, 0))
-    step, way = _turn(world, walkers, direction, step, left)
-    world.speed[walkers] = speed
-    world.intended[walkers] = way * step[:, None]
+    walks = _Walks(walking)
+    queue = world.queue
+    creeps = world.growth.anywhere
+    covered = np.ascontiguousarray(world.creep) if creeps else memory.new_bools(0)
+    creep = memory.bools(covered)
+    width, height = world.map.terrain.size
+    late = False
+    i = 0
+    for slot in range(world.top):
+        if c.wants[slot]:
+            walks.slot[i] = slot
+            top_speed = c.step_max[slot]
+            if creeps and creep[_cell(c.pos[slot], width, height)]:
+                top_speed = top_speed * c.creep_factor[slot]
+            _choose(c, walks, i, top_speed, brakers, queue)
+            walks.error_cos[i] = c.heading[slot].x * walks.way[i].x + c.heading[slot].y * walks.way[i].y
+            if walks.error_cos[i] < c.turn_cos[slot]:
+                late = True
+            i += 1
+    for i in range(walking):
+        slot = walks.slot[i]
+        if late:
+            _turn(c, walks, i)
+        else:
+            c.heading[slot] = walks.way[i]
+        c.speed[slot] = walks.speed[i]
+        c.intended[slot] = memory.point(walks.way[i].x * walks.step[i], walks.way[i].y * walks.step[i])
 
 
-def _braked(world: World, walkers: Ints, speed: Floats, left: Floats, straight: Bools) -> Floats:
-    """Return the speeds at which each walker can still stop at its goal; one with a further order does not stop."""
-    if not census(world).brakers:
-        return speed
-    loss = world.step_loss.take(walkers)
-    braking = np.isfinite(loss) & straight
-    if not some(braking):
-        return speed
-    loss = np.where(braking, loss, 0.0)
-    least = np.sqrt(2.0 * loss * left + 0.25 * loss * loss) - 0.5 * loss
-    braking &= least < speed
-    for i in which(braking).tolist():
-        braking[i] = not world.queue[walkers[i]]
-    return np.where(braking, least, speed)
+def _cell(at: memory.Point, width: int, height: int) -> int:
+    """Return the cell of the map under a point, the nearest one if it is outside."""
+    column = int(at.x)
+    row = int(at.y)
+    return min(max(row, 0), height - 1) * width + min(max(column, 0), width - 1)
 
 
-def _turn(world: World, walkers: Ints, wanted: Floats, step: Floats, left: Floats) -> tuple[Floats, Floats]:
-    """Turn walkers to the wanted directions (k, 2); return how far and which way they move meanwhile."""
-    facing = world.heading.take(walkers, 0)
-    product = facing * wanted
-    error_cos = product[:, 0] + product[:, 1]
-    turn_cos, turn_sin = world.turn_cos.take(walkers), world.turn_sin.take(walkers)
-    late = error_cos < turn_cos
-    if not some(late):
-        world.heading[walkers] = wanted
-        return step, wanted
-    standing = (world.speed.take(walkers) <= 0.0) | (error_cos < 0.0)
-    turn_cos = np.where(standing, world.turn_still_cos.take(walkers), turn_cos)
-    turn_sin = np.where(standing, world.turn_still_sin.take(walkers), turn_sin)
-    facing = geometry.turn_towards(facing, wanted, turn_cos, turn_sin)
-    world.heading[walkers] = facing
-    product = facing * wanted
-    swings = world.glides.take(walkers)
-    swings &= left > TURNING_CIRCLES * step
-    step = np.where(swings | ~late, step, step * np.maximum(product[:, 0] + product[:, 1], 0.0))
-    return step, np.where(swings[:, None], facing, wanted)
+def _choose(c: Columns, walks: _Walks, i: int, top_speed: float, brakers: bool, queue: list[object]) -> None:
+    """Choose the way and the step of a walker of some top speed."""
+    slot = walks.slot[i]
+    x = c.nav_point[slot].x - c.pos[slot].x
+    y = c.nav_point[slot].y - c.pos[slot].y
+    distance = memory.length(x, y)
+    left = max(distance - c.stop_at[slot] * c.nav_straight[slot], 0.0)
+    speed = min(c.speed[slot] + c.step_gain[slot], top_speed)
+    if brakers and c.nav_straight[slot] and math.isfinite(c.step_loss[slot]):
+        loss = c.step_loss[slot]
+        slowest = math.sqrt(2.0 * loss * left + 0.25 * loss * loss) - 0.5 * loss
+        if slowest < speed and not queue[slot]:
+            speed = slowest
+    walks.left[i] = left
+    walks.speed[i] = speed
+    walks.step[i] = min(speed, left)
+    if not walks.step[i] > 0.0:
+        walks.way[i] = c.heading[slot]
+    elif c.detour[slot] != 0 and (c.aside[slot].x != 0.0 or c.aside[slot].y != 0.0):
+        walks.way[i] = c.aside[slot]
+    else:
+        size = max(distance, NO_DISTANCE)
+        walks.way[i] = memory.point(x / size, y / size)
 
 
-def _top_speed(world: World, walkers: Ints, pos: Floats) -> Floats:
-    speed = world.step_max.take(walkers)
-    if world.growth.anywhere:
-        width, height = world.map.terrain.size
-        at = np.minimum(np.maximum(pos.astype(np.int64), 0), (width - 1, height - 1))
-        on_creep = world.creep.take(at[:, 1] * width + at[:, 0])
-        speed = np.where(on_creep, speed * world.creep_factor.take(walkers), speed)
-    return speed
+def _turn(c: Columns, walks: _Walks, i: int) -> None:
+    """Turn a walker to the way it wants to go; write how far and which way it moves meanwhile."""
+    slot = walks.slot[i]
+    way = walks.way[i]
+    standing = c.speed[slot] <= 0.0 or walks.error_cos[i] < 0.0
+    late = walks.error_cos[i] < c.turn_cos[slot]
+    cos_step = c.turn_still_cos[slot] if standing else c.turn_cos[slot]
+    sin_step = c.turn_still_sin[slot] if standing else c.turn_sin[slot]
+    facing = turning.turned(c.heading[slot], way, cos_step, sin_step)
+    swings = c.glides[slot] and walks.left[i] > TURNING_CIRCLES * walks.step[i]
+    c.heading[slot] = facing
+    if late and not swings:
+        walks.step[i] *= max(facing.x * way.x + facing.y * way.y, 0.0)
+    if swings:
+        walks.way[i] = facing
