@@ -6,7 +6,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native.columns cimport Columns, columns_of
 from khala_simulator.native.memory cimport Point, boolean
 from khala_simulator.compiled.numbers cimport count, floats, ints, least, length, most, new_floats
-from khala_simulator.numeric.turning cimport turned
+from khala_simulator.movement.turning cimport turned
 
 from khala_simulator.systems import movement as rules
 from khala_simulator.world.census import census
