@@ -36,7 +36,6 @@ SYSTEMS: Final = (
     "navigation",
     "orders",
     "triggers",
-    "vision",
 )
 """The systems that have a module here."""
 
