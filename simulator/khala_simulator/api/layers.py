@@ -1,7 +1,7 @@
 """Feature layers of the screen and of the minimap.
 
-This module decides what is drawn where, from what a player perceives; `raster.py` turns discs into pixels and pixels
-into bytes. Terrain that does not change is drawn once per camera position. Heights have the scale of `terrain_height`:
+This module decides what is drawn where, from what a player perceives; `discs.py` draws discs, `raster.py` makes bytes
+of images. Terrain that does not change is drawn once per camera position. Heights have the scale of `terrain_height`:
 z = -16 + 32 v / 255. That is a choice: the API's own text and a recorded frame contradict each other.
 
 Above: `observation.py`.
@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from s2clientprotocol import spatial_pb2
 
-from khala_simulator import compiled
 from khala_simulator.api import wire
+from khala_simulator.api.discs import DiscLayers
 from khala_simulator.api.effects import BLIP_RADIUS, Spots, blips, power, seen_area_effects, seen_buffs
-from khala_simulator.api.raster import RasterLayer, Sampler, disc_layers
-from khala_simulator.api.sight import Cloak, Display
+from khala_simulator.api.layer_values import VALUES, write_values
+from khala_simulator.api.raster import RasterLayer, Sampler
+from khala_simulator.api.sight import Display
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from s2clientprotocol import sc2api_pb2
 
     from khala_simulator.api.projection import ImagePair
-    from khala_simulator.api.raster import DiscLayers
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.types import Types
     from khala_simulator.api.wire import Part
@@ -50,13 +50,6 @@ MINIMAP_BITS = {
     "height_map": 8, "visibility_map": 8, "creep": 1, "camera": 1, "player_id": 8, "player_relative": 8,
     "selected": 1, "alerts": 1, "buildable": 1, "pathable": 1, "unit_type": 32,
 }  # fmt: skip
-VALUES = (
-    "player_id", "player_relative", "unit_type", "selected", "unit_hit_points", "unit_hit_points_ratio",
-    "unit_shields", "unit_shields_ratio", "unit_energy", "unit_energy_ratio", "hallucinations", "cloaked", "active",
-    "build_progress", "placeholder", "buffs", "buff_duration",
-)  # fmt: skip
-"""Layers that show a value of the topmost unit at each pixel."""
-
 CHEATING = frozenset({"unit_type"})
 """Minimap layers that are sent only when the client asks for cheating ones."""
 
@@ -183,7 +176,7 @@ class _Image:
         shown = [(k, self.layers[name]) for k, name in enumerate(VALUES) if name in self.layers]
         dense = "unit_density" in self.layers
         density = (self.layers["unit_density"], self.layers["unit_density_aa"]) if dense else None
-        self.units = disc_layers(shown, density, columns, rows)
+        self.units = DiscLayers(shown, density, columns, rows)
         self._spots: dict[str, DiscLayers] = {}
         self._camera: tuple[float, float] | None = None
         self._walk: Bools | None = None
@@ -195,7 +188,7 @@ class _Image:
     def spots(self, name: str) -> DiscLayers:
         """Return a layer that shows discs other than units."""
         if name not in self._spots:
-            self._spots[name] = disc_layers([(0, self.layers[name])], None, *self._shape)
+            self._spots[name] = DiscLayers([(0, self.layers[name])], None, *self._shape)
         return self._spots[name]
 
     def encode_terrain(self, frame: Frame, axes: Callable[[], tuple[Floats, Floats]]) -> list[Part]:
@@ -218,35 +211,15 @@ class _Image:
 def unit_values(frame: Frame) -> Ints:
     """Return [len(VALUES), n] the value of each unit in each layer that shows units.
 
-    Hit points, shields and energy are whole points, their ratios 0 to 255; the progress of a structure is 0 to 255
-    while it is being built and 0 afterwards. The last of several buffs on a unit is shown; its duration is the part
-    that remains, 0 to 255, and stays at 255 without an end.
+    The last of several buffs on a unit is shown; its duration is the part that remains, 0 to 255, and stays at 255
+    without an end.
     """
-    sight, kernel = frame.sight, compiled.part("sight")
+    sight = frame.sight
     values = np.zeros((len(VALUES), len(sight)), np.int32)
-    (write_values if kernel is None else kernel.layer_values)(sight, frame.selected, values)
+    write_values(sight, frame.selected, values)
     worn = seen_buffs(frame.world, sight)
     if worn is not None:
-        values[15, worn.row] = worn.id
-        values[16, worn.row] = np.where(worn.total > 0, _ratio(worn.remain, worn.total), 255)
+        part = np.minimum(worn.remain / np.maximum(worn.total, 1e-9), 1.0) * 255
+        values[VALUES.index("buffs"), worn.row] = worn.id
+        values[VALUES.index("buff_duration"), worn.row] = np.where(worn.total > 0, part, 255)
     return values
-
-
-def write_values(sight: Sight, selected: Bools, values: Ints) -> None:
-    """Write the rows of values that every unit has; `compiled.sight` does the same in one pass."""
-    values[0] = sight.owner
-    values[1] = sight.alliance
-    values[2] = sight.type_id
-    values[3] = selected
-    values[4], values[5] = sight.life, _ratio(sight.life, sight.life_max)
-    values[6], values[7] = sight.shields, _ratio(sight.shields, sight.shields_max)
-    values[8], values[9] = sight.energy, _ratio(sight.energy, sight.energy_max)
-    values[10] = sight.hallucination
-    values[11] = (sight.cloak != Cloak.NOT_CLOAKED.value) & (sight.cloak != Cloak.UNKNOWN.value)
-    values[12] = sight.active
-    values[13] = (sight.build_progress < 1) * sight.build_progress * 255
-    values[14] = sight.display == Display.PLACEHOLDER.value
-
-
-def _ratio(part: Floats, whole: Floats) -> Floats:
-    return np.minimum(part / np.maximum(whole, 1e-9), 1.0) * 255

@@ -1,36 +1,44 @@
 """The units of `Observation.raw_data`, with every field that the game would send of them.
 
 Which field is present depends on the unit's owner and on how it is perceived; that table comes from 96 real
-observations. Above: `observation.py`. Below: `sight.py`.
+observations. Above: `observation.py`. Below: `sight.py`, and `wire.py`, which writes messages.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-from s2clientprotocol import raw_pb2
-
-from khala_simulator import compiled
-from khala_simulator.api.sight import Alliance
+from khala_simulator.api import fields, wire
+from khala_simulator.api.sight import Alliance, Display
 from khala_simulator.economy import harvesting
+from khala_simulator.native import columns, memory
 from khala_simulator.world.active_buffs import FOREVER
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import ATTACK, OrderKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    import numpy as np
     from numpy.typing import NDArray
 
     from khala_simulator.api.effects import Worn
     from khala_simulator.api.sight import Sight
     from khala_simulator.api.types import Types
-    from khala_simulator.world.orders import Order
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
     Bools = NDArray[np.bool_]
+
+SELF: Final = Alliance.SELF.value
+NEUTRAL: Final = Alliance.NEUTRAL.value
+VISIBLE: Final = Display.VISIBLE.value
+HIDDEN: Final = Display.HIDDEN.value
+IDLE: Final = OrderKind.IDLE.value
+ATTACK_UNIT: Final = OrderKind.ATTACK_UNIT.value
+FOLLOW: Final = OrderKind.FOLLOW.value
+HOLD: Final = OrderKind.HOLD.value
+CAST: Final = OrderKind.CAST.value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,217 +61,289 @@ class Units:
 
     def encode(self) -> bytes:
         """Return all units, as the field `units` of an `ObservationRaw`."""
-        kernel = compiled.part("units")
-        if kernel is not None:
-            encoded: bytes = kernel.encode(self)
-            return encoded
-        raw = raw_pb2.ObservationRaw()
-        self.write(raw)
-        return raw.SerializeToString()
-
-    def write(self, raw: raw_pb2.ObservationRaw) -> None:
-        """Add all units to an observation; `compiled.units` does the same without an object for each."""
-        own: list[int] = self.sight.slot[self.sight.alliance == Alliance.SELF.value].tolist()
-        orders = self._orders(own)
-        first = len(raw.units)
-        for known, vital, side, slot in zip(self._known(), self._vitals(), self._sides(), self._slots(), strict=True):
-            unit = raw.units.add()
-            _write_known(unit, *known)
-            if unit.display_type in {raw_pb2.Snapshot, raw_pb2.Placeholder}:
-                continue
-            _write_vitals(unit, *vital)
-            _write_side(unit, *side)
-            if slot in orders:
-                self._write_own(unit, slot)
-                for order, height in orders[slot]:
-                    self._write_order(unit.orders.add(), order, height)
-        if self.worn is not None:
-            for row, number in zip(self.worn.row.tolist(), self.worn.id.tolist(), strict=True):
-                raw.units[first + row].buff_ids.append(number)
-
-    # what few units have, as bytes of fields of a `Unit`, for `compiled.units`
-
-    def orders(self, slot: int) -> bytes:
-        """Return the orders of an own unit."""
-        unit = raw_pb2.Unit()
-        for order, height in self._orders([slot])[slot]:
-            self._write_order(unit.orders.add(), order, height)
-        return unit.SerializeToString()
-
-    def cargo(self, slot: int) -> bytes:
-        """Return the passengers of an own unit, and the room that they take."""
-        unit = raw_pb2.Unit()
-        self._write_cargo(unit, slot)
-        return unit.SerializeToString()
-
-    def durations(self, slot: int) -> bytes:
-        """Return how long the life or a buff of an own unit still lasts."""
-        unit = raw_pb2.Unit()
-        self._write_durations(unit, slot)
-        return unit.SerializeToString()
-
-    def rallies(self, slot: int) -> bytes:
-        """Return where an own structure sends new units."""
-        unit = raw_pb2.Unit()
-        self._write_rallies(unit, slot)
-        return unit.SerializeToString()
-
-    # columns
-
-    def _slots(self) -> list[int]:
-        slots: list[int] = self.sight.slot.tolist()
-        return slots
-
-    def _known(self) -> Iterator[tuple[Any, ...]]:
-        s = self.sight
-        x, y = (s.pos - self.origin).T
-        return _rows(s.display, s.alliance, s.tag, s.type_id, s.owner, x, y, s.z, s.facing, s.radius,
-                     s.build_progress, s.cloak, self.on_screen)  # fmt: skip
-
-    def _vitals(self) -> Iterator[tuple[Any, ...]]:
-        s = self.sight
-        return _rows(s.life, s.life_max, s.shields, s.shields_max, s.energy, s.energy_max, s.flying, s.burrowed,
-                     s.hallucination, s.active, self.selected)  # fmt: skip
-
-    def _sides(self) -> Iterator[tuple[Any, ...]]:
-        s, types, row = self.sight, self.types, self.sight.row
-        tables = np.stack([types.levels(tuple(player.upgrades)) for player in self.world.players])
-        attack, armor, shield = tables[self.world.owner[s.slot], :, row].T
-        fixed = types.structure[row] | (s.alliance == Alliance.NEUTRAL.value)
-        contents = self.world.contents[s.slot]
-        minerals, vespene = contents * types.minerals_in[row], contents * types.vespene_in[row]
-        powered = types.needs_power[row] & self.world.powered[s.slot] & (self.world.build_progress[s.slot] >= 1.0)
-        return _rows(attack, armor, shield, ~fixed | types.armed[row], fixed, powered, minerals, vespene)
-
-    def _write_own(self, unit: raw_pb2.Unit, slot: int) -> None:
-        world, types, row = self.world, self.types, int(self.world.type[slot])
-        unit.assigned_harvesters, unit.ideal_harvesters = self.harvesters.get(slot, (0, 0))
-        self._write_rallies(unit, slot)
-        if types.armed[row]:
-            unit.weapon_cooldown = max(0.0, float(world.cooldown[slot]))
-            if target := world.tag_of(int(world.target[slot])):
-                unit.engaged_target_tag = target
-        if world.detects[slot]:
-            unit.detect_range = float(world.detects[slot])
-        if world.addon[slot] != NOBODY:
-            unit.add_on_tag = world.tag_of(int(world.addon[slot]))
-        if types.cargo[row]:
-            self._write_cargo(unit, slot)
-        self._write_durations(unit, slot)
-
-    def _write_rallies(self, unit: raw_pb2.Unit, slot: int) -> None:
-        for rally in dict.fromkeys(self.world.rallies.get(slot, {}).values()):
-            message = unit.rally_targets.add()
-            x, y = rally.point
-            z = float(self.world.map.terrain.ground_z(np.array([rally.point]))[0])
-            message.point.x, message.point.y, message.point.z = x - self.origin[0], y - self.origin[1], z
-            if rally.target:
-                message.tag = rally.target
-
-    def _write_cargo(self, unit: raw_pb2.Unit, slot: int) -> None:
-        """Write the passengers and the room that they take."""
-        world, inside = self.world, self.world.passengers(slot)
-        unit.cargo_space_max = int(self.types.cargo[world.type[slot]])
-        unit.cargo_space_taken = sum(world.unit_type(s).cargo_size for s in inside)
-        for s in inside:
-            unit.passengers.add(
-                tag=world.tag_of(s),
-                unit_type=world.unit_type(s).id,
-                health=float(world.life[s]),
-                health_max=float(world.life_max[s]),
-                shield=float(world.shields[s]),
-                shield_max=float(world.shields_max[s]),
-                energy=float(world.energy[s]),
-                energy_max=float(world.energy_max[s]),
-            )
-
-    def _write_durations(self, unit: raw_pb2.Unit, slot: int) -> None:
-        """Write how long its timed life, or else the buff that ends last, still lasts."""
-        world = self.world
-        if world.expires[slot]:
-            unit.buff_duration_remain = max(0, int(world.expires[slot]) - world.loop)
-            unit.buff_duration_max = int(world.expires[slot] - world.born_loop[slot])
-        elif len(world.buffs):
-            rows = world.buffs.of(slot)
-            rows = rows[rows["end"] < FOREVER]
-            if len(rows):
-                last = rows[rows["end"].argmax()]
-                unit.buff_duration_remain = max(0, round(float(last["end"]) - world.loop))
-                unit.buff_duration_max = round(float(last["end"]) - int(last["begun"]))
-
-    def _write_order(self, message: raw_pb2.UnitOrder, order: Order, height: float) -> None:
-        message.ability_id = order.ability
-        if order.progress:
-            message.progress = order.progress
-        if order.target:
-            message.target_unit_tag = order.target
-        elif order.point is not None:
-            point = message.target_world_space_pos
-            point.x, point.y = order.point[0] - self.origin[0], order.point[1] - self.origin[1]
-            point.z = height
-
-    def _orders(self, own: list[int]) -> dict[int, list[tuple[Order, float]]]:
-        """Return the orders of own units by slot, each with the ground height at its point, if it has one."""
-        orders = {slot: self.world.orders_of(slot) for slot in own}
-        points = [order.point for some in orders.values() for order in some if order.point is not None]
-        heights = iter(self.world.map.terrain.ground_z(np.array(points)).tolist() if points else ())
-        return {
-            slot: [(order, 0.0 if order.point is None else next(heights)) for order in some]
-            for slot, some in orders.items()
-        }
+        return _encode(self)
 
 
-def _rows(*columns: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
-    return zip(*(column.tolist() for column in columns), strict=True)
+class _View:
+    """What the fields are made from, as rows of numbers, and a message for parts of units."""
+
+    def __init__(self, units: Units) -> None:
+        world, types, sight = units.world, units.types, units.sight
+        self.units = units  # keeps the memory alive
+        self.world = world
+        self.c = columns.columns_of(world)
+        self.heights = world.map.terrain.heights
+        self.part = wire.Message(256)
+        self.loop = world.loop
+        self.top = world.top
+        self.x0, self.y0 = units.origin
+        self.makes = bool(world.jobs)
+        self.rallies = bool(world.rallies)
+        self.harvesters = units.harvesters
+        self.buffs = _buffs_by_row(units.worn)
+        self.lasting = _last_ends(world)
+        self.slot = memory.ints(sight.slot)
+        self.row = memory.ints(sight.row)
+        self.tag = memory.ints(sight.tag)
+        self.type_id = memory.ints(sight.type_id)
+        self.owner = memory.ints(sight.owner)
+        self.alliance = memory.ints(sight.alliance)
+        self.display = memory.ints(sight.display)
+        self.cloak = memory.ints(sight.cloak)
+        self.pos = memory.points(sight.pos)
+        self.z = memory.floats(sight.z)
+        self.facing = memory.floats(sight.facing)
+        self.radius = memory.floats(sight.radius)
+        self.life = memory.floats(sight.life)
+        self.life_max = memory.floats(sight.life_max)
+        self.shields = memory.floats(sight.shields)
+        self.shields_max = memory.floats(sight.shields_max)
+        self.energy = memory.floats(sight.energy)
+        self.energy_max = memory.floats(sight.energy_max)
+        self.build_progress = memory.floats(sight.build_progress)
+        self.flying = memory.bools(sight.flying)
+        self.burrowed = memory.bools(sight.burrowed)
+        self.hallucination = memory.bools(sight.hallucination)
+        self.active = memory.bools(sight.active)
+        self.selected = memory.bools(units.selected)
+        self.on_screen = memory.bools(units.on_screen)
+        self.type_count = len(types.id)
+        self.type_ids = memory.ints(types.id)
+        self.structure = memory.bools(types.structure)
+        self.armed = memory.bools(types.armed)
+        self.needs_power = memory.bools(types.needs_power)
+        self.minerals_in = memory.bools(types.minerals_in)
+        self.vespene_in = memory.bools(types.vespene_in)
+        self.cargo = memory.ints(types.cargo)
+        self.level_table = types.levels_of(tuple(tuple(player.upgrades) for player in world.players))
+        self.levels = memory.ints(self.level_table)  # attack, armor and shield of every player and type
 
 
-def _write_known(  # a row of the table, in the order of its columns
-    unit: raw_pb2.Unit, display: raw_pb2.DisplayType.ValueType, alliance: raw_pb2.Alliance.ValueType, tag: int,
-    type_id: int, owner: int, x: float, y: float, z: float, facing: float, radius: float, build_progress: float,
-    cloak: raw_pb2.CloakState.ValueType, on_screen: bool,
-) -> None:  # fmt: skip
-    unit.display_type = display
-    unit.alliance = alliance
-    unit.tag = tag
-    unit.unit_type = type_id
-    unit.owner = owner
-    pos = unit.pos
-    pos.x, pos.y, pos.z = x, y, z
-    unit.facing = facing
-    unit.radius = radius
-    unit.build_progress = build_progress
-    unit.cloak = cloak
-    unit.is_on_screen = on_screen
-    unit.is_blip = False
+def _buffs_by_row(worn: Worn | None) -> dict[int, list[int]]:
+    """Return the buffs of the API on each row of the sight that has any."""
+    found: dict[int, list[int]] = {}
+    if worn is not None:
+        for row, buff in zip(worn.row.tolist(), worn.id.tolist(), strict=True):
+            found.setdefault(row, []).append(buff)
+    return found
 
 
-def _write_vitals(  # a row of the table, in the order of its columns
-    unit: raw_pb2.Unit, life: float, life_max: float, shields: float, shields_max: float, energy: float,
-    energy_max: float, flying: bool, burrowed: bool, hallucination: bool, active: bool, selected: bool,
-) -> None:  # fmt: skip
-    unit.health = life
-    unit.health_max = life_max
-    unit.shield = shields
-    unit.shield_max = shields_max
-    unit.energy = energy
-    unit.energy_max = energy_max
-    unit.is_flying = flying
-    unit.is_burrowed = burrowed
-    unit.is_hallucination = hallucination
-    unit.is_active = active
-    unit.is_selected = selected
+def _last_ends(world: World) -> dict[int, tuple[int, float]]:
+    """Return when the buff that ends last on a unit has begun and ends, by slot; buffs without an end do not count."""
+    found: dict[int, tuple[int, float]] = {}
+    if len(world.buffs):
+        rows = world.buffs.rows
+        for slot, begun, end in zip(rows["slot"].tolist(), rows["begun"].tolist(), rows["end"].tolist(), strict=True):
+            if end < FOREVER and (slot not in found or end > found[slot][1]):
+                found[slot] = begun, end
+    return found
 
 
-def _write_side(  # a row of the table, in the order of its columns
-    unit: raw_pb2.Unit, attack: int, armor: int, shield: int, fights: bool, fixed: bool, powered: bool, minerals: int,
-    vespene: int,
-) -> None:  # fmt: skip
-    unit.armor_upgrade_level, unit.shield_upgrade_level = armor, shield
-    if fights:
-        unit.attack_upgrade_level = attack
+def _encode(units: Units) -> bytes:
+    """Return the units as a field of an observation; those that are only remembered or planned have few fields."""
+    view = _View(units)
+    n = len(units.sight)
+    message = wire.Message(256 * n + 512)
+    unit = wire.Message(1024)
+    for i in range(n):
+        unit.clear()
+        is_here = view.display[i] == VISIBLE or view.display[i] == HIDDEN
+        own = view.alliance[i] == SELF
+        _put_known(unit, view, i, is_here)
+        if is_here:
+            _put_vitals(unit, view, i)
+            if own:
+                _put_orders(unit, view, view.slot[i])
+                _put_load(unit, view, view.slot[i], view.row[i])
+            if view.buffs and i in view.buffs:
+                for buff in view.buffs[i]:
+                    unit.put_number(fields.BUFF_IDS, buff)
+            if own:
+                _put_service(unit, view, view.slot[i], view.row[i])
+            _put_standing(unit, view, i)
+            if own:
+                _put_time_left(unit, view, view.slot[i])
+                if view.rallies:
+                    _put_rallies(unit, view, view.slot[i])
+        message.put_message(fields.UNITS, unit)
+    return message.content()
+
+
+def _put_known(unit: wire.Message, view: _View, i: int, is_here: bool) -> None:
+    """Write what is known of remembered and planned units too."""
+    unit.put_number(fields.DISPLAY_TYPE, view.display[i])
+    unit.put_number(fields.ALLIANCE, view.alliance[i])
+    unit.put_number(fields.TAG, view.tag[i])
+    unit.put_number(fields.UNIT_TYPE, view.type_id[i])
+    unit.put_number(fields.OWNER, view.owner[i])
+    unit.put_point(fields.POS, view.pos[i].x - view.x0, view.pos[i].y - view.y0, view.z[i])
+    unit.put_float(fields.FACING, view.facing[i])
+    unit.put_float(fields.RADIUS, view.radius[i])
+    unit.put_float(fields.BUILD_PROGRESS, view.build_progress[i])
+    unit.put_number(fields.CLOAK, view.cloak[i])
+    if is_here:
+        unit.put_number(fields.IS_SELECTED, view.selected[i])
+    unit.put_number(fields.IS_ON_SCREEN, view.on_screen[i])
+    unit.put_number(fields.IS_BLIP, False)
+
+
+def _put_vitals(unit: wire.Message, view: _View, i: int) -> None:
+    """Write life, shields and energy, what a resource still holds, and where the unit is."""
+    row = view.row[i]
+    contents = view.c.contents[view.slot[i]]
+    unit.put_float(fields.HEALTH, view.life[i])
+    unit.put_float(fields.HEALTH_MAX, view.life_max[i])
+    unit.put_float(fields.SHIELD, view.shields[i])
+    unit.put_float(fields.ENERGY, view.energy[i])
+    if contents and view.minerals_in[row]:
+        unit.put_number(fields.MINERAL_CONTENTS, contents)
+    if contents and view.vespene_in[row]:
+        unit.put_number(fields.VESPENE_CONTENTS, contents)
+    unit.put_number(fields.IS_FLYING, view.flying[i])
+    unit.put_number(fields.IS_BURROWED, view.burrowed[i])
+
+
+def _put_standing(unit: wire.Message, view: _View, i: int) -> None:
+    """Write what its owner's upgrades and its state make of the unit; what can't move may have power."""
+    c = view.c
+    slot = view.slot[i]
+    row = view.row[i]
+    fixed = view.structure[row] or view.alliance[i] == NEUTRAL
+    levels = 3 * c.owner[slot] * view.type_count + row
     if fixed:
-        unit.is_powered = powered
-    if minerals:
-        unit.mineral_contents = minerals
-    if vespene:
-        unit.vespene_contents = vespene
+        powered = view.needs_power[row] and c.powered[slot] and c.build_progress[slot] >= 1.0
+        unit.put_number(fields.IS_POWERED, powered)
+    unit.put_float(fields.SHIELD_MAX, view.shields_max[i])
+    unit.put_float(fields.ENERGY_MAX, view.energy_max[i])
+    unit.put_number(fields.IS_HALLUCINATION, view.hallucination[i])
+    unit.put_number(fields.IS_ACTIVE, view.active[i])
+    if not fixed or view.armed[row]:
+        unit.put_number(fields.ATTACK_UPGRADE_LEVEL, view.levels[levels])
+    unit.put_number(fields.ARMOR_UPGRADE_LEVEL, view.levels[levels + view.type_count])
+    unit.put_number(fields.SHIELD_UPGRADE_LEVEL, view.levels[levels + 2 * view.type_count])
+
+
+# own units ------------------------------------------------------------------------------------------------------------
+
+
+def _put_orders(unit: wire.Message, view: _View, slot: int) -> None:
+    """Write its orders, as `World.orders_of` has them."""
+    world = view.world
+    if world.queue[slot] or (view.makes and view.c.order_kind[slot] == IDLE and slot in world.jobs):
+        for order in world.orders_of(slot):
+            x, y = order.point or (0.0, 0.0)
+            _put_order(unit, view, order.ability, order.target, order.point is not None, x, y, order.progress)
+    else:
+        _put_only_order(unit, view, slot)
+
+
+def _put_only_order(unit: wire.Message, view: _View, slot: int) -> None:
+    """Write the only order of a unit; an idle one may fight by itself."""
+    c = view.c
+    kind = c.order_kind[slot]
+    if kind != IDLE:
+        target = c.order_target[slot]
+        aimed = c.order_aimed[slot] and target == NOBODY and kind not in (ATTACK_UNIT, FOLLOW, HOLD)
+        tag = c.tag[target] if target != NOBODY else 0
+        progress = _progress(c, slot, view.loop) if kind == CAST else 0.0
+        x = c.order_point[slot].x
+        y = c.order_point[slot].y
+        _put_order(unit, view, c.order_ability[slot], tag, aimed, x, y, progress)
+    elif c.target[slot] != NOBODY:
+        _put_order(unit, view, ATTACK, c.tag[c.target[slot]], False, 0.0, 0.0, 0.0)
+
+
+def _progress(c: Columns, slot: int, loop: int) -> float:
+    """Return the elapsed part of an ability's preparation, 0..1."""
+    begun = c.cast_begun[slot]
+    end = c.cast_at[slot]
+    progress: float = min(max((loop - begun) / (end - begun), 0.0), 1.0) if end > begun >= 0.0 else 0.0
+    return progress
+
+
+def _put_order(
+    unit: wire.Message, view: _View, ability: int, target: int, aimed: bool, x: float, y: float, progress: float
+) -> None:
+    """Write one order: its target is a unit, or else a point if it is aimed at one."""
+    order = view.part
+    order.clear()
+    order.put_number(fields.ORDER_ABILITY_ID, ability)
+    if target:
+        order.put_number(fields.ORDER_TARGET_UNIT_TAG, target)
+    elif aimed:
+        order.put_point(fields.ORDER_TARGET_WORLD_SPACE_POS, x - view.x0, y - view.y0, view.heights.at(x, y))
+    if progress:
+        order.put_float(fields.ORDER_PROGRESS, progress)
+    unit.put_message(fields.ORDERS, order)
+
+
+def _put_load(unit: wire.Message, view: _View, slot: int, row: int) -> None:
+    """Write its add-on, its passengers, and the room that they take."""
+    c = view.c
+    if c.addon[slot] != NOBODY:
+        unit.put_number(fields.ADD_ON_TAG, c.tag[c.addon[slot]])
+    if view.cargo[row]:
+        taken = 0
+        for inside in range(view.top):
+            if c.carrier[inside] == slot and c.alive[inside]:
+                _put_passenger(unit, view, inside)
+                taken += view.world.unit_type(inside).cargo_size
+        unit.put_number(fields.CARGO_SPACE_TAKEN, taken)
+        unit.put_number(fields.CARGO_SPACE_MAX, view.cargo[row])
+
+
+def _put_passenger(unit: wire.Message, view: _View, slot: int) -> None:
+    """Write a unit inside of another."""
+    c = view.c
+    passenger = view.part
+    passenger.clear()
+    passenger.put_number(fields.PASSENGER_TAG, c.tag[slot])
+    passenger.put_float(fields.PASSENGER_HEALTH, c.life[slot])
+    passenger.put_float(fields.PASSENGER_HEALTH_MAX, c.life_max[slot])
+    passenger.put_float(fields.PASSENGER_SHIELD, c.shields[slot])
+    passenger.put_float(fields.PASSENGER_ENERGY, c.energy[slot])
+    passenger.put_number(fields.PASSENGER_UNIT_TYPE, view.type_ids[c.type[slot]])
+    passenger.put_float(fields.PASSENGER_SHIELD_MAX, c.shields_max[slot])
+    passenger.put_float(fields.PASSENGER_ENERGY_MAX, c.energy_max[slot])
+    unit.put_message(fields.PASSENGERS, passenger)
+
+
+def _put_service(unit: wire.Message, view: _View, slot: int, row: int) -> None:
+    """Write its workers, its weapon and its sensors."""
+    c = view.c
+    workers = 0
+    ideal = 0
+    if slot in view.harvesters:
+        workers, ideal = view.harvesters[slot]
+    unit.put_number(fields.ASSIGNED_HARVESTERS, workers)
+    unit.put_number(fields.IDEAL_HARVESTERS, ideal)
+    if view.armed[row]:
+        unit.put_float(fields.WEAPON_COOLDOWN, max(0.0, c.cooldown[slot]))
+    if c.detects[slot]:
+        unit.put_float(fields.DETECT_RANGE, c.detects[slot])
+    if view.armed[row] and c.target[slot] != NOBODY and c.tag[c.target[slot]]:
+        unit.put_number(fields.ENGAGED_TARGET_TAG, c.tag[c.target[slot]])
+
+
+def _put_time_left(unit: wire.Message, view: _View, slot: int) -> None:
+    """Write how long its timed life, or else the buff that ends last, still lasts."""
+    c = view.c
+    if c.expires[slot]:
+        unit.put_number(fields.BUFF_DURATION_REMAIN, max(0, c.expires[slot] - view.loop))
+        unit.put_number(fields.BUFF_DURATION_MAX, c.expires[slot] - c.born_loop[slot])
+    elif view.lasting and slot in view.lasting:
+        begun, end = view.lasting[slot]
+        unit.put_number(fields.BUFF_DURATION_REMAIN, max(0, round(end - view.world.loop)))
+        unit.put_number(fields.BUFF_DURATION_MAX, round(end) - begun)
+
+
+def _put_rallies(unit: wire.Message, view: _View, slot: int) -> None:
+    """Write where a structure sends new units."""
+    target = view.part
+    for rally in dict.fromkeys(view.world.rallies.get(slot, {}).values()):
+        x, y = rally.point
+        target.clear()
+        target.put_point(fields.RALLY_POINT, x - view.x0, y - view.y0, view.heights.at(x, y))
+        if rally.target:
+            target.put_number(fields.RALLY_TAG, rally.target)
+        unit.put_message(fields.RALLY_TARGETS, target)

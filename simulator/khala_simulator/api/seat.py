@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.layers import FeatureLayers
@@ -18,6 +17,7 @@ from khala_simulator.api.selection import Selection
 from khala_simulator.api.sight import Sight, look
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from khala_simulator.api.render import Renders
@@ -131,7 +131,7 @@ class PlayerSeat:
 
     def ground_z(self, x: float, y: float) -> float:
         """Return the height of the ground at a world point."""
-        return float(self.world.map.terrain.ground_z(np.array([[x, y]]))[0])
+        return self.world.map.terrain.heights.at(x, y)
 
     def move_camera(self, x: float, y: float) -> None:
         """Point the camera at a world point, or at the nearest one of the playable area."""

@@ -3,29 +3,34 @@
 The rules of perception are here and nowhere else: the side of each unit, what fog and cloak hide, and what is still
 known of a hidden unit. Rows are in drawing order, ground units before flying ones.
 
-Above: `raw.py`, `layers.py`, `ui.py`. Below: the world's arrays.
+Above: `raw.py`, `layers.py`, `ui.py`. Below: the world's columns.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from khala_simulator import compiled
 from khala_simulator.economy import building_sites
+from khala_simulator.native import columns, memory
 from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some
+from khala_simulator.systems import vision
 from khala_simulator.systems.vision import detected
+from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 from khala_simulator.world.snapshots import INDEX_SHIFT, RememberedUnit
-from khala_simulator.world.world import NOBODY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.types import Types
+    from khala_simulator.maps.heights import Heights
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells, Points
     from khala_simulator.world.world import World
 
     Bools = NDArray[np.bool_]
@@ -36,7 +41,6 @@ API_NEUTRAL = 16
 EMPTY_SLOT = 0
 PLACEHOLDER_TAG = 3 << 32
 OBSERVER = 0  # the player id of a seat that owns nothing and sees everything
-_VISIBLE_CELL = 2
 
 # Columns are compared with the `value` of an enum: converting the enum itself takes numpy 2 us more each time.
 
@@ -69,9 +73,26 @@ class Cloak(enum.IntEnum):
     ALLIED = 4
 
 
+SELF: Final = Alliance.SELF.value
+NEUTRAL: Final = Alliance.NEUTRAL.value
+ENEMY: Final = Alliance.ENEMY.value
+VISIBLE: Final = Display.VISIBLE.value
+HIDDEN: Final = Display.HIDDEN.value
+UNKNOWN: Final = Cloak.UNKNOWN.value
+CLOAKED: Final = Cloak.CLOAKED.value
+DETECTED: Final = Cloak.DETECTED.value
+NOT_CLOAKED: Final = Cloak.NOT_CLOAKED.value
+ALLIED: Final = Cloak.ALLIED.value
+IDLE: Final = OrderKind.IDLE.value
+VISIBLE_CELL: Final = 2  # of `World.visibility`
+
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class Sight:
-    """The units that a player perceives, one row each; vitals of units that are not seen clearly are 0."""
+    """The units that a player perceives, one row each; vitals of units that are not seen clearly are 0.
+
+    The memory of each column is contiguous.
+    """
 
     slot: Ints
     row: Ints  # unit type, row of the catalog
@@ -111,9 +132,7 @@ def look(
     through_fog: bool = False,
 ) -> Sight:
     """Return the units that `player` perceives now; `through_fog` adds those in the fog, as hidden ones."""
-    kernel = compiled.part("sight")
-    seen = units_seen if kernel is None else kernel.units_seen
-    sight: Sight = seen(world, types, player, show_cloaked, through_fog)
+    sight = _units_seen(world, types, player, show_cloaked, through_fog)
     shown = [] if through_fog else world.memories[player].shown
     if shown:
         sight = _with_snapshots(sight, world, types, player, shown, Display.SNAPSHOT)
@@ -122,20 +141,50 @@ def look(
     return sight
 
 
-def units_seen(world: World, types: Types, player: int, show_cloaked: bool, through_fog: bool) -> Sight:
-    """Return the units that a player perceives now; `compiled.sight` does the same in one pass."""
-    seen = world.is_visible(player)
-    owner = world.owner[world.live]
-    own = (owner == player) & (player != OBSERVER)
-    cloak = _cloak(world, player, own)
-    undetected = cloak == Cloak.CLOAKED.value
-    told = (seen | through_fog) & (show_cloaked | through_fog | ~undetected)
-    order = np.argsort(types.flying[world.type[world.live]], kind="stable")
-    keep = order[told[order]]
-    hidden = (~seen | undetected)[keep]
-    known = np.where(seen, cloak, Cloak.UNKNOWN.value)[keep]
-    fakes = _fakes(world, player, world.live[keep], own[keep])
-    return _columns(world, types, keep, hidden, own[keep], known, fakes)
+def _units_seen(world: World, types: Types, player: int, show_cloaked: bool, through_fog: bool) -> Sight:
+    """Return the units that a player perceives now."""
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    width, height = world.map.terrain.size
+    visibility = memory.uint8s(world.visibility[player])
+    fogged = world.fog
+    observes = player == OBSERVER
+    flies = memory.bools(types.flying)
+    kept = memory.new_ints(len(live))
+    cloaks = memory.new_ints(len(live))
+    clears = memory.new_ints(len(live))
+    keeps = memory.ints(kept)
+    cloak = memory.ints(cloaks)
+    clear = memory.ints(clears)
+    n = 0
+    for flying in range(2):
+        for i in range(len(live)):
+            slot = slots[i]
+            if flies[c.type[slot]] != flying:
+                continue
+            own = c.owner[slot] == player and not observes
+            hides = _cloak_of(c, slot, own, observes or c.visible[player * c.capacity + slot])
+            seen = (
+                not fogged
+                or c.owner[slot] == player
+                or visibility[vision.cell_at(c.pos[slot], width, height)] == VISIBLE_CELL
+            )
+            if (seen or through_fog) and (show_cloaked or through_fog or hides != CLOAKED):
+                keeps[n] = slot
+                cloak[n] = hides if seen else UNKNOWN
+                clear[n] = seen and hides != CLOAKED
+                n += 1
+    return _sight_of(world, types, c, player, kept[:n], cloaks[:n], clear)
+
+
+def _cloak_of(c: Columns, slot: int, own: bool, uncovered: bool) -> int:
+    """Return what a player knows of the cloak of a unit of its own or another's, if it sees the place."""
+    if not c.cloaked[slot] and not (c.burrowed[slot] and not own):
+        return NOT_CLOAKED
+    if own:
+        return ALLIED
+    return DETECTED if uncovered else CLOAKED
 
 
 def _placeholders(world: World, player: int) -> list[RememberedUnit]:
@@ -170,75 +219,149 @@ def _with_snapshots(
         "build_progress": np.array([s.build_progress for s in shown]),
         "flying": types.flying[row],
     }
-    columns = {
+    joined = {
         field.name: np.concatenate((known.get(field.name, none).astype(column.dtype), column))
         for field in dataclasses.fields(Sight)
         for column in (getattr(sight, field.name),)
     }
-    return Sight(**columns)
+    return Sight(**joined)
 
 
-def _fakes(world: World, player: int, slots: Ints, own: Bools) -> Bools:
-    """Return (k,) which units the player knows to be hallucinations: its own, and others' under its detectors."""
-    fakes: Bools = world.hallucination[slots]
-    foreign = np.flatnonzero(fakes & ~own)
-    if foreign.size and player != OBSERVER:
-        fakes[foreign] = detected(world, player, slots[foreign])
-    return fakes
-
-
-def _columns(world: World, types: Types, keep: Ints, hidden: Bools, own: Bools, cloak: Ints, fakes: Bools) -> Sight:
-    slot = world.live[keep]
-    row, owner = world.type[slot], world.owner[slot]
-    clear = ~hidden
-    pos = world.pos[slot]
+def _sight_of(world: World, types: Types, c: Columns, player: int, slot: Ints, cloak: Ints, clear: Cells) -> Sight:
+    """Return what a player perceives of these units: how they hide, and which it sees clearly."""
+    n = len(slot)
+    slots = memory.ints(slot)
     stats = world.stats
+    row = _ints_at(c.type, slots, n)
+    owner = _ints_at(c.owner, slots, n)
+    place = memory.new_ints(n)
+    rows = memory.ints(row)
+    owners = memory.ints(owner)
+    places = memory.ints(place)  # in tables (players, types)
+    alliance = memory.new_ints(n)
+    display = memory.new_ints(n)
+    sides = memory.ints(alliance)
+    displays = memory.ints(display)
+    type_count = len(types.id)
+    neutral = API_NEUTRAL
+    observes = player == OBSERVER
+    for i in range(n):
+        places[i] = owners[i] * type_count + rows[i]
+        displays[i] = VISIBLE if clear[i] else HIDDEN
+        if owners[i] == player and not observes:
+            sides[i] = SELF
+        else:
+            sides[i] = NEUTRAL if owners[i] == 0 else ENEMY
+        if owners[i] == 0:
+            owners[i] = neutral
+    pos = _points_at(c.pos, slots, n)
     return Sight(
         slot=slot,
         row=row,
-        tag=world.tag[slot],
-        type_id=types.id[row],
-        owner=np.where(owner == 0, API_NEUTRAL, owner),
-        alliance=_alliance(owner, own),
-        display=np.where(hidden, Display.HIDDEN.value, Display.VISIBLE.value),
+        tag=_ints_at(c.tag, slots, n),
+        type_id=_ints_at(memory.ints(types.id), rows, n),
+        owner=owner,
+        alliance=alliance,
+        display=display,
         cloak=cloak,
         pos=pos,
-        z=world.map.terrain.ground_z(pos) + types.height[row],
-        facing=geometry.facing(world.heading[slot]),
-        radius=types.radius[row],
-        life=world.life[slot] * clear,
-        life_max=stats.life_max[owner, row] * clear,
-        shields=world.shields[slot] * clear,
-        shields_max=stats.shields_max[owner, row] * clear,
-        energy=world.energy[slot] * clear,
-        energy_max=stats.energy_max[owner, row] * clear,
-        build_progress=world.build_progress[slot],
-        flying=types.flying[row],
-        burrowed=world.burrowed[slot],
-        hallucination=fakes,
-        active=_active(world)[slot] & clear,
+        z=_z_of(world.map.terrain.heights, pos, memory.floats(types.height), rows, n),
+        facing=geometry.facing(_points_at(c.heading, slots, n)),
+        radius=_floats_at(memory.floats(types.radius), rows, n),
+        life=_told_at(c.life, slots, clear, n),
+        life_max=_told_at(memory.floats(stats.life_max), places, clear, n),
+        shields=_told_at(c.shields, slots, clear, n),
+        shields_max=_told_at(memory.floats(stats.shields_max), places, clear, n),
+        energy=_told_at(c.energy, slots, clear, n),
+        energy_max=_told_at(memory.floats(stats.energy_max), places, clear, n),
+        build_progress=_floats_at(c.build_progress, slots, n),
+        flying=_bools_at(memory.bools(types.flying), rows, n),
+        burrowed=_bools_at(c.burrowed, slots, n),
+        hallucination=_fakes(world, player, slot, alliance, _bools_at(c.hallucination, slots, n)),
+        active=_active(world, c, slots, clear, n),
     )
 
 
-def _active(world: World) -> Bools:
-    """Return (capacity,) which units have an order, fight by themselves, or make something."""
-    active: Bools = (world.order_kind != OrderKind.IDLE.value) | (world.target != NOBODY)
-    if world.jobs:
-        active[list(world.jobs)] = True
-    return active
+def _fakes(world: World, player: int, slot: Ints, alliance: Ints, fakes: Bools) -> Bools:
+    """Return (k,) which units the player knows to be hallucinations: its own, and others' under its detectors."""
+    if player != OBSERVER and some(fakes):
+        foreign = np.flatnonzero(fakes & (alliance != Alliance.SELF.value))
+        if foreign.size:
+            fakes[foreign] = detected(world, player, slot[foreign])
+    return fakes
+
+
+def _active(world: World, c: Columns, slots: Cells, clear: Cells, n: int) -> Bools:
+    """Return (n,) which units have an order, fight by themselves, or make something, if they are seen clearly."""
+    array = memory.new_bools(n)
+    active = memory.bools(array)
+    jobs = world.jobs
+    makes = bool(jobs)
+    for i in range(n):
+        slot = slots[i]
+        if clear[i]:
+            active[i] = c.order_kind[slot] != IDLE or c.target[slot] != NOBODY or (makes and slot in jobs)
+    return array
+
+
+def _z_of(heights: Heights, pos: Floats, above: Cells, rows: Cells, n: int) -> Floats:
+    """Return (n,) the height of each unit: that of the ground, and how far its type is above it."""
+    array = memory.new_floats(n)
+    z = memory.floats(array)
+    at = memory.points(pos)
+    for i in range(n):
+        z[i] = heights.at(at[i].x, at[i].y) + above[rows[i]]
+    return array
+
+
+def _told_at(column: Cells, at: Cells, clear: Cells, n: int) -> Floats:
+    """Return (n,) the numbers at these places of a column, 0 for units that are not seen clearly."""
+    array = memory.new_floats(n)
+    told = memory.floats(array)
+    for i in range(n):
+        told[i] = column[at[i]] * clear[i]
+    return array
+
+
+def _floats_at(column: Cells, at: Cells, n: int) -> Floats:
+    """Return (n,) the numbers at these places of a column."""
+    array = memory.new_floats(n)
+    found = memory.floats(array)
+    for i in range(n):
+        found[i] = column[at[i]]
+    return array
+
+
+def _ints_at(column: Cells, at: Cells, n: int) -> Ints:
+    """Return (n,) the numbers at these places of a column."""
+    array = memory.new_ints(n)
+    found = memory.ints(array)
+    for i in range(n):
+        found[i] = column[at[i]]
+    return array
+
+
+def _bools_at(column: Cells, at: Cells, n: int) -> Bools:
+    """Return (n,) the values at these places of a column."""
+    array = memory.new_bools(n)
+    found = memory.bools(array)
+    for i in range(n):
+        found[i] = column[at[i]]
+    return array
+
+
+def _points_at(column: Points, at: Cells, n: int) -> Floats:
+    """Return (n, 2) the points at these places of a column."""
+    array = memory.new_points(n)
+    found = memory.points(array)
+    for i in range(n):
+        found[i] = column[at[i]]
+    return array
 
 
 def _alliance(owner: Ints, own: Bools) -> Ints:
     others = np.where(owner == 0, Alliance.NEUTRAL.value, Alliance.ENEMY.value)
     return np.where(own, Alliance.SELF.value, others)
-
-
-def _cloak(world: World, player: int, own: Bools) -> Ints:
-    """Return [live] what is known of each unit's cloak, seen or not."""
-    hiding = world.cloaked[world.live] | (world.burrowed[world.live] & ~own)
-    detected = world.visible[player, world.live] | (player == OBSERVER)
-    enemy = np.where(detected, Cloak.DETECTED.value, Cloak.CLOAKED.value)
-    return np.where(hiding, np.where(own, Cloak.ALLIED.value, enemy), Cloak.NOT_CLOAKED.value)
 
 
 def alliance_of(owner: Ints, player: int) -> Ints:
@@ -254,5 +377,5 @@ def sees(world: World, player: int, points: Floats) -> Bools:
     if not world.fog:
         return inside
     cells = world.visibility[player, np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)]
-    seen: Bools = inside & (cells == _VISIBLE_CELL)
+    seen: Bools = inside & (cells == VISIBLE_CELL)
     return seen

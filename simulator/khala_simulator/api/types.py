@@ -74,6 +74,11 @@ class Types:
             levels[2, unit.row] = _count(numbered, "unit", {unit.name}, "ShieldArmor")
         return levels
 
+    @functools.lru_cache(maxsize=64)  # noqa: B019  # see above
+    def levels_of(self, upgrades: tuple[tuple[int, ...], ...]) -> Ints:
+        """Return [players, 3, rows] the levels that each player's upgrades give."""
+        return np.stack([self.levels(mine) for mine in upgrades])
+
 
 def _count(upgrades: Iterable[Upgrade], catalog: str, entries: set[str], field: str) -> int:
     return sum(

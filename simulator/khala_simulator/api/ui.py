@@ -6,17 +6,22 @@ it has passengers, and else the single panel.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from s2clientprotocol import ui_pb2
 
-from khala_simulator import compiled
+from khala_simulator.api import fields, wire
 from khala_simulator.api.sight import Alliance
+from khala_simulator.native import columns, memory
 
 if TYPE_CHECKING:
     from khala_simulator.api.selection import Selection
     from khala_simulator.api.types import Types
     from khala_simulator.world.world import World
+
+SELF: Final = Alliance.SELF.value
+NEUTRAL: Final = Alliance.NEUTRAL.value
+ENEMY: Final = Alliance.ENEMY.value
 
 
 def panel(world: World, types: Types, selection: Selection, player: int) -> ui_pb2.ObservationUI:
@@ -35,17 +40,13 @@ def panel(world: World, types: Types, selection: Selection, player: int) -> ui_p
 
 
 def _encode_multi(world: World, types: Types, slots: list[int], player: int) -> bytes:
-    """Return a `MultiPanel`; `compiled.units` writes it without an object for each unit."""
-    kernel = compiled.part("units")
-    if kernel is not None:
-        encoded: bytes = kernel.encode_panel(world, types, slots, player)
-        return encoded
-    return multi_panel(world, types, slots, player).SerializeToString()
-
-
-def multi_panel(world: World, types: Types, slots: list[int], player: int) -> ui_pb2.MultiPanel:
-    """Return the panel of several units."""
-    return ui_pb2.MultiPanel(units=(_unit(world, types, slot, player) for slot in slots))
+    """Return a `MultiPanel`."""
+    infos = _Infos(world, types, player)
+    message = wire.Message(64 * len(slots) + 64)
+    for slot in slots:
+        infos.write(slot)
+        message.put_message(fields.PANEL_UNITS, infos.info)
+    return message.content()
 
 
 def _write_one(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, player: int) -> None:
@@ -82,19 +83,45 @@ def _write_single(single: ui_pb2.SinglePanel, world: World, types: Types, slot: 
 
 
 def _unit(world: World, types: Types, slot: int, player: int) -> ui_pb2.UnitInfo:
-    owner, row = int(world.owner[slot]), int(world.type[slot])
-    at = (owner, row)
-    stats = world.stats
-    side = Alliance.SELF if owner == player else Alliance.NEUTRAL if owner == 0 else Alliance.ENEMY
-    return ui_pb2.UnitInfo(
-        unit_type=int(types.id[row]),
-        player_relative=side,
-        health=int(world.life[slot]),
-        shields=int(world.shields[slot]),
-        energy=int(world.energy[slot]),
-        transport_slots_taken=0,
-        build_progress=float(world.build_progress[slot]),
-        max_health=int(stats.life_max[at]),
-        max_shields=int(stats.shields_max[at]),
-        max_energy=int(stats.energy_max[at]),
-    )
+    infos = _Infos(world, types, player)
+    infos.write(slot)
+    return ui_pb2.UnitInfo.FromString(infos.info.content())
+
+
+class _Infos:
+    """What a panel says of units, one after the other."""
+
+    def __init__(self, world: World, types: Types, player: int) -> None:
+        self.c = columns.columns_of(world)
+        self.player = player
+        self.info = wire.Message(128)  # a `UnitInfo`
+        self.tables = (types.id, world.stats.life_max, world.stats.shields_max, world.stats.energy_max)
+        self.type_count = len(types.id)
+        self.type_id = memory.ints(types.id)
+        self.life_max = memory.floats(world.stats.life_max)  # of every player and type, as the others
+        self.shields_max = memory.floats(world.stats.shields_max)
+        self.energy_max = memory.floats(world.stats.energy_max)
+
+    def write(self, slot: int) -> None:
+        """Write what it says of a unit; points are whole ones."""
+        c = self.c
+        info = self.info
+        owner = c.owner[slot]
+        at = owner * self.type_count + c.type[slot]
+        life = int(c.life[slot])
+        shields = int(c.shields[slot])
+        energy = int(c.energy[slot])
+        life_max = int(self.life_max[at])
+        shields_max = int(self.shields_max[at])
+        energy_max = int(self.energy_max[at])
+        info.clear()
+        info.put_number(fields.INFO_UNIT_TYPE, self.type_id[c.type[slot]])
+        info.put_number(fields.INFO_PLAYER_RELATIVE, SELF if owner == self.player else ENEMY if owner else NEUTRAL)
+        info.put_number(fields.INFO_HEALTH, life)
+        info.put_number(fields.INFO_SHIELDS, shields)
+        info.put_number(fields.INFO_ENERGY, energy)
+        info.put_number(fields.INFO_TRANSPORT_SLOTS_TAKEN, 0)
+        info.put_float(fields.INFO_BUILD_PROGRESS, c.build_progress[slot])
+        info.put_number(fields.INFO_MAX_HEALTH, life_max)
+        info.put_number(fields.INFO_MAX_SHIELDS, shields_max)
+        info.put_number(fields.INFO_MAX_ENERGY, energy_max)

@@ -6,18 +6,21 @@ Keeps the snapshots of ``World.memories`` up to date. Above: ``systems.vision``.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.native import columns, memory
 from khala_simulator.world.players import NEUTRAL
 from khala_simulator.world.snapshots import INDEX_SHIFT, TAG_BASE, RememberedUnit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.columns import Floats, Ints
     from khala_simulator.world.snapshots import FogMemory
     from khala_simulator.world.world import World
 
@@ -34,44 +37,103 @@ def unknown_to(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[n
 
 def remember(world: World, player: int) -> None:
     """Update a player's memory with the player's sight in this loop."""
-    memory, owner = world.memories[player], world.owner.take(world.live)
-    slots = world.live[leave_snapshots(world.catalog).take(world.type.take(world.live)) & (owner != player)]
-    visible = world.visible[player].take(slots)
-    seen = visible
-    if not memory.made:  # the game shows where the neutral things are from the start
-        seen = visible | (world.owner.take(slots) == NEUTRAL)
-    columns = [c.take(slots[seen], 0) for c in (world.tag, world.type, world.owner, world.pos, world.heading)]
-    columns.append(world.build_progress.take(slots[seen]))
-    noted = b"".join(column.tobytes() for column in columns) if memory.made else None
-    if noted is None or noted != memory.noted:  # most are resources and finished structures, the same as the last time
-        _note(memory, columns)
-        in_sight = set(world.tag.take(slots[visible]).tolist())
-        _cover(world, memory, [s for s in memory.of_unit.values() if s.unit not in in_sight])
-        memory.noted = noted
-    uncovered = world.visibility[player].take(memory.cells) == VISIBLE
-    if some(uncovered):
-        for index in which(uncovered).tolist():
-            del memory.of_unit[memory.shown[index].unit]
-        _cover(world, memory, [s for s in memory.shown if s.unit in memory.of_unit])
+    c = columns.columns_of(world)
+    known = world.memories[player]
+    first = not known.made  # the game shows where the neutral things are from the start
+    leave = leave_snapshots(world.catalog)
+    leaves = memory.bools(leave)
+    live = world.live
+    slots = memory.ints(live)
+    found = memory.new_ints(len(live))
+    seen = memory.ints(found)
+    n = 0
+    for i in range(len(live)):
+        slot = slots[i]
+        if not leaves[c.type[slot]] or c.owner[slot] == player:
+            continue
+        if c.visible[player * c.capacity + slot] or (first and c.owner[slot] == NEUTRAL):
+            seen[n] = slot
+            n += 1
+    if known.noted is None or not _is_noted(c, seen, n, known.noted):  # most are the same as the last time
+        _note(c, known, seen, n)
+        in_sight = {c.tag[seen[i]] for i in range(n) if c.visible[player * c.capacity + seen[i]]}
+        _cover(world, known, [s for s in known.of_unit.values() if s.unit not in in_sight])
+        known.noted = None if first else _numbers(c, seen, n)
+    _uncover(world, player, known)
 
 
-def _cover(world: World, memory: FogMemory, hidden: list[RememberedUnit]) -> None:
+def _uncover(world: World, player: int, known: FogMemory) -> None:
+    """Forget the snapshots whose place is seen without the unit."""
+    cells = memory.ints(known.cells)
+    visibility = memory.uint8s(world.visibility[player])
+    gone = [i for i in range(len(known.cells)) if visibility[cells[i]] == VISIBLE]
+    if gone:
+        for i in gone:
+            del known.of_unit[known.shown[i].unit]
+        _cover(world, known, [s for s in known.shown if s.unit in known.of_unit])
+
+
+def _cover(world: World, known: FogMemory, hidden: list[RememberedUnit]) -> None:
     """Write which snapshots the fog covers."""
     width = world.map.terrain.size[0]
-    memory.shown = hidden
-    memory.cells = np.array([int(s.pos[1]) * width + int(s.pos[0]) for s in hidden], dtype=np.int64)
+    known.shown = hidden
+    known.cells = np.array([int(s.pos[1]) * width + int(s.pos[0]) for s in hidden], dtype=np.int64)
 
 
-def _note(memory: FogMemory, columns: list[NDArray[Any]]) -> None:
-    """Remember units as they are now: tag, type, owner, place, heading and progress."""
-    for tag, row, owner, (x, y), (hx, hy), progress in zip(*(c.tolist() for c in columns), strict=True):
-        known, now = memory.of_unit.get(tag), (row, owner, (x, y), (hx, hy), progress)
-        if known is not None and now == (known.row, known.owner, known.pos, known.heading, known.build_progress):
+def _note(c: Columns, known: FogMemory, slots: Cells, n: int) -> None:
+    """Remember units as they are now."""
+    for i in range(n):
+        slot = slots[i]
+        pos = c.pos[slot]
+        heading = c.heading[slot]
+        tag = c.tag[slot]
+        now = (c.type[slot], c.owner[slot], (pos.x, pos.y), (heading.x, heading.y), c.build_progress[slot])
+        then = known.of_unit.get(tag)
+        if then is not None and now == (then.row, then.owner, then.pos, then.heading, then.build_progress):
             continue
-        if known is None:
-            memory.made += 1
-        own_tag = TAG_BASE | memory.made << INDEX_SHIFT if known is None else known.tag
-        memory.of_unit[tag] = RememberedUnit(own_tag, tag, *now)
+        if then is None:
+            known.made += 1
+        own_tag = TAG_BASE | known.made << INDEX_SHIFT if then is None else then.tag
+        known.of_unit[tag] = RememberedUnit(own_tag, tag, *now)
+
+
+def _numbers(c: Columns, slots: Cells, n: int) -> tuple[Ints, Floats]:
+    """Return the tag, type and owner of each unit, and its place, heading and progress."""
+    names = memory.new_ints(3 * n)
+    states = memory.new_floats(5 * n)
+    name = memory.ints(names)
+    state = memory.floats(states)
+    for i in range(n):
+        slot = slots[i]
+        name[3 * i] = c.tag[slot]
+        name[3 * i + 1] = c.type[slot]
+        name[3 * i + 2] = c.owner[slot]
+        state[5 * i] = c.pos[slot].x
+        state[5 * i + 1] = c.pos[slot].y
+        state[5 * i + 2] = c.heading[slot].x
+        state[5 * i + 3] = c.heading[slot].y
+        state[5 * i + 4] = c.build_progress[slot]
+    return names, states
+
+
+def _is_noted(c: Columns, slots: Cells, n: int, noted: tuple[Ints, Floats]) -> bool:
+    """Return whether units are as they were noted."""
+    names, states = noted
+    if len(names) != 3 * n:
+        return False
+    name = memory.ints(names)
+    state = memory.floats(states)
+    for i in range(n):
+        slot = slots[i]
+        if name[3 * i] != c.tag[slot] or name[3 * i + 1] != c.type[slot] or name[3 * i + 2] != c.owner[slot]:
+            return False
+        if state[5 * i] != c.pos[slot].x or state[5 * i + 1] != c.pos[slot].y:
+            return False
+        if state[5 * i + 2] != c.heading[slot].x or state[5 * i + 3] != c.heading[slot].y:
+            return False
+        if state[5 * i + 4] != c.build_progress[slot]:
+            return False
+    return True
 
 
 @lru_cache(maxsize=4)

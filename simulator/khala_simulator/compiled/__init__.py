@@ -26,7 +26,6 @@ SYSTEMS: Final = (
     "avoidance",
     "collision",
     "navigation",
-    "vision",
 )
 """The systems that have a module here."""
 

@@ -10,7 +10,7 @@ import dataclasses
 import hashlib
 import re
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from khala_simulator.maps.heights import Heights
 from khala_simulator.maps.nodes import shown
 from khala_simulator.maps.scenario import Flat, Scenario
 from khala_simulator.maps.scenario_file import Sheet, sheets
@@ -58,18 +59,14 @@ class Terrain:
     height: NDArray[np.uint8]  # API bytes: z = -16 + 32 v / 255 at the cell's lower-left corner
     vertices: NDArray[np.float32]  # (h + 1, w + 1) ground z at the cells' corners
 
+    @cached_property
+    def heights(self) -> Heights:
+        """The height of the ground under any point."""
+        return Heights(self.vertices, self.size)
+
     def ground_z(self, points: Floats) -> Floats:
-        """Return the ground height under world points (n, 2), interpolated between the corners of their cells."""
-        x = np.minimum(np.maximum(points[..., 0], 0.0), self.size[0] - 1e-6)
-        y = np.minimum(np.maximum(points[..., 1], 0.0), self.size[1] - 1e-6)
-        ix, iy = x.astype(np.intp), y.astype(np.intp)
-        fx, fy = x - ix, y - iy
-        v, width = self.vertices, self.vertices.shape[1]
-        corner = iy * width + ix  # one index into the flat grid costs a third of two
-        low = v.take(corner) * (1.0 - fx) + v.take(corner + 1) * fx
-        high = v.take(corner + width) * (1.0 - fx) + v.take(corner + width + 1) * fx
-        result: Floats = low * (1.0 - fy) + high * fy
-        return result
+        """Return the ground height under world points (..., 2), interpolated between the corners of their cells."""
+        return self.heights.under(points)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ Views give and take Python's own numbers, which are as exact as C's.
 from __future__ import annotations
 
 import math
+import struct
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -48,17 +49,37 @@ def point(x: float, y: float) -> Point:
 
 def bools(array: NDArray[np.bool_]) -> Cells:
     """Return the numbers of an array whose memory is contiguous, row by row."""
-    return memoryview(array.reshape(-1))
+    return array.reshape(-1).data
 
 
 def ints(array: NDArray[np.int64]) -> Cells:
     """Return the numbers of an array whose memory is contiguous, row by row."""
-    return memoryview(array.reshape(-1))
+    return array.reshape(-1).data
 
 
 def floats(array: NDArray[np.float64]) -> Cells:
     """Return the numbers of an array whose memory is contiguous, row by row."""
-    return memoryview(array.reshape(-1))
+    return array.reshape(-1).data
+
+
+def uint8s(array: NDArray[np.uint8]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return array.reshape(-1).data
+
+
+def uint16s(array: NDArray[np.uint16]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return array.reshape(-1).data
+
+
+def int16s(array: NDArray[np.int16]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return array.reshape(-1).data
+
+
+def int32s(array: NDArray[np.int32]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row."""
+    return array.reshape(-1).data
 
 
 def points(array: NDArray[np.float64]) -> Points:
@@ -81,6 +102,16 @@ def new_floats(n: int) -> NDArray[np.float64]:
     return np.empty(n, dtype=np.float64)
 
 
+def new_uint8s(n: int) -> NDArray[np.uint8]:
+    """Return an array (n,) of zeros."""
+    return np.zeros(n, dtype=np.uint8)
+
+
+def new_int32s(n: int) -> NDArray[np.int32]:
+    """Return an array (n,) of zeros."""
+    return np.zeros(n, dtype=np.int32)
+
+
 def new_points(n: int) -> NDArray[np.float64]:
     """Return an array (n, 2) that is not filled."""
     return np.empty((n, 2), dtype=np.float64)
@@ -89,3 +120,13 @@ def new_points(n: int) -> NDArray[np.float64]:
 def length(x: float, y: float) -> float:
     """Return the length of a vector, rounded as everywhere."""
     return math.sqrt(x * x + y * y)
+
+
+def put_float32(to: Cells, at: int, number: float) -> None:
+    """Write a number into the four bytes from an index on, as a float of 32 bits."""
+    struct.pack_into("<f", to, at, number)
+
+
+def put_bytes(to: Cells, at: int, cells: Cells, n: int) -> None:
+    """Write the first bytes of others into those from an index on."""
+    to[at : at + n] = cells[:n]

@@ -19,6 +19,16 @@ cdef cnp.ndarray new_floats(Py_ssize_t n):
     return cnp.PyArray_EMPTY(1, &size, cnp.NPY_FLOAT64, 0)
 
 
+cdef cnp.ndarray new_uint8s(Py_ssize_t n):
+    cdef cnp.npy_intp size = n
+    return cnp.PyArray_ZEROS(1, &size, cnp.NPY_UINT8, 0)
+
+
+cdef cnp.ndarray new_int32s(Py_ssize_t n):
+    cdef cnp.npy_intp size = n
+    return cnp.PyArray_ZEROS(1, &size, cnp.NPY_INT32, 0)
+
+
 cdef cnp.ndarray new_points(Py_ssize_t n):
     cdef cnp.npy_intp[2] size
     size[0] = n

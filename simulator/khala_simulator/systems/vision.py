@@ -7,15 +7,14 @@ or burrowed are seen where a detector of the player, a scan, or a revealing buff
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat.fog import remember
+from khala_simulator.combat import fog
+from khala_simulator.native import columns, memory
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
@@ -24,46 +23,77 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from khala_simulator.maps.game_map import Terrain
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.tables.catalog import Catalog
-    from khala_simulator.world.columns import Bools, Floats
+    from khala_simulator.world.columns import Bools
     from khala_simulator.world.world import World
 
 Eye = tuple[int, int, int, float, int]
-"""What sees: for which player, its cell, its radius, and the cliff level from which on it does not see."""
+"""What sees: for which player (0: for nobody), its cell, its radius, and the cliff level from which on it is blind."""
 
-AIR = Layer.AIR.value
-SEEN_BEFORE = 1
-VISIBLE = 2
-FROM_ABOVE = 1 << 20  # higher than any cliff: nothing hides from it
+NUMBERS: Final = 5  # of an eye
+AIR: Final = Layer.AIR.value
+SEEN_BEFORE: Final = 1
+VISIBLE: Final = 2
+FROM_ABOVE: Final = 1 << 20  # higher than any cliff: nothing hides from it
+VISION_PERIOD: Final = MECHANICS.vision_period
+HIGH_GROUND_STEP: Final = MECHANICS.high_ground_step
 
 
 def look(world: World) -> None:
     """Update ``visibility`` and ``visible``; where there is fog or a unit hides, every few loops."""
     changed = world.looked_at != world.population
-    due = world.loop % MECHANICS.vision_period == 0 or changed
-    if world.fog and due:
-        _light(world)
-    if world.fog or changed or (world.hiding and due):
-        world.visible[:, : world.top] = False
-        world.visible[:, world.live] = _seen_units(world)
-        reveal(world)
-        if world.fog and due:
-            for player in range(1, len(world.players)):
-                remember(world, player)
-        world.looked_at = world.population
+    fogged = world.fog
+    loop = world.loop
+    due = changed or loop % VISION_PERIOD == 0
+    if not (fogged or changed or (world.hiding and due)):
+        return
+    if fogged and due:
+        _eyes_of(world).light(world)
+    _see_units(world, columns.columns_of(world))
+    if len(world.buffs):
+        _reveal(world)
+    if fogged and due:
+        for player in range(1, len(world.players)):
+            fog.remember(world, player)
+    world.looked_at = world.population
 
 
-def _seen_units(world: World) -> Bools:
-    """Return (players, len(world.live)) whether each player sees each living unit."""
-    seen = world.visible_units()
-    if world.hiding:
-        slots = world.live
-        cloaked = which(world.cloaked.take(slots))  # whatever burrows is cloaked until something uncovers it
-        hidden, owner = slots.take(cloaked), world.owner.take(slots.take(cloaked))
-        for player in range(len(world.players) if hidden.size else 0):
-            seen[player, cloaked] &= (owner == player) | detected(world, player, hidden)
-    return seen
+def _see_units(world: World, c: Columns) -> None:
+    """Write which living units each player sees."""
+    live = world.live
+    slots = memory.ints(live)
+    visibility = memory.uint8s(world.visibility)
+    players, height, width = world.visibility.shape
+    fogged = world.fog
+    hidden = []
+    for player in range(players):
+        for slot in range(world.top):
+            c.visible[player * c.capacity + slot] = False
+    for i in range(len(live)):
+        slot = slots[i]
+        cell = cell_at(c.pos[slot], width, height)
+        if c.cloaked[slot]:  # whatever burrows is cloaked until something uncovers it
+            hidden.append(slot)
+        for player in range(players):
+            c.visible[player * c.capacity + slot] = (
+                not fogged or c.owner[slot] == player or visibility[player * height * width + cell] == VISIBLE
+            )
+    if hidden and world.hiding:
+        _hide(world, c, hidden)
+
+
+def _hide(world: World, c: Columns, hidden: list[int]) -> None:
+    """Take cloaked units from the sight of players that do not detect them."""
+    slots = np.array(hidden, dtype=np.int64)
+    for player in range(len(world.players)):
+        found = detected(world, player, slots)
+        is_found = memory.bools(found)
+        for i in range(len(hidden)):
+            slot = hidden[i]
+            if c.owner[slot] != player and not is_found[i]:
+                c.visible[player * c.capacity + slot] = False
 
 
 def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -79,101 +109,131 @@ def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.
     return found
 
 
-def reveal(world: World) -> None:
+def _reveal(world: World) -> None:
     """Show units under a revealing buff to the player that applied it."""
     for row in _buffs(world, _revealing(world.catalog)):
         world.visible[int(row["owner"]), int(row["slot"])] = True
 
 
+def cell_at(point: memory.Point, width: int, height: int) -> int:
+    """Return the number of the cell that a point is in, or of the nearest one on the map."""
+    x = int(point.x)
+    y = int(point.y)
+    return min(max(y, 0), height - 1) * width + min(max(x, 0), width - 1)
+
+
 # light ----------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(slots=True)
 class Eyes:
     """What the players saw with last, and how many eyes see each cell now."""
 
-    units: Floats  # (5, slots) owner (0: sees for nobody), cell x and y, radius, and the cliff level that it can't see
-    lights: set[Eye]  # those that are no units
-    count: NDArray[np.int16]  # (players, h, w)
+    def __init__(self, world: World) -> None:
+        self._cliffs = world.map.terrain.cliff
+        self._cliff = memory.uint16s(self._cliffs)
+        self._height, self._width = self._cliffs.shape
+        self._counts = np.zeros(world.visibility.shape, dtype=np.int16)  # (players, h, w)
+        self._count = memory.int16s(self._counts)
+        self._units = np.zeros((0, NUMBERS))  # (slots, 5) an `Eye` each
+        self._lights: set[Eye] = set()  # those that are no units
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world looks anew."""
+        return type(None), ()
+
+    def light(self, world: World) -> None:
+        """Redraw every player's visibility grid; the neutral player sees nothing."""
+        self._count_units(world, columns.columns_of(world))
+        if world.area_effects or len(world.buffs) or self._lights:
+            self._count_lights(world)
+        visibility = memory.uint8s(world.visibility)
+        count = self._count
+        cells = self._height * self._width
+        for cell in range(cells, cells * len(world.players)):
+            visibility[cell] = VISIBLE if count[cell] > 0 else min(visibility[cell], SEEN_BEFORE)
+        for player in world.players[1:]:
+            if "show_map" in player.cheats:
+                world.visibility[player.id] = VISIBLE
+
+    def _count_units(self, world: World, c: Columns) -> None:
+        """Count what the eyes of units see; only those that differ from the last time.
+
+        Most units stand or stay in their cell: with 130 units a side, 10 eyes of 100 change in a look.
+        """
+        top = world.top
+        if len(self._units) < top:
+            self._units = np.vstack((self._units, np.zeros((top - len(self._units), NUMBERS))))
+        live = world.live
+        slots = memory.ints(live)
+        units = np.zeros((top, NUMBERS))
+        before = memory.floats(self._units)
+        now = memory.floats(units)
+        for i in range(len(live)):
+            self._write(c, slots[i], now)
+        for slot in range(top):
+            at = NUMBERS * slot
+            if _differ(before, now, at):
+                self._watch(before, at, -1)
+                self._watch(now, at, 1)
+        self._units = units
+
+    def _write(self, c: Columns, slot: int, eyes: Cells) -> None:
+        """Write the eye of a living unit."""
+        at = NUMBERS * slot
+        x = int(c.pos[slot].x)
+        y = int(c.pos[slot].y)
+        level = self._cliff[cell_at(c.pos[slot], self._width, self._height)]
+        eyes[at] = c.owner[slot]
+        eyes[at + 1] = x
+        eyes[at + 2] = y
+        eyes[at + 3] = c.sight[slot]
+        eyes[at + 4] = FROM_ABOVE if c.layer[slot] == AIR else level + HIGH_GROUND_STEP
+
+    def _count_lights(self, world: World) -> None:
+        """Count what the eyes see that are no units; only those that come or go."""
+        lights = set(_lights(world))
+        for sign, changed in ((1, lights - self._lights), (-1, self._lights - lights)):
+            for light in changed:
+                eye = np.array(light, dtype=np.float64)
+                self._watch(memory.floats(eye), 0, sign)
+        self._lights = lights
+
+    def _watch(self, eyes: Cells, at: int, sign: int) -> None:
+        """Add every cell that an eye sees, or take it away."""
+        owner = int(eyes[at])
+        if not owner:
+            return
+        x = int(eyes[at + 1])
+        y = int(eyes[at + 2])
+        below = int(eyes[at + 4])
+        shape, half = disc(eyes[at + 3])
+        inside = memory.bools(shape)
+        first = owner * self._height * self._width
+        for row in range(max(y - half, 0), min(y + half + 1, self._height)):
+            for column in range(max(x - half, 0), min(x + half + 1, self._width)):
+                cell = row * self._width + column
+                if inside[(row - y + half) * (2 * half + 1) + column - x + half] and self._cliff[cell] < below:
+                    self._count[first + cell] += sign
 
 
-def _light(world: World) -> None:
-    """Redraw every player's visibility grid."""
-    eyes = world.eyes
-    if not isinstance(eyes, Eyes):
-        eyes = world.eyes = Eyes(np.zeros((5, 0)), set(), np.zeros(world.visibility.shape, dtype=np.int16))
-    _recount(world, eyes)
-    grids = world.visibility[1:]
-    np.minimum(grids, SEEN_BEFORE, out=grids)
-    np.copyto(grids, VISIBLE, where=eyes.count[1:] > 0)
-    for player in world.players[1:]:
-        if "show_map" in player.cheats:
-            world.visibility[player.id] = VISIBLE
-
-
-def _recount(world: World, eyes: Eyes) -> None:
-    """Count what each eye sees; only those that differ from the last time.
-
-    Most units stand or stay in their cell: with 130 units a side, 10 eyes of 100 change in a look.
-    """
-    before, now, terrain = eyes.units, _unit_eyes(world), world.map.terrain
-    if before.shape != now.shape:
-        before = np.pad(before, ((0, 0), (0, now.shape[1] - before.shape[1])))
-    changed = which(np.logical_or.reduce(before != now))
-    for sign, of in ((-1, before), (1, now)):
-        for owner, x, y, radius, below in of.take(changed, 1).T.tolist():
-            _count(eyes.count, terrain, (int(owner), int(x), int(y), radius, int(below)), sign)
-    eyes.units = now
-    count_lights(world, eyes)
-
-
-def count_lights(world: World, eyes: Eyes) -> None:
-    """Count what the eyes see that are no units; only those that come or go."""
-    lights = set(_lights(world))
-    for light in lights - eyes.lights:
-        _count(eyes.count, world.map.terrain, light, 1)
-    for light in eyes.lights - lights:
-        _count(eyes.count, world.map.terrain, light, -1)
-    eyes.lights = lights
-
-
-def _unit_eyes(world: World) -> Floats:
-    """Return (5, slots) the eyes of all units, as in ``Eyes``."""
-    n, cliff = world.top, world.map.terrain.cliff
-    height, width = cliff.shape
-    cells = world.pos[:n].astype(np.int64)
-    inside = np.minimum(np.maximum(cells, 0), (width - 1, height - 1))
-    eyes = np.zeros((5, n))
-    eyes[0, world.live] = world.owner.take(world.live)
-    eyes[1:3] = cells.T
-    eyes[3] = world.sight[:n]
-    eyes[4] = cliff.take(inside[:, 1] * width + inside[:, 0])
-    eyes[4] += MECHANICS.high_ground_step
-    eyes[4, world.layer[:n] == AIR] = FROM_ABOVE
+def _eyes_of(world: World) -> Eyes:
+    """Return the eyes of a world, which begin to see now if there are none."""
+    if world.eyes is None:
+        world.eyes = Eyes(world)
+    eyes: Eyes = world.eyes  # type: ignore[assignment]  # to the world it is an object
     return eyes
 
 
-def _count(count: NDArray[np.int16], terrain: Terrain, eye: Eye, sign: int) -> None:
-    """Add every cell that an eye sees, or take it away."""
-    if eye[0]:
-        box, shape = _view(terrain, *eye[1:])
-        cells = count[eye[0]][box]
-        (np.add if sign > 0 else np.subtract)(cells, shape, out=cells)
-
-
-@lru_cache(maxsize=1 << 14)
-def _view(terrain: Terrain, x: int, y: int, radius: float, below: int) -> tuple[tuple[slice, slice], Bools]:
-    """Return what is seen from a cell: a box of the map, and which of its cells.
-
-    Workers come to the same cells again and again.
-    """
-    width, height = terrain.size
-    mask, half = disc(radius)
-    left, low = max(x - half, 0), max(y - half, 0)
-    right, high = max(min(x + half + 1, width), left), max(min(y + half + 1, height), low)
-    shape = mask[low - y + half : high - y + half, left - x + half : right - x + half]
-    box = slice(low, high), slice(left, right)
-    return box, shape if below == FROM_ABOVE else shape & (terrain.cliff[box] < below)
+def _differ(eyes: Cells, others: Cells, at: int) -> bool:
+    """Return whether two eyes differ."""
+    differ: bool = (
+        eyes[at] != others[at]
+        or eyes[at + 1] != others[at + 1]
+        or eyes[at + 2] != others[at + 2]
+        or eyes[at + 3] != others[at + 3]
+        or eyes[at + 4] != others[at + 4]
+    )
+    return differ
 
 
 def _lights(world: World) -> Iterator[Eye]:

@@ -1,10 +1,10 @@
 cimport cython
 from libc.stdint cimport int64_t
 
+from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport boolean
-from khala_simulator.movement cimport turning
 from khala_simulator.world.shots cimport PendingHit, Shot
 
 cdef double NOT_STARTED

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.combat.launchers import LAUNCHERS
-from khala_simulator.native import columns, memory
 from khala_simulator.movement import turning
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.census import census
 from khala_simulator.world.columns import NOBODY

@@ -14,6 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from khala_simulator.world.columns import Floats, Ints
+
 TAG_BASE: Final = 2 << 32
 INDEX_SHIFT: Final = 18
 
@@ -39,7 +41,7 @@ class FogMemory:
         self.shown: list[RememberedUnit] = []
         self.cells: NDArray[np.int64] = np.zeros(0, dtype=np.int64)  # of those, as numbers y * width + x
         self.made = 0
-        self.noted: bytes | None = None  # all that was in sight the last time, as it was
+        self.noted: tuple[Ints, Floats] | None = None  # all that was in sight the last time, as it was; see ``fog``
 
     def find(self, tag: int) -> RememberedUnit | None:
         """Return the shown snapshot with this tag of its own, or None."""

@@ -259,8 +259,7 @@ class World(UnitColumns, WorldCaches):
     def heights(self) -> Floats:
         """Return (len(live),) z of every living unit: the ground's, and its flying height above it."""
         above = np.array([self.catalog.units[row].height for row in self.type[self.live]], dtype=np.float64)
-        result: Floats = self.map.terrain.ground_z(self.pos[self.live]) + above
-        return result
+        return self.map.terrain.ground_z(self.pos[self.live]) + above
 
     def stand(self, slot: int) -> None:
         """Put a structure's footprint on the ground, unless units walk over it."""
@@ -322,20 +321,12 @@ class World(UnitColumns, WorldCaches):
 
     def is_visible(self, player: int) -> Bools:
         """Return (len(live),) whether ``player`` sees each living unit now; cloak and detection are ignored here."""
-        seen: Bools = self.visible_units()[player]
-        return seen
-
-    def visible_units(self) -> Bools:
-        """Return (players, len(live)) the same of every player."""
         if not self.fog:
-            return np.ones((len(self.players), len(self.live)), dtype=np.bool_)
+            return np.ones(len(self.live), dtype=np.bool_)
         width, height = self.map.terrain.size
-        at = self.pos.take(self.live, 0).astype(np.int64)
-        np.maximum(at, 0, out=at)
-        np.minimum(at, (width - 1, height - 1), out=at)
-        cells = at[:, 1] * width + at[:, 0]
-        seen: Bools = self.visibility.reshape(len(self.players), -1).take(cells, axis=1) == 2
-        seen[self.owner.take(self.live), np.arange(len(cells))] = True
+        column, row = self.pos[self.live].astype(np.int64).T
+        cells = self.visibility[player, np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+        seen: Bools = (cells == 2) | (self.owner[self.live] == player)
         return seen
 
     # result -------------------------------------------------------------------------------------------------------

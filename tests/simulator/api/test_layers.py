@@ -10,6 +10,7 @@ from s2clientprotocol import common_pb2, spatial_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api import layers
+from khala_simulator.api.layer_values import VALUES
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.sight import Display
 from khala_simulator.combat import buffs
@@ -202,6 +203,6 @@ def test_a_placeholder_is_a_unit_that_is_to_be_built(make_table: Any) -> None:
     frame = Frame(
         table.world, table.game.types, 1, planned, np.zeros(1, np.bool_), (16, 16), np.zeros((0, 2)), fogged=False
     )
-    values = dict(zip(layers.VALUES, layers.unit_values(frame)[:, 0].tolist(), strict=True))
+    values = dict(zip(VALUES, layers.unit_values(frame)[:, 0].tolist(), strict=True))
     assert (values["placeholder"], values["unit_type"]) == (1, table.world.catalog.unit("Pylon").id)
     assert not table.screen("placeholder").any()
