@@ -15,7 +15,7 @@ from khala_simulator.abilities.protoss import warpgate
 from khala_simulator.api.abilities import result_of, usable
 from khala_simulator.combat import fog
 from khala_simulator.economy import building_sites
-from khala_simulator.movement import pathfinding
+from khala_simulator.movement import pathfinding, ways
 from khala_simulator.tables.layers import Layer
 from khala_simulator.world.world import NOBODY
 
@@ -83,7 +83,7 @@ def _distance(seat: PlayerSeat, question: query_pb2.RequestQueryPathing) -> floa
     here, there = np.array(start), np.array(end)
     inside = world.map.terrain.walk[int(start[1]), int(start[0])] and not surface.flat[surface.cell(here)]
     beside = surface.nearest_free(here) if inside else None
-    return surface.distance(here if beside is None else surface.centre(np.array(beside)), there)
+    return ways.distance(surface, here if beside is None else surface.centre(np.array(beside)), there)
 
 
 def _on_map(world: World, x: float, y: float) -> bool:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 SYSTEMS: Final = (
     "avoidance",
     "collision",
-    "navigation",
+    "avoidance",
+    "collision",
 )
 """The systems that have a module here."""
 

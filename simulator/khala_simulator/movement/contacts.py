@@ -1,187 +1,255 @@
 """Contacts: which bodies touch or nearly do.
 
-A look-up for ``systems.collision``, which acts on it. Among a few bodies every pair is measured, with
-distances looked up in a table; many are sorted along the wider axis of the crowd and only neighbours are measured, so
-that the cost grows with the crowd and not with its square.
+A look-up for ``movement.pushing``, which acts on it.
+
+Which pairs: two bodies that share a layer, and whose distance is less than the one they keep and a ``SKIN``, as what is
+pushed off one body may come upon the next. Nothing is to be done unless two of a pair overlap by more than
+``OVERLAP_ALLOWED``. What stands on a footprint is a wall and no body.
+
+How they are found: among ``FEW`` units every pair is measured. Many are sorted along the axis on which they spread
+wider, and each is measured with those that follow it within the reach of the two widest, so that the cost grows with
+the crowd and not with its square. The sort begins with the order of the last loop, of which little has changed.
+
+In which order: sums of pushes are rounded, so their order decides the last bit of a position, and it must follow from
+the state of the world alone. The bodies stand in the order of their slots among few, and along the axis among many,
+where equal ones follow their slots. Each forms its pairs with those that follow it, in that order. Of the pushes that a
+body gets, those as the second of a pair are summed up first among few, those as the first of it among many.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from khala_simulator.numeric.arrays import some, which
-from khala_simulator.tables.layers import Layer
+from khala_simulator.native import memory
 
 if TYPE_CHECKING:
-    from khala_simulator.world.columns import Bools, Floats, Ints
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.world.world import World
 
-SKIN: Final = 0.1  # how far apart two bodies may be to be worth looking at
+SKIN: Final = 0.1
 OVERLAP_ALLOWED: Final = 0.005
-TABLE_LIMIT: Final = 80  # up to so many units a table of all pairs is the faster way
-WORTH_A_LOOK: Final = 40  # and up to so many bodies a look at one, as they seldom touch
+FEW: Final = 80
+FAR: Final = 1e300
 
 
-@dataclass(slots=True)
-class Pairs:
-    """Pairs of bodies, as indices into the living slots, each pair both ways round."""
+class Crowd:
+    """The bodies of one world, and room for what is measured between them; ``count`` of them are alive.
 
-    both: Ints  # (2, k)
-    apart: Floats  # (k,) distance to keep
-    closest: float  # the least distance between two of a pair, squared
-
-    @property
-    def one(self) -> Ints:
-        """(k,) the first of each pair."""
-        one: Ints = self.both[0]
-        return one
-
-    @property
-    def other(self) -> Ints:
-        """(k,) the second."""
-        other: Ints = self.both[1]
-        return other
-
-
-@dataclass(slots=True)
-class Bodies:
-    """The constants of the pairs of living bodies until a unit is born, dies or changes."""
-
-    changes: int  # those of the world for which they hold
-    content: tuple[bytes, ...]  # of the columns of which they are made
-    count: int  # of living units
-    rows: Ints  # (k,) those that can meet other bodies
-    separation: Floats  # (n,) of every living unit
-    bits: Ints  # (n,) layers it collides in, 0 for what stands on a footprint: that is a wall, not a body
-    flying: Bools  # (n,)
-    any_flying: bool
-    widest: float  # the largest separation
-    table: tuple[Floats, Floats, Floats] | None  # of all pairs of rows: touching, near, and to be kept; see ``_table``
-    members: Ints  # (2, k * k) of each pair in it
-
-    @classmethod
-    def of(cls, world: World) -> Bodies:
-        """Return the bodies of a world's living units."""
-        slots = world.live
-        bits = np.where(world.walled.take(slots), 0, world.layer_bits.take(slots))
-        rows = which(bits != 0)
-        separation = world.separation.take(slots)
-        flying = world.layer.take(slots) == int(Layer.AIR)
-        content = _content(world)
-        sizes = separation.take(rows)
-        table = _table(sizes, bits.take(rows)) if len(rows) <= TABLE_LIMIT else None
-        members = np.stack((rows.repeat(len(rows)), np.tile(rows, len(rows)))) if len(slots) <= TABLE_LIMIT else rows
-        widest = float(sizes.max(initial=0.0))
-        any_flying = bool(flying.any())
-        return cls(
-            world.changes, content, len(slots), rows, separation, bits, flying, any_flying, widest, table, members
-        )
-
-    def near(self, at: Floats) -> Pairs | None:
-        """Return the pairs that touch or nearly do when the bodies are at ``at`` (n, 2); None when no two touch.
-
-        Forces are summed up in the order of the pairs, so it is always the same: by slots, or that of ``within``.
-        """
-        if len(self.rows) < self.count:
-            at = at.take(self.rows, 0)
-        if self.count <= TABLE_LIMIT:
-            return self._looked_up(at)
-        if len(self.rows) <= WORTH_A_LOOK and not self._touching(at)[1]:
-            return None
-        return self._neighbours(at)
-
-    def _touching(self, at: Floats) -> tuple[Floats, bool]:
-        """Return the distances of the pairs in the table, squared, and whether any two touch."""
-        x, y = at[:, 0], at[:, 1]
-        squared = x[:, None] - x
-        squared *= squared
-        dy = y[:, None] - y
-        dy *= dy
-        squared += dy
-        return squared, self.table is not None and some(squared < self.table[0])
-
-    def _looked_up(self, at: Floats) -> Pairs | None:
-        squared, touch = self._touching(at)
-        if not touch or self.table is None:
-            return None
-        flat = which((squared < self.table[1]).ravel())  # one index into a table costs a third of two
-        return Pairs(self.members.take(flat, 1), self.table[2].take(flat), float(np.minimum.reduce(squared.take(flat))))
-
-    def _neighbours(self, at: Floats) -> Pairs | None:
-        """Do the same as ``_looked_up``, without a table."""
-        if not len(at):
-            return None
-        pairs, squared = within(at, 2.0 * self.widest + SKIN)
-        pairs = self.rows.take(pairs)
-        apart = self.separation.take(pairs)
-        apart = apart[0] + apart[1]
-        bits = self.bits.take(pairs)
-        meets = (bits[0] & bits[1]) != 0
-        meets &= squared < (apart + SKIN) ** 2
-        near = which(meets)
-        squared, apart = squared.take(near), apart.take(near)
-        if not some(squared < np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2):
-            return None
-        one, other = pairs.take(near, 1)
-        both = np.concatenate((one, other, other, one)).reshape(2, -1)
-        return Pairs(both, np.concatenate((apart, apart)), float(np.minimum.reduce(squared)))
-
-
-def bodies_of(world: World) -> Bodies:
-    """Return the bodies of a world's living units, rebuilt now if something has changed."""
-    known = world.bodies
-    if isinstance(known, Bodies):
-        if known.changes == world.changes:
-            return known
-        if known.content == _content(world):  # such as when a worker took up a load
-            known.changes = world.changes
-            return known
-    made = world.bodies = Bodies.of(world)
-    return made
-
-
-def _content(world: World) -> tuple[bytes, ...]:
-    """Return all of which ``Bodies`` are made."""
-    columns = (world.walled, world.layer_bits, world.layer, world.separation)
-    return world.live.tobytes(), *(column.take(world.live).tobytes() for column in columns)
-
-
-def within(at: Floats, reach: float) -> tuple[Ints, Floats]:
-    """Return (2, k) every pair of points (n, 2) less than ``reach`` apart on both axes, and (k,) its distance squared.
-
-    Each pair is there once. The points are sorted along the axis on which they spread wider, and each is paired with
-    those that follow.
+    Attributes:
+        before: (count,) where each stood.
+        after: (count,) where it goes.
+        start: (count,) from where it is pushed.
+        force: (count,) how far all its pairs push it.
+        enemy: (count,) how easily an enemy pushes it.
+        friend: (count,) how easily a friend does.
+        pairs: How many are near each other.
+        first: (pairs,) indices into the living slots.
+        second: (pairs,) the same.
+        apart: (pairs,) distance to keep.
+        share: (pairs,) part of an overlap by which the first gives way.
+        rest: (pairs,) that of the second.
+        offset: (pairs,) from the second to the first.
+        distance: (pairs,) its length.
+        push: (pairs,) part of the offset that makes up for an overlap.
+        chosen: (pairs,) room for numbers of pairs.
+        closest: The least distance between the two of a pair, squared.
+        by_slots: Whether the bodies are few, in the order of their slots.
     """
-    axes = np.ascontiguousarray(at.T)
-    spread = np.maximum.reduce(axes, axis=1) - np.minimum.reduce(axes, axis=1)
-    along, across = axes if spread[0] >= spread[1] else axes[::-1]
-    order = along.argsort(kind="stable")
-    along, across = along.take(order), across.take(order)
-    rank = np.arange(len(order))
-    follow = along.searchsorted(along + reach)
-    follow -= rank
-    follow -= 1
-    one = rank.repeat(follow)
-    # the first of the k-th point's pairs is the sum of all before, its followers begin at k + 1
-    other = np.arange(len(one))
-    other += (rank + 1 + follow - np.add.accumulate(follow)).repeat(follow)
-    aside = across.take(one) - across.take(other)
-    close = which(np.abs(aside) < reach)
-    one, other, aside = one.take(close), other.take(close), aside.take(close)
-    ahead = along.take(one) - along.take(other)
-    ahead *= ahead
-    aside *= aside
-    ahead += aside
-    return order.take(np.concatenate((one, other)).reshape(2, -1)), ahead
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.pairs = 0
+        self.closest = FAR
+        self.by_slots = True
+        self._body_room = 0
+        self._pair_room = 0
+        self._slot_room = 0
+        self._last = 0  # how many bodies were ranked last
+        self._pair_arrays: tuple[Any, ...] = ()
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world makes its own room."""
+        return type(None), ()
+
+    def reserve(self, count: int, slots: int) -> None:
+        """Make room for so many bodies in so many slots."""
+        self.count = count
+        if count > self._body_room:
+            self._reserve_bodies(2 * count)
+        if slots > self._slot_room:
+            self._slot_room = slots
+            self._place_array = np.full(slots, -1, dtype=np.int64)
+            self._place = memory.ints(self._place_array)
+
+    def _reserve_bodies(self, room: int) -> None:
+        """Make room for so many bodies; nothing of the old is kept."""
+        points = [memory.new_points(room) for _ in range(5)]
+        floats = [memory.new_floats(room) for _ in range(4)]
+        ints = [memory.new_ints(room) for _ in range(4)]
+        self._body_arrays = points, floats, ints
+        self.before = memory.points(points[0])
+        self.after = memory.points(points[1])
+        self.start = memory.points(points[2])
+        self.force = memory.points(points[3])
+        self._at = memory.points(points[4])
+        self.enemy = memory.floats(floats[0])
+        self.friend = memory.floats(floats[1])
+        self._along = memory.floats(floats[2])
+        self._separation = memory.floats(floats[3])
+        self._body = memory.ints(ints[0])
+        self._layers = memory.ints(ints[1])
+        self._close = memory.ints(ints[2])
+        self._ranked = memory.ints(ints[3])
+        self._body_room = room
+        self._last = 0
+
+    def _reserve_pairs(self, room: int) -> None:
+        """Make room for so many pairs; those that are found already are kept."""
+        ints = [memory.new_ints(room) for _ in range(3)]
+        floats = [memory.new_floats(room) for _ in range(5)]
+        offset = memory.new_points(room)
+        arrays = (ints[0], ints[1], floats[0], *ints[2:], *floats[1:], offset)
+        for new, old in zip(arrays[:3], self._pair_arrays, strict=False):
+            new[: self.pairs] = old[: self.pairs]
+        self._pair_arrays = arrays
+        self.first = memory.ints(ints[0])
+        self.second = memory.ints(ints[1])
+        self.chosen = memory.ints(ints[2])
+        self.apart = memory.floats(floats[0])
+        self.share = memory.floats(floats[1])
+        self.rest = memory.floats(floats[2])
+        self.distance = memory.floats(floats[3])
+        self.push = memory.floats(floats[4])
+        self.offset = memory.points(offset)
+        self._pair_room = room
+
+    def find_pairs(self, c: Columns, slots: Cells) -> bool:
+        """Find the pairs that touch or nearly do, in their order; return whether any two touch."""
+        self.pairs = 0
+        self.closest = FAR
+        self.by_slots = self.count <= FEW
+        bodies = 0
+        for i in range(self.count):
+            if c.layer_bits[slots[i]] != 0 and not c.walled[slots[i]]:
+                self._body[bodies] = i
+                bodies += 1
+        if not self.by_slots:
+            self._rank(slots, bodies)
+        widest = 0.0
+        for k in range(bodies):
+            i = self._body[k]
+            self._at[k] = self.after[i]
+            self._separation[k] = c.separation[slots[i]]
+            self._layers[k] = c.layer_bits[slots[i]]
+            widest = max(widest, self._separation[k])
+        reach = 2.0 * widest + SKIN
+        touch = False
+        end = bodies if self.by_slots else 0
+        for k in range(bodies):
+            while end < bodies and self._along[end] < self._along[k] + reach:
+                end += 1
+            touch |= self._meet(k, end)
+        return touch
+
+    def _rank(self, slots: Cells, bodies: int) -> None:
+        """Sort the bodies along the axis on which they spread wider."""
+        self._recall(slots, bodies)
+        body = self._body
+        along = self._along
+        across = self._spreads_upwards(bodies)
+        for k in range(bodies):
+            along[k] = self.after[body[k]].y if across else self.after[body[k]].x
+        for k in range(1, bodies):
+            i = body[k]
+            value = along[k]
+            j = k
+            while j > 0 and (along[j - 1] > value or (along[j - 1] == value and body[j - 1] > i)):
+                along[j] = along[j - 1]
+                body[j] = body[j - 1]
+                j -= 1
+            along[j] = value
+            body[j] = i
+        for k in range(bodies):
+            self._ranked[k] = slots[body[k]]
+        self._last = bodies
+
+    def _recall(self, slots: Cells, bodies: int) -> None:
+        """Put the bodies in the order of the last loop, and new ones at the end."""
+        body = self._body
+        place = self._place  # (slots,) of each that is not in order yet its index, else -1
+        for k in range(bodies):
+            place[slots[body[k]]] = body[k]
+        known = 0
+        for k in range(self._last):
+            slot = self._ranked[k]
+            if place[slot] >= 0:
+                body[known] = place[slot]
+                place[slot] = -1
+                known += 1
+        for i in range(self.count):
+            slot = slots[i]
+            if place[slot] >= 0:
+                body[known] = i
+                place[slot] = -1
+                known += 1
+
+    def _spreads_upwards(self, bodies: int) -> bool:
+        """Return whether the bodies spread wider on the y axis."""
+        if not bodies:
+            return False
+        at = self.after[self._body[0]]
+        low_x = high_x = at.x
+        low_y = high_y = at.y
+        for k in range(1, bodies):
+            at = self.after[self._body[k]]
+            low_x = min(low_x, at.x)
+            high_x = max(high_x, at.x)
+            low_y = min(low_y, at.y)
+            high_y = max(high_y, at.y)
+        return high_x - low_x < high_y - low_y
+
+    def _meet(self, k: int, end: int) -> bool:
+        """Note the pairs of the k-th body with those that follow, up to ``end``; return whether any two touch."""
+        at = self._at
+        separation = self._separation
+        close = self._close
+        here = at[k]
+        size = separation[k]
+        near = 0
+        for j in range(k + 1, end):  # without a branch, as none could be foreseen
+            there = at[j]
+            x = here.x - there.x
+            y = here.y - there.y
+            beside = size + separation[j] + SKIN
+            close[near] = j
+            near += x * x + y * y < beside * beside
+        if self.pairs + near > self._pair_room:
+            self._reserve_pairs(2 * (self.pairs + near) + 64)
+        touch = False
+        for n in range(near):
+            j = close[n]
+            if self._layers[k] & self._layers[j] == 0:
+                continue
+            x = here.x - at[j].x
+            y = here.y - at[j].y
+            squared = x * x + y * y
+            apart = size + separation[j]
+            inside = max(apart - OVERLAP_ALLOWED, 0.0)
+            self.first[self.pairs] = self._body[k]
+            self.second[self.pairs] = self._body[j]
+            self.apart[self.pairs] = apart
+            self.pairs += 1
+            self.closest = min(self.closest, squared)
+            touch |= squared < inside * inside
+        return touch
 
 
-def _table(separation: Floats, bits: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return for every pair: touching and near distance, squared, -1 if they never meet; and the distance to keep."""
-    apart = separation[:, None] + separation
-    meets = (bits[:, None] & bits) != 0
-    np.fill_diagonal(meets, val=False)
-    touching = np.where(meets, np.maximum(apart - OVERLAP_ALLOWED, 0.0) ** 2, -1.0)
-    return touching, np.where(meets, (apart + SKIN) ** 2, -1.0), apart
+def crowd_of(world: World) -> Crowd:
+    """Return the crowd of a world."""
+    if world.bodies is None:
+        world.bodies = Crowd()
+    crowd: Crowd = world.bodies  # type: ignore[assignment]  # its caches say less
+    return crowd

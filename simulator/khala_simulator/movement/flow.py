@@ -1,8 +1,8 @@
 """Flow: the ways of a crowd round the bodies that stand, to the free places from which it reaches its targets.
 
 A ``Flow`` is a fine grid over a fight: where a body of one size has room, and how many steps it is from there to the
-nearest place in reach of a target. It is found outwards from those places, a step at a time, on whole grids at once:
-a grid is one integer, a bit for each cell. ``systems.flanking`` follows it.
+nearest place in reach of a target. The steps are counted outwards from those places, all cells of one step after those
+of the step before, until every walker is reached. ``systems.flanking`` follows it.
 """
 
 from __future__ import annotations
@@ -11,158 +11,250 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.native import memory
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.pathfinding import Surface
-    from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Bools, Ints
-
-Bytes = NDArray[np.uint8]
+    from khala_simulator.movement.grids import Grid
+    from khala_simulator.native.memory import Cells
 
 FINE: Final = 4  # cells of the grid in a cell of the ground, on each axis
 MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
-DIGITS: Final = 6
-NOWHERE: Final = 2**DIGITS - 1  # more steps than are looked at
+NOWHERE: Final = 63  # more steps than are looked at
 HOPS: Final = 2  # of up to two cells, from the nearest cell with a way to the point that a walker heads for
+AROUND: Final = 2  # cells to each side in a hop
 NEARER: Final = 1e-5  # what a square cell of distance to the goal weighs, where a step weighs 1
-SIDE: Final = np.arange(-2, 3)
-AROUND: Final = np.array([(dx, dy) for dy in SIDE for dx in SIDE])
-BESIDE: Final = AROUND[np.abs(AROUND).max(axis=1) < 2]  # the cell itself and its eight neighbours
+
+
+class Walker:
+    """One of a crowd, and the way that is found for it.
+
+    Attributes:
+        slot: Its slot.
+        at: Where it is.
+        goal: Where it wants to go.
+        ahead: The point that it heads for.
+        left: How far that is.
+        found: Whether there is a way.
+        arrives: Whether the way ends there.
+        settled: Whether others go round that place.
+    """
+
+    slot: int
+    at: memory.Point
+    goal: memory.Point
+    ahead: memory.Point
+    left: float
+    found: bool
+    arrives: bool
+    settled: bool
+
+
+def walker_of(slot: int, at: memory.Point, goal: memory.Point) -> Walker:
+    """Return a walker whose way is not known yet."""
+    walker = Walker()
+    walker.slot = slot
+    walker.at = at
+    walker.goal = goal
+    walker.ahead = at
+    walker.left = 0.0
+    walker.found = False
+    walker.arrives = False
+    walker.settled = False
+    return walker
 
 
 class Flow:
-    """A grid around walkers (k, 2); ``stand`` and ``reach`` say what is on it, ``points`` finds the ways."""
+    """A grid around walkers; ``stand`` and ``reach`` say what is on it, ``find`` finds the ways."""
 
-    def __init__(self, surface: Surface, walkers: Floats) -> None:
-        low = np.floor(walkers.min(axis=0) + (surface.shift - MARGIN)).astype(np.int64)
-        high = np.ceil(walkers.max(axis=0) + (surface.shift + MARGIN)).astype(np.int64)
-        (x0, y0), (x1, y1) = low.tolist(), high.tolist()
-        inside = surface.free[max(y0, 0) : y1, max(x0, 0) : x1]
-        ground = np.zeros((y1 - y0, x1 - x0), dtype=np.bool_)
+    def cover(self, grid: Grid, walkers: list[Walker]) -> None:
+        """Lay the grid around walkers, with nothing on it yet."""
+        margin = grid.shift - MARGIN
+        far = grid.shift + MARGIN
+        x0 = int(math.floor(min([walker.at.x for walker in walkers]) + margin))
+        y0 = int(math.floor(min([walker.at.y for walker in walkers]) + margin))
+        x1 = int(math.ceil(max([walker.at.x for walker in walkers]) + far))
+        y1 = int(math.ceil(max([walker.at.y for walker in walkers]) + far))
+        inside = grid.surface.free[max(y0, 0) : max(y1, 0), max(x0, 0) : max(x1, 0)]
+        ground = np.zeros((y1 - y0, x1 - x0), dtype=np.uint8)
         ground[max(-y0, 0) :, max(-x0, 0) :][: inside.shape[0], : inside.shape[1]] = inside
-        self.low = low - surface.shift
-        self.free: Bools = ground.repeat(FINE, axis=0).repeat(FINE, axis=1)
-        self.free[[0, -1]] = self.free[:, [0, -1]] = False  # so that no step leads round the edge
-        self.wanted: Bools = np.zeros_like(self.free)
-        self.height, self.width = self.free.shape
+        fine = ground.repeat(FINE, axis=0).repeat(FINE, axis=1)
+        fine[[0, -1]] = 0  # so that no step leads round the edge
+        fine[:, [0, -1]] = 0
+        self.low = memory.point(x0 - grid.shift, y0 - grid.shift)
+        self.height, self.width = fine.shape
+        bytes_alike = (np.zeros_like(fine) for _ in range(3))
+        self.arrays = (fine, *bytes_alike, memory.new_ints(fine.size))
+        self.free = memory.uint8s(self.arrays[0])
+        self.wanted = memory.uint8s(self.arrays[1])
+        self.awaited = memory.uint8s(self.arrays[2])  # the cells around walkers
+        self.left = memory.uint8s(self.arrays[3])  # steps to a place to go to, more than ``NOWHERE`` if it is not free
+        self.reached = memory.ints(self.arrays[4])  # cells in the order of these
+        self.end = 0  # of the cells that were reached
 
-    def stand(self, at: Floats, apart: Floats) -> None:
-        """Take the cells nearer than ``apart`` (m,) to bodies at (m, 2)."""
-        self._paint(self.free, at, apart, value=False)
+    def stand(self, at: memory.Point, apart: float) -> None:
+        """Take the cells nearer than ``apart`` to a body."""
+        self.paint(self.free, at, apart, 0)
 
-    def reach(self, at: Floats, within: Floats) -> None:
-        """Mark the cells within a distance (m,) of targets at (m, 2) as places to go to."""
-        self._paint(self.wanted, at, within, value=True)
+    def reach(self, at: memory.Point, within: float) -> None:
+        """Mark the cells within a distance of a target as places to go to."""
+        self.paint(self.wanted, at, within, 1)
 
-    def _paint(self, grid: Bools, at: Floats, radius: Floats, *, value: bool) -> None:
-        if not len(at):
+    def paint(self, cells: Cells, at: memory.Point, radius: float, value: int) -> None:
+        """Write a value to the cells around a point."""
+        middle_x = (at.x - self.low.x) * FINE
+        middle_y = (at.y - self.low.y) * FINE
+        radius = radius * FINE
+        half = int(math.ceil(radius))
+        column = int(math.floor(middle_x))
+        row = int(math.floor(middle_y))
+        for i in range(max(row - half, 0), min(row + half + 1, self.height)):
+            y = i + 0.5 - middle_y
+            for j in range(max(column - half, 0), min(column + half + 1, self.width)):
+                x = j + 0.5 - middle_x
+                if x * x + y * y < radius * radius:
+                    cells[i * self.width + j] = value
+
+    def find(self, walkers: list[Walker], width: float) -> None:
+        """Write the points ``ahead`` that walkers head for, and which of them have a way.
+
+        Of ways that are equally short each takes the one that leads nearer to its goal. Where a walker is about to
+        arrive others of its ``width`` find no room, and go on to the next place.
+        """
+        if not self.spread(walkers):
             return
-        at, radius = (at - self.low) * FINE, radius * FINE
-        half = math.ceil(float(radius.max()))
-        beside = (at > -half) & (at < (self.width + half, self.height + half))
-        near = which(beside[:, 0] & beside[:, 1])
-        at, radius = at.take(near, 0), radius.take(near)
-        square = np.arange(-half, half + 1)
-        x, dx = _columns(at[:, 0], square, self.width)
-        y, dy = _columns(at[:, 1], square, self.height)
-        inside = dx[:, None, :] + dy[:, :, None] < (radius * radius)[:, None, None]
-        number = (y * self.width)[:, :, None] + x[:, None, :]
-        grid.reshape(-1)[number.take(which(inside.ravel()))] = value
+        for walker in walkers:
+            walker.ahead = self.look_ahead(walker)
+            walker.left = memory.length(walker.ahead.x - walker.at.x, walker.ahead.y - walker.at.y)
+        settled = _settle(walkers, width)
+        if not 0 < settled < len(walkers):
+            return
+        for walker in walkers:
+            if walker.settled:
+                self.stand(walker.ahead, width)
+        self.spread(walkers)
+        for walker in walkers:
+            if not walker.settled:
+                before = walker.found
+                ahead = self.look_ahead(walker)
+                if walker.found:
+                    walker.ahead = ahead
+                walker.found = before
 
-    def points(self, at: Floats, goal: Floats, width: float) -> tuple[Floats, Bools]:
-        """Return the points (k, 2) that walkers at (k, 2) head for, and which of them have a way.
+    def cell(self, at: memory.Point) -> int:
+        """Return the cell under a point of the grid."""
+        x = int((at.x - self.low.x) * FINE)
+        y = int((at.y - self.low.y) * FINE)
+        return y * self.width + x
 
-        Of ways that are equally short each takes the one that leads nearer to its goal (k, 2). Where a walker is about
-        to arrive others of its ``width`` find no room, and go on to the next place.
+    def spread(self, walkers: list[Walker]) -> bool:
+        """Count the steps from each cell to a place to go to, outwards until those that go on are reached.
+
+        Returns whether there is such a place.
         """
-        if not np.count_nonzero(self.free & self.wanted):
-            return at, np.zeros(len(at), dtype=np.bool_)
-        points, found, arriving = self._ahead(at, goal)
-        first = which(arriving)
-        first = first[_without_overlap(points[first], geometry.length(points[first] - at[first]), width)]
-        rest = np.ones(len(at), dtype=np.bool_)
-        rest[first] = False
-        if first.size and some(rest):
-            self.stand(points[first], np.full(len(first), width))
-            further, also, _ = self._ahead(at[rest], goal[rest])
-            points[which(rest)[also]] = further[also]
-        return points, found
-
-    def _ahead(self, at: Floats, goal: Floats) -> tuple[Floats, Bools, Bools]:
-        """Return the points some steps ahead (k, 2), who has a way, and whose ends there."""
-        cells = ((at - self.low) * FINE).astype(np.int64)
-        goal = (goal - self.low) * FINE - 0.5
-        left = self._spread(cells)
-        cell, steps = self._next(left, cells, goal)
-        found = steps < NOWHERE
-        for _ in range(HOPS):
-            cell, steps = self._next(left, cell, goal)
-        return (cell + 0.5) / FINE + self.low, found, steps == 0
-
-    def _spread(self, cells: Ints) -> Bytes:
-        """Return (cells,) the steps from each cell to a place to go to, ``NOWHERE`` if it was not reached.
-
-        It ends as soon as the walkers' cells (k, 2) are reached. Each digit of the numbers is a grid by itself.
-        """
-        walkers = np.zeros(self.free.size, dtype=np.bool_)
-        walkers[self._numbers(cells, BESIDE)] = True
-        free, reached, missing = (_bits(g) for g in (self.free, self.free & self.wanted, self.free.ravel() & walkers))
-        digits, width, step = [0] * DIGITS, self.width, 0
-        while step < NOWHERE - 1 and missing & reached != missing:
-            row = reached | reached << 1 | reached >> 1
-            tall = reached if step % 2 else row  # a diagonal every second step: about as long as it looks
-            grown = (row | tall << width | tall >> width) & free
-            if grown == reached:
+        free = self.arrays[0]
+        wanted = self.arrays[1]
+        self.arrays[2].fill(0)
+        np.subtract(NOWHERE + 1, free, out=self.arrays[3], casting="unsafe")
+        missing = 0
+        self.end = 0
+        for walker in walkers:
+            if walker.settled:
+                continue
+            middle = self.cell(walker.at)
+            for y in range(-1, 2):
+                for x in range(-1, 2):
+                    cell = middle + y * self.width + x
+                    if self.free[cell]:
+                        if not self.awaited[cell]:
+                            missing += 1
+                        self.awaited[cell] = 1
+        for place in np.flatnonzero(free & wanted).tolist():
+            missing -= self.arrive(place, 0)
+        old = 0
+        older = 0
+        for step in range(1, NOWHERE):
+            if missing == 0:
                 break
-            step += 1
-            for digit in range((step & -step).bit_length()):
-                digits[digit] ^= reached  # a digit turns at its multiples, in all cells that are not reached before
-            reached = grown
-        everywhere = (1 << self.free.size) - 1
-        beyond, size = reached ^ everywhere, (self.free.size + 7) // 8
-        packed = b"".join(
-            (digits[d] ^ (everywhere if step >> d & 1 else 0) | beyond).to_bytes(size, "little") for d in range(DIGITS)
-        )
-        grids = np.unpackbits(np.frombuffer(packed, np.uint8).reshape(DIGITS, size), axis=1, bitorder="little")
-        left: Bytes = np.add.reduce(grids << np.arange(DIGITS, dtype=np.uint8)[:, None], axis=0, dtype=np.uint8)
-        return left
+            stop = self.end
+            for i in range(old, stop):
+                cell = self.reached[i]
+                missing -= self.arrive(cell - 1, step) + self.arrive(cell + 1, step)
+                missing -= self.arrive(cell - self.width, step) + self.arrive(cell + self.width, step)
+            if step % 2 == 1:  # a diagonal every second step: about as long as it looks
+                for i in range(older, stop):
+                    cell = self.reached[i] - self.width
+                    missing -= self.arrive(cell - 1, step) + self.arrive(cell + 1, step)
+                    cell = self.reached[i] + self.width
+                    missing -= self.arrive(cell - 1, step) + self.arrive(cell + 1, step)
+            if self.end == stop:
+                break
+            older = old
+            old = stop
+        return self.end > 0
 
-    def _next(self, left: Bytes, cells: Ints, goal: Floats) -> tuple[Ints, Bytes]:
-        """Return (k, 2) the cell with the fewest steps left among those around, and how many that are."""
-        steps = left.take(self._numbers(cells, AROUND))
-        beside = (cells - goal)[:, :, None] + SIDE
-        beside *= beside
-        distance = (beside[:, 1, :, None] + beside[:, 0, None, :]).reshape(steps.shape)
-        best = np.argmin(steps + NEARER * distance, axis=1)
-        return cells + AROUND[best], steps[np.arange(len(cells)), best]
+    def arrive(self, cell: int, step: int) -> int:
+        """Note that a cell is reached now, if it is free and was not before; return how many awaited ones that are."""
+        if self.left[cell] != NOWHERE:
+            return 0
+        self.left[cell] = step
+        self.reached[self.end] = cell
+        self.end += 1
+        return self.awaited[cell]
 
-    def _numbers(self, cells: Ints, offsets: Ints) -> Ints:
-        """Return (k, m) the numbers of the cells at offsets (m, 2) from others (k, 2)."""
-        numbers: Ints = (cells[:, 1] * self.width + cells[:, 0])[:, None] + (offsets[:, 1] * self.width + offsets[:, 0])
-        return numbers
+    def look_ahead(self, walker: Walker) -> memory.Point:
+        """Return the point some steps ahead; write whether there is a way, and whether it ends there."""
+        cell = self.cell(walker.at)
+        x = cell % self.width
+        y = cell // self.width
+        goal_x = (walker.goal.x - self.low.x) * FINE - 0.5
+        goal_y = (walker.goal.y - self.low.y) * FINE - 0.5
+        for hop in range(HOPS + 1):
+            best = math.inf
+            best_x = x
+            best_y = y
+            for dy in range(-AROUND, AROUND + 1):
+                beside_y = (y - goal_y) + dy
+                for dx in range(-AROUND, AROUND + 1):
+                    beside_x = (x - goal_x) + dx
+                    cost = beside_y * beside_y + beside_x * beside_x
+                    cost = min(self.left[(y + dy) * self.width + x + dx], NOWHERE) + NEARER * cost
+                    if cost < best:
+                        best = cost
+                        best_x = x + dx
+                        best_y = y + dy
+            x = best_x
+            y = best_y
+            if hop == 0:
+                walker.found = self.left[y * self.width + x] < NOWHERE
+        walker.arrives = self.left[y * self.width + x] == 0
+        return memory.point((x + 0.5) / FINE + self.low.x, (y + 0.5) / FINE + self.low.y)
 
 
-def _columns(at: Floats, square: Ints, width: int) -> tuple[Ints, Floats]:
-    """Return (m, s) the columns of a square around points (m,), and how far from them they are, squared."""
-    columns = np.floor(at).astype(np.int64)[:, None] + square
-    away = columns + 0.5 - at[:, None]
-    away *= away
-    away[(columns < 0) | (columns >= width)] = np.inf
-    return columns, away
+def flow_around(grid: Grid, walkers: list[Walker]) -> Flow:
+    """Return a grid around walkers, with nothing on it yet."""
+    flow = Flow()
+    flow.cover(grid, walkers)
+    return flow
 
 
-def _without_overlap(points: Floats, left: Floats, width: float) -> Bools:
-    """Return which of the points (k, 2) have none within ``width`` whose walker has less of its way left."""
-    offset = points[:, None, :] - points
-    beaten = offset[..., 0] ** 2 + offset[..., 1] ** 2 < width * width
-    beaten &= left < left[:, None]
-    result: Bools = ~np.logical_or.reduce(beaten, axis=1)
-    return result
+def _settle(walkers: list[Walker], width: float) -> int:
+    """Write who arrives where none who is nearer to its place does; return how many do."""
+    settled = 0
+    for walker in walkers:
+        walker.settled = walker.arrives
+        for rival in walkers:
+            if not walker.settled:
+                break
+            if rival.arrives and rival.left < walker.left and _are_near(walker, rival, width):
+                walker.settled = False
+        if walker.settled:
+            settled += 1
+    return settled
 
 
-def _bits(grid: Bools) -> int:
-    return int.from_bytes(np.packbits(grid.ravel(), bitorder="little").tobytes(), "little")
+def _are_near(walker: Walker, rival: Walker, width: float) -> bool:
+    """Return whether the places of two walkers are nearer to each other than a distance."""
+    x = walker.ahead.x - rival.ahead.x
+    y = walker.ahead.y - rival.ahead.y
+    return x * x + y * y < width * width

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.economy import building_sites, harvesting
-from khala_simulator.movement import pathfinding
+from khala_simulator.movement import pathfinding, ways
 from khala_simulator.movement.placement import snapped
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.layers import Layer
@@ -58,7 +58,7 @@ def way(world: World, start: Point, goal: Point) -> float:
     if ends[0] == ends[1]:
         return 0.0
     a, b = surface.centre(np.array(ends))
-    return surface.distance(a, b) or 1000.0 + math.dist(start, goal)
+    return ways.distance(surface, a, b) or 1000.0 + math.dist(start, goal)
 
 
 def resources(world: World) -> tuple[Point, ...]:

@@ -10,177 +10,251 @@ handles those that go the same way. The game's own local avoidance is not known;
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.movement import pathfinding
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
+from khala_simulator.movement import grids
+from khala_simulator.native import columns, memory
 from khala_simulator.systems import flanking
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.movement.grids import Grid
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells, Points
     from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Bools, Ints
+    from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import World
 
-FAN_DEG = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
-FAN_COS = np.array([math.cos(math.radians(a)) for a in FAN_DEG] * 2)  # to one side, then to the other
-FAN_SIN = np.array([sign * math.sin(math.radians(a)) for sign in (1.0, -1.0) for a in FAN_DEG])
-SEEN_AHEAD = 0.7
-TOLERANCE = 0.02
-LAYERS = tuple(Layer)
-AIR = Layer.AIR
+FAN_DEG: Final = (0.0, 25.0, 50.0, 75.0, 100.0, 130.0)
+_FAN_COS: Final = np.array([math.cos(math.radians(a)) for a in FAN_DEG] * 2)  # to one side, then to the other
+_FAN_SIN: Final = np.array([sign * math.sin(math.radians(a)) for sign in (1.0, -1.0) for a in FAN_DEG])
+FAN_COS: Final = memory.floats(_FAN_COS)
+FAN_SIN: Final = memory.floats(_FAN_SIN)
+SIDE: Final = len(FAN_DEG)  # headings to one side
+FAN: Final = 2 * SIDE
+SEEN_AHEAD: Final = 0.7
+TOLERANCE: Final = 0.02
+STRIPES: Final = 256
+AIR: Final = int(Layer.AIR)
+LED: Final = flanking.LED
+DETOUR_LOOK: Final = MECHANICS.detour_look
+DETOUR_PERIOD: Final = MECHANICS.detour_period
+DETOUR_LOOPS: Final = MECHANICS.detour_loops
+FLANK_PERIOD: Final = MECHANICS.flank_period
 
 
 def find_headings(world: World) -> None:
     """Write ``aside`` of walkers that have to go around others; it is checked every few loops."""
-    n = world.top
-    if not np.count_nonzero(world.detour[:n]):
+    loop = world.loop
+    if loop % DETOUR_PERIOD:
         return
-    if world.loop % MECHANICS.detour_period:
+    c = columns.columns_of(world)
+    turning = []
+    for slot in range(world.top):
+        if c.detour[slot] == 0:
+            continue
+        if c.detour_end[slot] <= loop or not c.wants[slot]:
+            c.detour[slot] = 0
+            c.aside[slot] = memory.point(0.0, 0.0)
+        else:
+            turning.append(slot)
+    if not turning:
         return
-    turning = which(world.detour[:n] != 0)
-    over = (world.detour_end.take(turning) <= world.loop) | ~world.wants.take(turning)
-    world.detour[turning[over]] = 0
-    world.aside[turning[over]] = 0.0
-    due = turning[~over]
-    flowing = _flowing(world, due)
     # in the middle of the usual step of 8 loops: who gets a new order at every step is led for the rest of it
-    if (world.loop - MECHANICS.detour_period) % MECHANICS.flank_period == 0 and due.size:
-        world.detour[due[flowing]] //= flanking.LED
-        flanking.lead(world, due)
-        flowing = _flowing(world, due)
-    due = due[~flowing]
-    if due.size:
-        _look(world, due)
+    if (loop - DETOUR_PERIOD) % FLANK_PERIOD == 0:
+        for slot in turning:
+            if _flows(c, slot):
+                c.detour[slot] = 1 if c.detour[slot] > 0 else -1
+        flanking.lead(world)
+    _look(world, c, turning)
 
 
-def _flowing(world: World, slots: Ints) -> Bools:
-    flowing: Bools = np.abs(world.detour.take(slots)) == flanking.LED
-    return flowing
+def _flows(c: Columns, slot: int) -> bool:
+    """Return whether a walker follows a flow."""
+    return c.detour[slot] == LED or c.detour[slot] == -LED
+
+
+# the side -------------------------------------------------------------------------------------------------------------
 
 
 def begin(world: World, slots: Ints, shift: Floats) -> None:
-    """Make blocked walkers look for a way around, first on the side where fewer stand or to which ``shift`` pushed."""
-    kept = world.detour.take(slots)
-    world.detour_end[slots] = world.loop + MECHANICS.detour_loops
-    new = which(kept == 0)
-    if not new.size:
-        return
-    slots, shift = slots.take(new), shift.take(new, 0)
-    intended = world.intended.take(slots, 0)
-    beside = _beside(world, slots, intended)
-    pushed = intended[:, 0] * shift[:, 1] - intended[:, 1] * shift[:, 0]
-    world.detour[slots] = np.where(np.where(beside == 0.0, pushed, -beside) >= 0.0, 1, -1)
+    """Make blocked walkers look for a way around, first on the side where fewer stand or to which ``shift`` pushed.
+
+    Args:
+        world: The game.
+        slots: Slots of the walkers (k,).
+        shift: How far bodies pushed each of them off its step (k, 2).
+    """
+    c = columns.columns_of(world)
+    walkers = memory.ints(slots)
+    shifts = memory.points(shift)
+    end = world.loop + DETOUR_LOOPS
+    places = None
+    for i in range(len(slots)):
+        slot = walkers[i]
+        c.detour_end[slot] = end
+        if c.detour[slot] != 0:
+            continue
+        if places is None:
+            places = _standing(world, c)
+        way = c.intended[slot]
+        beside = _to_the_left(c.pos[slot], way, places)
+        turn = way.x * shifts[i].y - way.y * shifts[i].x if beside == 0.0 else -beside
+        c.detour[slot] = 1 if turn >= 0.0 else -1
 
 
-def _beside(world: World, slots: Ints, way: Floats) -> Floats:
-    """Return (k,) how far to the left of their ways the bodies stand that are near and ahead, summed up."""
-    bodies = world.live
-    bodies = bodies[~world.wants.take(bodies) & (world.layer.take(bodies) != AIR)]
-    at, there = world.pos.take(slots, 0), world.pos.take(bodies, 0)
-    dx, dy = there[:, 0] - at[:, 0, None], there[:, 1] - at[:, 1, None]
-    x, y = way[:, 0, None], way[:, 1, None]
-    near = dx * dx + dy * dy < MECHANICS.detour_look**2
-    near &= dx * x + dy * y > 0.0
-    dy *= x
-    dx *= y
-    dy -= dx
-    dy *= near
-    beside: Floats = np.add.reduce(dy, axis=1)
-    return beside
+def _standing(world: World, c: Columns) -> Floats:
+    """Return (k, 2) where the bodies are that do not walk."""
+    live = world.live
+    slots = memory.ints(live)
+    room = memory.new_points(len(live))
+    places = memory.points(room)
+    bodies = 0
+    for i in range(len(live)):
+        slot = slots[i]
+        if not c.wants[slot] and c.layer[slot] != AIR:
+            places[bodies] = c.pos[slot]
+            bodies += 1
+    return room[:bodies]
 
 
-def _look(world: World, slots: Ints) -> None:
-    start = world.pos.take(slots, 0)
-    way = world.nav_point.take(slots, 0) - start
-    way /= np.maximum(geometry.length(way), 1e-12)[:, None]
-    side = world.detour.take(slots).astype(np.float64)
-    headings = _fan(way, side)
-    free = _free(world, slots, start, way, headings)
-    first = np.argmax(free, axis=1)
-    rows = np.arange(len(slots))
-    found = free[rows, first]
-    chosen = headings[:, rows, first].T
-    straight = found & (first == 0)
-    # an army on its way to a fight keeps to its sides: who turned back would meet those that follow
-    turns = found & (first > len(FAN_DEG)) & (world.target.take(slots) != NOBODY)
-    world.detour[slots] = np.where(turns, -side, side)
-    world.aside[slots] = np.where((found & ~straight)[:, None], chosen, 0.0)
+def _to_the_left(at: memory.Point, way: memory.Point, standing: Floats) -> float:
+    """Return how far to the left of a way the bodies stand that are near and ahead, summed up in pairs."""
+    places = memory.points(standing)
+    terms = memory.new_floats(len(standing))
+    beside = memory.floats(terms)
+    for i in range(len(standing)):
+        x = places[i].x - at.x
+        y = places[i].y - at.y
+        is_ahead = x * x + y * y < DETOUR_LOOK * DETOUR_LOOK and x * way.x + y * way.y > 0.0
+        beside[i] = y * way.x - x * way.y if is_ahead else 0.0
+    return float(terms.sum())
 
 
-def _fan(way: Floats, side: Floats) -> Floats:
-    """Return (2, k, 2 x fan) headings turned further and further to a side (1 is left), then to the other side."""
-    sine = FAN_SIN * side[:, None]
-    x, y = way[:, 0, None], way[:, 1, None]
-    headings = np.empty((2, *sine.shape))
-    np.subtract(x * FAN_COS, y * sine, out=headings[0])
-    np.add(y * FAN_COS, x * sine, out=headings[1])
-    return headings
+# the heading ----------------------------------------------------------------------------------------------------------
 
 
-def _free(world: World, slots: Ints, start: Floats, way: Floats, headings: Floats) -> Bools:
-    """Return (k, h) which headings (2, k, h) have no wall and no body that stands or comes within ``SEEN_AHEAD``."""
-    points = np.empty((*headings.shape[1:], 2))
-    for axis in (0, 1):
-        np.add(start[:, axis, None], headings[axis] * SEEN_AHEAD, out=points[..., axis])
-    free = _on_ground(world, slots, points)
-    k, body, apart = _in_the_way(world, slots, start, way)
-    if k.size:
-        ahead = headings.take(k, 1)  # (2, p, h)
-        x, y = body[:, 0, None], body[:, 1, None]
-        along = ahead[0] * x
-        along += ahead[1] * y
-        across = ahead[0] * y
-        across -= ahead[1] * x
-        across *= across
-        reach = np.maximum(along - SEEN_AHEAD, 0.0)
-        reach *= reach
-        across += reach
-        struck = which(((along > 0.0) & (across < apart[:, None] ** 2)).ravel())
-        pair = struck // free.shape[1]
-        free[k.take(pair), struck - pair * free.shape[1]] = False
-    return free
+def _look(world: World, c: Columns, turning: list[int]) -> None:
+    """Choose the heading of every walker that follows no flow: the free one that turns it least."""
+    crowd = _Crowd(world)
+    ground = world.ground
+    for slot in turning:
+        if _flows(c, slot):
+            continue
+        x = c.nav_point[slot].x - c.pos[slot].x
+        y = c.nav_point[slot].y - c.pos[slot].y
+        size = max(memory.length(x, y), 1e-12)
+        way = memory.point(x / size, y / size)
+        grid = None if c.layer[slot] == AIR else grids.grid_of(ground, c.layer[slot])
+        crowd.look_around(c, slot, way)
+        turn = _first_free(c, crowd, grid, slot, way)
+        heading = _heading(way, turn, c.detour[slot]) if 0 < turn < FAN else memory.point(0.0, 0.0)
+        # an army on its way to a fight keeps to its sides: who turned back would meet those that follow
+        if SIDE < turn < FAN and c.target[slot] != NOBODY:
+            c.detour[slot] = -c.detour[slot]
+        c.aside[slot] = heading
 
 
-def _in_the_way(world: World, slots: Ints, start: Floats, way: Floats) -> tuple[Ints, Floats, Floats]:
-    """Return bodies near ``slots`` that block them: (p,) index into ``slots``, (p, 2) offset, (p,) distance to keep."""
-    bodies = world.live[~world.walled[world.live]]
-    there = world.pos.take(bodies, 0)
-    farthest = world.separation.take(slots) + float(world.separation.take(bodies).max()) + SEEN_AHEAD
-    near = which((_squared(start, there) < (farthest * farthest)[:, None]).ravel())
-    k = near // len(bodies)  # one index into a table costs a third of two
-    one, other = slots.take(k), bodies.take(near - k * len(bodies))
-    offset = world.pos.take(other, 0) - start.take(k, 0)
-    apart = world.separation.take(one) + world.separation.take(other) - TOLERANCE
-    product = way.take(k, 0) * world.intended.take(other, 0)
-    meets = (world.layer_bits.take(one) & world.layer_bits.take(other)) != 0
-    meets &= (other != one) & (other != world.target.take(one))
-    meets &= product[:, 0] + product[:, 1] <= 0.0
-    meets &= offset[:, 0] ** 2 + offset[:, 1] ** 2 < (apart + SEEN_AHEAD) ** 2
-    return k[meets], offset[meets], apart[meets]
+def _first_free(c: Columns, crowd: _Crowd, grid: Grid | None, slot: int, way: memory.Point) -> int:
+    """Return the number of the first heading of the fan that is free, ``FAN`` if none is."""
+    for turn in range(FAN):
+        heading = _heading(way, turn, c.detour[slot])
+        if (grid is None or _is_ground(grid, c.pos[slot], heading)) and crowd.lets_pass(heading):
+            return turn
+    return FAN
 
 
-def _squared(at: Floats, there: Floats) -> Floats:
-    """Return (k, m) the distances of points (k, 2) from others (m, 2), squared."""
-    squared = there[:, 0] - at[:, 0, None]
-    squared *= squared
-    dy = there[:, 1] - at[:, 1, None]
-    dy *= dy
-    squared += dy
-    return squared
+def _heading(way: memory.Point, turn: int, side: float) -> memory.Point:
+    """Return one of the headings that turn further and further to a side (1 is left), then to the other side."""
+    sine = FAN_SIN[turn] * side
+    return memory.point(way.x * FAN_COS[turn] - way.y * sine, way.y * FAN_COS[turn] + way.x * sine)
 
 
-def _on_ground(world: World, slots: Ints, points: Floats) -> Bools:
-    free = np.ones(points.shape[:2], dtype=np.bool_)
-    layers = world.layer.take(slots)
-    for layer in LAYERS:
-        mine = which(layers == layer.value)
-        if layer is not AIR and mine.size:
-            surface = pathfinding.surface(world.ground, layer)
-            free[mine] = surface.flat.take(surface.cell(points.take(mine, 0)))
-    return free
+def _is_ground(grid: Grid, start: memory.Point, heading: memory.Point) -> bool:
+    """Return whether a heading leads to a free cell."""
+    return grid.flat[grids.cell_at(grid, start.x + heading.x * SEEN_AHEAD, start.y + heading.y * SEEN_AHEAD)]
+
+
+def _stripe(x: float) -> int:
+    """Return the number of the stripe of the map, one cell wide, in which a point is counted."""
+    return 0 if x < 0.0 else STRIPES - 1 if x >= STRIPES else int(x)
+
+
+class _Crowd:
+    """The bodies that may be in somebody's way, sorted by stripes of the map; then those near one walker."""
+
+    def __init__(self, world: World) -> None:
+        c = columns.columns_of(world)
+        live = world.live
+        slots = memory.ints(live)
+        self._arrays = (
+            memory.new_ints(len(live)),
+            np.zeros(STRIPES + 1, dtype=np.int64),
+            memory.new_floats(len(live)),
+            memory.new_floats(len(live)),
+            memory.new_floats(len(live)),
+        )
+        self._slot = memory.ints(self._arrays[0])
+        self._begin = memory.ints(self._arrays[1])  # of each stripe
+        self._x = memory.floats(self._arrays[2])  # from the walker
+        self._y = memory.floats(self._arrays[3])
+        self._apart = memory.floats(self._arrays[4])  # distance to keep
+        self._many = 0  # near the walker
+        self._widest = 0.0
+        for i in range(len(live)):
+            if _is_body(c, slots[i]):
+                self._begin[_stripe(c.pos[slots[i]].x)] += 1
+        for i in range(1, STRIPES + 1):
+            self._begin[i] += self._begin[i - 1]
+        for i in range(len(live)):
+            slot = slots[i]
+            if _is_body(c, slot):
+                stripe = _stripe(c.pos[slot].x)
+                self._begin[stripe] -= 1
+                self._slot[self._begin[stripe]] = slot
+                self._widest = max(self._widest, c.separation[slot])
+
+    def look_around(self, c: Columns, slot: int, way: memory.Point) -> None:
+        """Find the bodies that stand near a walker or come towards it."""
+        separation = c.separation[slot]
+        farthest = separation + self._widest + SEEN_AHEAD
+        start = c.pos[slot]
+        self._many = 0
+        first = self._begin[_stripe(start.x - farthest)]
+        end = self._begin[_stripe(start.x + farthest) + 1]
+        for i in range(first, end):
+            body = self._slot[i]
+            x = c.pos[body].x - start.x
+            y = c.pos[body].y - start.y
+            apart = separation + c.separation[body] - TOLERANCE
+            seen = apart + SEEN_AHEAD
+            if (
+                x * x + y * y < seen * seen
+                and c.layer_bits[slot] & c.layer_bits[body] != 0
+                and body != slot
+                and body != c.target[slot]
+                and way.x * c.intended[body].x + way.y * c.intended[body].y <= 0.0
+            ):
+                self._x[self._many] = x
+                self._y[self._many] = y
+                self._apart[self._many] = apart
+                self._many += 1
+
+    def lets_pass(self, heading: memory.Point) -> bool:
+        """Return whether a heading leads into none of these within ``SEEN_AHEAD``."""
+        for i in range(self._many):
+            along = heading.x * self._x[i] + heading.y * self._y[i]
+            across = heading.x * self._y[i] - heading.y * self._x[i]
+            reach = max(along - SEEN_AHEAD, 0.0)
+            if along > 0.0 and across * across + reach * reach < self._apart[i] * self._apart[i]:
+                return False
+        return True
+
+
+def _is_body(c: Columns, slot: int) -> bool:
+    """Return whether a unit is a body to go round; what stands on a footprint is a wall."""
+    return c.layer_bits[slot] != 0 and not c.walled[slot]

@@ -9,113 +9,140 @@ of this is an estimate.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from khala_simulator.movement import pathfinding
-from khala_simulator.movement.flow import Flow
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.movement import flow, grids
+from khala_simulator.native import columns, memory
+from khala_simulator.systems import acquire
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
-    from khala_simulator.world.columns import Ints
+    from khala_simulator.movement.flow import Walker
+    from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
 
-RANK_STEP: Any = 250.0
-foes_of: Any = None
-rank_of: Any = None
-LED = 2  # times the side in ``detour`` of those that follow a flow
-ANY = -1
-AIR = int(Layer.AIR)
+LED: Final = 2  # times the side in ``detour`` of those that follow a flow
+AIR: Final = int(Layer.AIR)
+NO_DISTANCE: Final = 1e-9
+REACH: Final = MECHANICS.flank_reach
+LOOK: Final = MECHANICS.flank_look
+SQUEEZE: Final = MECHANICS.flank_squeeze
+CHASE_SLACK: Final = MECHANICS.chase_slack
+DETOUR_LOOPS: Final = MECHANICS.detour_loops
 
 
-def lead(world: World, blocked: Ints) -> None:
-    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked."""
-    slots = _pursuers(world)
-    stuck = np.zeros(world.top, dtype=np.bool_)
-    stuck[blocked] = True
-    if not some(stuck.take(slots)):
-        return
-    standing = _standing(world)
-    for kind in _kinds(world, slots):
-        if some(stuck.take(kind)):
-            _follow(world, kind, standing)
+def lead(world: World) -> None:
+    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked.
+
+    Those that have a side to go round on are blocked.
+    """
+    c = columns.columns_of(world)
+    pursuers = [slot for slot in range(world.top) if _pursues(c, slot)]
+    while pursuers:  # those of one kind after the other
+        first: int = pursuers[0]
+        kind = []
+        others = []
+        blocked = False
+        for slot in pursuers:
+            if slot == first or _are_alike(c, first, slot):
+                kind.append(slot)
+                blocked = blocked or c.detour[slot] != 0
+            else:
+                others.append(slot)
+        pursuers = others
+        if blocked:
+            _follow(world, c, kind)
 
 
-def _pursuers(world: World) -> Ints:
-    """Return the melee units on their way to a target that is near; structures are reached at their walls."""
-    n = world.top
-    pursue = world.wants[:n] & (world.target[:n] != NOBODY) & (world.layer[:n] != AIR)
-    pursue &= ~world.walks[:n] | world.looks_around[:n]
-    pursue &= (world.reach[:n] <= MECHANICS.flank_reach) & (world.gap[:n] < MECHANICS.flank_look)
-    slots = which(pursue)
-    chosen: Ints = slots[~world.walled.take(world.target.take(slots))]
-    return chosen
-
-
-def _kinds(world: World, slots: Ints) -> list[Ints]:
-    """Return units apart that differ in owner, size or layer, and in target if they do not choose for themselves."""
-    chooses = world.looks_around.take(slots) & world.acquires.take(slots)
-    columns = (
-        world.owner.take(slots),
-        world.layer.take(slots),
-        world.separation.take(slots),
-        np.where(chooses, ANY, world.target.take(slots)),
+def _pursues(c: Columns, slot: int) -> bool:
+    """Return whether a melee unit is on its way to a target that is near; structures are reached at their walls."""
+    return (
+        c.wants[slot]
+        and c.target[slot] != NOBODY
+        and c.layer[slot] != AIR
+        and (not c.walks[slot] or c.looks_around[slot])
+        and c.reach[slot] <= REACH
+        and c.gap[slot] < LOOK
+        and not c.walled[c.target[slot]]
     )
-    kinds: dict[tuple[float, ...], list[int]] = {}
-    for slot, *kind in zip(slots.tolist(), *(column.tolist() for column in columns), strict=True):
-        kinds.setdefault(tuple(kind), []).append(slot)
-    return [np.array(kind) for kind in kinds.values()]
 
 
-def _standing(world: World) -> Ints:
-    """Return the bodies that may have to be gone round: what does not walk, and is no structure."""
-    bodies = world.live
-    standing: Ints = bodies[~world.walled.take(bodies) & ~world.wants.take(bodies)]
-    return standing
+def _chooses(c: Columns, slot: int) -> bool:
+    """Return whether a unit chooses its targets for itself."""
+    return c.looks_around[slot] and c.acquires[slot]
 
 
-def _foes(world: World, slots: Ints) -> Ints:
-    """Return the enemies that are as good as the best target of some units that choose for themselves."""
-    best = float(rank_of(world, slots, world.target.take(slots)).max())
-    foes = foes_of(world, int(world.owner[slots[0]]))
-    foes = foes[~world.walled.take(foes) & ((world.plane_bits.take(foes) & GROUND_PLANE) != 0)]
-    rank = rank_of(world, slots[:1], foes)
-    chosen: Ints = foes[rank > best - RANK_STEP]
-    return chosen
+def _are_alike(c: Columns, slot: int, other: int) -> bool:
+    """Return whether two units agree in owner, size and layer, and in target if they do not choose for themselves."""
+    return (
+        c.owner[slot] == c.owner[other]
+        and c.layer[slot] == c.layer[other]
+        and c.separation[slot] == c.separation[other]
+        and _chooses(c, slot) == _chooses(c, other)
+        and (_chooses(c, slot) or c.target[slot] == c.target[other])
+    )
 
 
-def _follow(world: World, slots: Ints, standing: Ints) -> None:
-    """Lead units of one size to the nearest free places in reach of any of their foes."""
-    one = int(slots[0])
-    chooses = world.looks_around[one] and world.acquires[one]
-    foes = _foes(world, slots) if chooses else world.target.take(slots[:1])
-    at, width = world.pos.take(slots, 0), float(world.separation[one])
-    flow = Flow(pathfinding.surface(world.ground, Layer(int(world.layer[one]))), at)
-    bodies = _in_the_way(world, one, standing)
-    squeeze = MECHANICS.flank_squeeze
-    flow.stand(world.pos.take(bodies, 0), world.separation.take(bodies) + (width - squeeze))
-    reach = world.radius.take(foes) + (world.radius.take(slots) + world.reach.take(slots)).min()
-    touch = world.separation.take(foes) + width
-    flow.reach(world.pos.take(foes, 0), np.maximum(reach, touch) - MECHANICS.chase_slack)
-    points, found = flow.points(at, world.pos.take(world.target.take(slots), 0), 2.0 * width - squeeze)
-    offset = points - at
-    distance = geometry.length(offset)
-    found &= distance > 0.0
-    slots = slots[found]
-    world.aside[slots] = (offset / np.maximum(distance, 1e-9)[:, None])[found]
-    world.detour[slots] = np.where(world.detour.take(slots) < 0, -LED, LED)
-    world.detour_end[slots] = world.loop + MECHANICS.detour_loops
+def _follow(world: World, c: Columns, kind: list[int]) -> None:
+    """Lead units of one kind to the nearest free places in reach of any of their foes."""
+    first: int = kind[0]
+    walkers = [_walker(c, slot) for slot in kind]
+    around = flow.flow_around(grids.grid_of(world.ground, c.layer[first]), walkers)
+    width = c.separation[first]
+    reach = c.radius[first] + c.reach[first]
+    best = 0.0
+    for slot in kind:
+        reach = min(reach, c.radius[slot] + c.reach[slot])
+        best = max(best, acquire.rank_of(c, slot, c.target[slot]))
+    picks = _chooses(c, first)
+    live = world.live
+    slots = memory.ints(live)
+    for i in range(len(live)):
+        slot = slots[i]
+        if _is_in_the_way(c, first, slot):
+            around.stand(c.pos[slot], c.separation[slot] + (width - SQUEEZE))
+        if _is_good(c, first, slot, best) if picks else slot == c.target[first]:
+            around.reach(c.pos[slot], max(c.radius[slot] + reach, c.separation[slot] + width) - CHASE_SLACK)
+    around.find(walkers, 2.0 * width - SQUEEZE)
+    loop: int = world.loop
+    for walker in walkers:
+        _head_for(c, walker, loop)
 
 
-def _in_the_way(world: World, one: int, standing: Ints) -> Ints:
-    """Return the bodies that a unit has to go around: enemies that stand, and friends that fight or hold."""
-    bodies = standing[(world.layer_bits.take(standing) & world.layer_bits[one]) != 0]
-    busy = (world.target.take(bodies) != NOBODY) | world.holds.take(bodies)
-    chosen: Ints = bodies[busy | (world.owner.take(bodies) != world.owner[one])]
-    return chosen
+def _walker(c: Columns, slot: int) -> Walker:
+    return flow.walker_of(slot, c.pos[slot], c.pos[c.target[slot]])
+
+
+def _head_for(c: Columns, walker: Walker, loop: int) -> None:
+    """Have a unit go where the flow leads it, if there is a way."""
+    slot = walker.slot
+    x = walker.ahead.x - walker.at.x
+    y = walker.ahead.y - walker.at.y
+    distance = memory.length(x, y)
+    if walker.found and distance > 0.0:
+        c.aside[slot] = memory.point(x / max(distance, NO_DISTANCE), y / max(distance, NO_DISTANCE))
+        c.detour[slot] = -LED if c.detour[slot] < 0 else LED
+        c.detour_end[slot] = loop + DETOUR_LOOPS
+
+
+def _is_in_the_way(c: Columns, first: int, slot: int) -> bool:
+    """Return whether a unit has to go around a body: an enemy that stands, or a friend that fights or holds."""
+    return (
+        not c.walled[slot]
+        and not c.wants[slot]
+        and c.layer_bits[slot] & c.layer_bits[first] != 0
+        and (c.target[slot] != NOBODY or c.holds[slot] or c.owner[slot] != c.owner[first])
+    )
+
+
+def _is_good(c: Columns, first: int, slot: int, best: float) -> bool:
+    """Return whether a unit is an enemy that is as good as the best target of its pursuers."""
+    return (
+        acquire.is_foe(c, c.owner[first], slot)
+        and not c.walled[slot]
+        and c.plane_bits[slot] & GROUND_PLANE != 0
+        and acquire.rank_of(c, first, slot) > best - acquire.RANK_STEP
+    )

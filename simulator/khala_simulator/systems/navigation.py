@@ -6,108 +6,163 @@ the farthest corner they can walk to straight. ``collision`` handles bodies in t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from khala_simulator.movement import pathfinding
-from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.movement import grids, ways
+from khala_simulator.movement.grids import Lines
+from khala_simulator.movement.pathfinding import NEAR_SIDE
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.pathfinding import Surface
+    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.ways import Way
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells
     from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
 
-CORNER_REACHED = 0.4
-NEAR_CORNER = 1.8
-HEADWAY = 0.25  # so much nearer to the goal counts as progress
-LOOK_PERIOD = 4  # checking many at once costs little more than checking one
-LAYERS = tuple(Layer)
-AIR = Layer.AIR
+CORNER_REACHED: Final = 0.4
+NEAR_CORNER: Final = 1.8
+HEADWAY: Final = 0.25  # so much nearer to the goal counts as progress
+NO_DISTANCE: Final = 1e-12
+LOOK_PERIOD: Final = 4  # checking many at once costs little more than checking one
+PATH_PERIOD: Final = MECHANICS.path_period
+AIR: Final = int(Layer.AIR)
+LAYERS: Final = len(Layer)
 
 
 def find_ways(world: World) -> None:
     """Write ``nav_point`` of every unit that wants to move; ways are checked every few loops."""
-    n = world.top
-    walkers = which(world.wants[:n])
-    if not walkers.size:
+    c = columns.columns_of(world)
+    loop = world.loop
+    latest = loop if loop % LOOK_PERIOD == 0 else 0
+    due = 0
+    for slot in range(world.top):
+        if c.wants[slot]:
+            if c.nav_straight[slot]:
+                c.nav_point[slot] = c.goal[slot]
+            due += c.nav_loop[slot] <= latest
+    if due:
+        _check(world, c, due, latest)
+
+
+def _check(world: World, c: Columns, due: int, latest: int) -> None:
+    """Check the ways of so many walkers, layer by layer."""
+    rooms = (memory.new_ints(due), memory.new_ints(due))
+    walkers = memory.ints(rooms[0])
+    slots = memory.ints(rooms[1])
+    i = 0
+    for slot in range(world.top):
+        if c.wants[slot] and c.nav_loop[slot] <= latest:
+            walkers[i] = slot
+            i += 1
+    for layer in range(LAYERS):
+        many = 0
+        for i in range(due):
+            if c.layer[walkers[i]] == layer:
+                slots[many] = walkers[i]
+                many += 1
+        if many:
+            _look_over(world, c, slots, many, layer)
+    loop = world.loop
+    for i in range(due):
+        slot = walkers[i]
+        soon = not c.nav_straight[slot] and _away(c.nav_point[slot], c.pos[slot]) < NEAR_CORNER
+        c.nav_loop[slot] = loop + (LOOK_PERIOD if soon else PATH_PERIOD)
+
+
+def _away(point: memory.Point, other: memory.Point) -> float:
+    """Return the distance between two points."""
+    return memory.length(point.x - other.x, point.y - other.y)
+
+
+def _look_over(world: World, c: Columns, slots: Cells, n: int, layer: int) -> None:
+    """Find out which walkers of a layer get straight to their goals, and the corners of the others' ways."""
+    for i in range(n):
+        slot = slots[i]
+        c.nav_straight[slot] = True
+        c.nav_end[slot] = False
+        c.nav_point[slot] = c.goal[slot]
+        c.nav_goal[slot] = c.goal[slot]
+    if layer != AIR:
+        _go_straight(world, c, slots, n, layer)
+    loop = world.loop
+    for i in range(n):
+        slot = slots[i]
+        left = _away(c.nav_goal[slot], c.pos[slot])
+        if c.nav_loop[slot] == 0 or left < c.nav_best[slot] - HEADWAY:
+            c.nav_best[slot] = left
+            c.nav_best_loop[slot] = loop
+
+
+def _go_straight(world: World, c: Columns, slots: Cells, n: int, layer: int) -> None:
+    """Send walkers straight to their goals, and round corners where such a line is not free."""
+    grid = grids.grid_of(world.ground, layer)
+    lines = Lines(n)
+    for i in range(n):
+        lines.add(c.pos[slots[i]], _stopping_point(c, slots[i]))
+    grids.clear(grid, lines)
+    crooked = False
+    for i in range(n):
+        c.nav_straight[slots[i]] = lines.free[i]
+        crooked |= not lines.free[i]
+    if crooked:
+        _go_round(world, c, grid, slots, n)
+
+
+def _stopping_point(c: Columns, slot: int) -> memory.Point:
+    """Return where a unit would stop on a straight way; a target on a footprint is reached from beside it."""
+    x = c.pos[slot].x - c.goal[slot].x
+    y = c.pos[slot].y - c.goal[slot].y
+    share = min(c.stop_at[slot] / max(memory.length(x, y), NO_DISTANCE), 1.0)
+    return memory.point(c.goal[slot].x + x * share, c.goal[slot].y + y * share)
+
+
+def _go_round(world: World, c: Columns, grid: Grid, slots: Cells, n: int) -> None:
+    """Send walkers whose straight line is not free to the next corners of their ways."""
+    crooked = []
+    for i in range(n):
+        slot = slots[i]
+        if c.nav_straight[slot]:
+            continue
+        part = grid.part[grids.cell_at(grid, c.pos[slot].x, c.pos[slot].y)]
+        if part < 0:
+            continue
+        goal = grids.cell_at(grid, c.goal[slot].x, c.goal[slot].y)
+        if grid.part[goal] != part:
+            goal = _nearest(grid, world.goal[slot], part, c.pos[slot])
+            c.nav_goal[slot] = grids.centre_of(grid, goal)
+        crooked.append(ways.way_from(slot, c.pos[slot], goal))
+    ways.find_corners(grid, crooked)
+    for way in crooked:
+        _turn_corner(c, grid, way)
+
+
+def _turn_corner(c: Columns, grid: Grid, way: Way) -> None:
+    """Send a walker to the next corner of its way, or to the middle of the last cell."""
+    slot = way.walker
+    if grids.cell_at(grid, c.pos[slot].x, c.pos[slot].y) != way.goal:
+        c.nav_point[slot] = ways.corner_of(grid, way)
         return
-    straight = walkers[world.nav_straight.take(walkers)]
-    world.nav_point[straight] = world.goal.take(straight, 0)
-    due = world.nav_loop.take(walkers) <= (world.loop if world.loop % LOOK_PERIOD == 0 else 0)
-    if not some(due):
-        return
-    walkers = walkers[due]
-    layers = world.layer.take(walkers)
-    for layer in LAYERS:
-        on_layer = walkers[layers == layer.value]
-        if on_layer.size:
-            _look_over(world, on_layer, layer)
-    left = geometry.length(world.nav_point.take(walkers, 0) - world.pos.take(walkers, 0))
-    soon = ~world.nav_straight.take(walkers) & (left < NEAR_CORNER)
-    world.nav_loop[walkers] = world.loop + np.where(soon, LOOK_PERIOD, MECHANICS.path_period)
+    centre = grids.centre_of(grid, way.goal)
+    c.nav_point[slot] = centre
+    x = centre.x - c.pos[slot].x
+    y = centre.y - c.pos[slot].y
+    c.nav_end[slot] = x * x + y * y < CORNER_REACHED * CORNER_REACHED
 
 
-def _look_over(world: World, slots: Ints, layer: Layer) -> None:
-    goal = world.goal.take(slots, 0)
-    surface = pathfinding.surface(world.ground, layer)
-    straight = np.ones(len(slots), dtype=np.bool_)
-    if layer is not AIR:
-        straight = surface.clear(world.pos.take(slots, 0), _stopping_point(world, slots, goal))
-    world.nav_straight[slots] = straight
-    world.nav_end[slots] = False
-    world.nav_point[slots] = world.nav_goal[slots] = goal
-    crooked = slots[~straight]
-    if crooked.size:
-        _find_corners(world, crooked, surface)
-    _note_progress(world, slots)
-
-
-def _find_corners(world: World, crooked: Ints, surface: Surface) -> None:
-    """Send walkers whose straight line is not free to the next corner of their way."""
-    start, goal = world.pos.take(crooked, 0), world.goal.take(crooked, 0)
-    cells = surface.cell(goal)
-    wanted = cells.copy()
-    parts = surface.part.take(surface.cell(start))
-    usable = parts >= 0
-    for i in _by_goal(goal, parts, usable & (surface.part.take(cells) != parts)):
-        cells[i] = surface.nearest(goal[i[0]], int(parts[i[0]]), start[i])
-    elsewhere = wanted != cells
-    crooked, start, cells, elsewhere = crooked[usable], start[usable], cells[usable], elsewhere[usable]
-    if crooked.size:
-        world.nav_goal[crooked[elsewhere]] = surface.centre(cells[elsewhere])
-        centre = surface.centre(cells)
-        at_goal = surface.cell(start) == cells
-        world.nav_point[crooked] = np.where(at_goal[:, None], centre, surface.corners(start, cells))
-        offset = centre - start
-        world.nav_end[crooked] = at_goal & (offset[:, 0] ** 2 + offset[:, 1] ** 2 < CORNER_REACHED**2)
-
-
-def _by_goal(goals: Floats, parts: Ints, chosen: Bools) -> list[list[int]]:
-    """Return the numbers of the chosen walkers, those together that are in the same part and have the same goal."""
-    groups: dict[tuple[float, ...], list[int]] = {}
-    at = which(chosen)
-    for i, goal, part in zip(at.tolist(), goals.take(at, 0).tolist(), parts.take(at).tolist(), strict=True):
-        groups.setdefault((*goal, part), []).append(i)
-    return list(groups.values())
-
-
-def _note_progress(world: World, slots: Ints) -> None:
-    """Remember how near to its goal each walker has come on this way, and when."""
-    left = geometry.length(world.nav_goal.take(slots, 0) - world.pos.take(slots, 0))
-    nearer = (world.nav_loop.take(slots) == 0) | (left < world.nav_best.take(slots) - HEADWAY)
-    world.nav_best[slots] = np.where(nearer, left, world.nav_best.take(slots))
-    world.nav_best_loop[slots] = np.where(nearer, world.loop, world.nav_best_loop.take(slots))
-
-
-def _stopping_point(world: World, slots: Ints, goal: Floats) -> Floats:
-    """Return (k, 2) where each unit would stop on a straight way; a target on a footprint is reached from beside it."""
-    offset = world.pos.take(slots, 0) - goal
-    distance = geometry.length(offset)
-    share = np.minimum(world.stop_at.take(slots) / np.maximum(distance, 1e-12), 1.0)
-    result: Floats = goal + offset * share[:, None]
-    return result
+def _nearest(grid: Grid, point: Floats, part: int, start: memory.Point) -> int:
+    """Return the cell of a connected part nearest to a point; the side of the start decides near ties."""
+    found, distance = grid.surface.around(point, part)
+    cells = memory.ints(found)
+    distances = memory.floats(distance)
+    best = 0
+    least = 0.0
+    for i in range(len(found)):
+        cost = distances[i] + NEAR_SIDE * _away(grids.centre_of(grid, cells[i]), start)
+        if i == 0 or cost < least:
+            best = i
+            least = cost
+    return cells[best]

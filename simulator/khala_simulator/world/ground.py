@@ -28,7 +28,7 @@ class Ground:
         self.walk: Grid = terrain.walk  # (h, w) free for a ground unit's centre now
         self.blocked: dict[int, Ints] = {}  # slot -> (k, 2) cells (x, y) of its structure
         self.surfaces: dict[tuple[Layer, tuple[int, ...]], object] = {}
-        self.native: list[object | None] = [None] * len(Layer)  # those of every layer as compiled code sees them
+        self.grids: list[object | None] = [None] * len(Layer)  # the cells of every layer as the rules read them
 
     def block(self, slot: int, cells: Ints) -> None:
         """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
@@ -54,4 +54,4 @@ class Ground:
     def _changed(self) -> None:
         self.walk = self.with_structures(self.terrain.walk)
         self.surfaces = {}
-        self.native = [None] * len(self.native)
+        self.grids = [None] * len(self.grids)

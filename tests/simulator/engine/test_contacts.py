@@ -7,50 +7,72 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from khala_simulator.abilities import commands
-from khala_simulator.movement import contacts
-from khala_simulator.movement.contacts import Bodies, within
+from khala_simulator.systems import collision
 
-SIXTEENTHS = st.integers(0, 480).map(lambda n: n / 16)  # so that differences are exact
-POINTS = st.lists(st.tuples(SIXTEENTHS, SIXTEENTHS), min_size=1, max_size=60)
+NAMES = ("Zergling", "Ultralisk", "Mutalisk", "Colossus", "Marine", "SpineCrawler")
+MANY = 81  # among fewer units every pair is measured
 
 
-@given(points=POINTS, reach=st.integers(1, 80).map(lambda n: n / 16))
-def test_all_pairs_within_reach_are_found_once(points: list[tuple[float, float]], reach: float) -> None:
-    at = np.array(points, dtype=np.float64)
-    (one, other), squared = within(at, reach)
-    found = {frozenset(pair) for pair in zip(one.tolist(), other.tolist(), strict=True)}
-    assert len(found) == len(one)
-    away = np.abs(at[:, None, :] - at)
-    expected = {frozenset((i, j)) for i, j in zip(*np.nonzero((away < reach).all(axis=2)), strict=True) if i < j}
-    assert found == expected
-    assert squared.tolist() == pytest.approx([math.dist(at[i], at[j]) ** 2 for i, j in zip(one, other, strict=True)])
+def stand(world: Any) -> None:
+    """Have bodies react to each other once, none of which walks."""
+    world.anyone_moved = False
+    world.resting_version = -1
+    collision.separate(world)
 
 
 def test_many_units_of_which_none_has_a_body_do_not_touch(field: Any) -> None:
-    for i in range(contacts.TABLE_LIMIT + 1):
-        field.put("SupplyDepot", 1, 4 + i % 10 * 2, 4 + i // 10 * 2)
-    assert Bodies.of(field.world).near(field.world.pos.take(field.world.live, 0)) is None
-
-
-def test_neighbours_are_the_same_with_and_without_a_table(field: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(1)
     world = field.world
-    names = ("Zergling", "Ultralisk", "Mutalisk", "Colossus", "Marine", "SpineCrawler")
-    for i in range(70):
-        field.put(names[i % 6], 1 + i % 2, *rng.uniform(6, 26, 2).tolist())
-    at = world.pos.take(world.live, 0)
+    for i in range(MANY):
+        field.put("SupplyDepot", 1, 4 + i % 10 * 2, 4 + i // 10 * 2)
+    before = world.pos.copy()
+    stand(world)
+    assert world.pos.tobytes() == before.tobytes()
+    assert world.resting_version == world.population
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 1 << 30))
+def test_few_bodies_react_as_they_do_among_many(make_field: Any, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(3, 12, (40, 2)).tolist()
     found = []
-    for limit in (0, 1000):
-        monkeypatch.setattr(contacts, "TABLE_LIMIT", limit)
-        pairs = Bodies.of(world).near(at)
-        assert pairs is not None
-        found.append(sorted(zip(pairs.one.tolist(), pairs.other.tolist(), pairs.apart.tolist(), strict=True)))
-    assert found[0] == found[1]
-    assert found[0]
+    for others in (0, MANY):
+        field = make_field()
+        slots = [field.put(NAMES[i % 6], 1 + i % 2, x, y) for i, (x, y) in enumerate(places)]
+        for i in range(others):
+            field.put("Marine", 1, 18 + i % 9, 18 + i // 9)
+        before = field.world.pos[slots]
+        stand(field.world)
+        found.append(field.world.pos[slots])
+        assert np.abs(found[-1] - before).max() > 0.0
+    assert found[0].tolist() == [pytest.approx(place, abs=1e-12) for place in found[1].tolist()]
+
+
+@pytest.mark.parametrize("count", [40, 2 * MANY])
+def test_a_heap_of_bodies_comes_apart(field: Any, count: int) -> None:
+    world = field.world
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        field.put("Marine", 1, *rng.normal(16, 1, 2).tolist())
+    for _ in range(300):
+        stand(world)
+    at = world.pos[world.live]
+    away = np.linalg.norm(at[:, None] - at, axis=2)
+    np.fill_diagonal(away, np.inf)
+    assert away.min() > 2 * world.separation[world.live[0]] - 0.1
+
+
+def test_bodies_on_the_very_same_point_come_apart(field: Any) -> None:
+    world = field.world
+    pile = [field.put("Marine", 1, 16, 16) for _ in range(8)]
+    world.pos[pile] = (16.0, 16.0)
+    for _ in range(100):
+        stand(world)
+    assert len({tuple(place) for place in world.pos[pile].round(1).tolist()}) == len(pile)
 
 
 def test_flyers_pass_through_each_other_and_drift_apart_where_they_stop(field: Any) -> None:

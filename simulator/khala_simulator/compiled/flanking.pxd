@@ -1,4 +1,0 @@
-"""Flanking, compiled; `systems.flanking` has the rules."""
-from khala_simulator.native.columns cimport Columns
-
-cdef lead(object world, Columns c)

@@ -1,0 +1,60 @@
+cimport cython
+from libc.stdint cimport int64_t
+
+from khala_simulator.movement cimport grids
+from khala_simulator.movement.grids cimport Grid
+from khala_simulator.native cimport columns, memory
+from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
+from khala_simulator.systems cimport flanking
+
+cdef double* FAN_COS
+cdef double* FAN_SIN
+cdef int64_t SIDE
+cdef int64_t FAN
+cdef double SEEN_AHEAD
+cdef double TOLERANCE
+cdef int64_t STRIPES
+cdef int64_t AIR
+cdef int64_t LED
+cdef double DETOUR_LOOK
+cdef int64_t DETOUR_PERIOD
+cdef int64_t DETOUR_LOOPS
+cdef int64_t FLANK_PERIOD
+cdef int64_t NOBODY
+
+
+@cython.locals(loop=int64_t, slot=int64_t)
+cpdef find_headings(object world)
+cdef bint _flows(Columns c, int64_t slot) noexcept
+@cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double)
+cpdef begin(object world, object slots, object shift)
+@cython.locals(i=Py_ssize_t, slot=int64_t, bodies=Py_ssize_t)
+cdef object _standing(object world, Columns c)
+@cython.locals(i=Py_ssize_t, x=double, y=double, is_ahead=bint)
+cdef double _to_the_left(Point at, Point way, object standing) except? -1.0
+@cython.locals(slot=int64_t, x=double, y=double, size=double, grid=Grid, turn=int64_t)
+cdef _look(object world, Columns c, list turning)
+@cython.locals(turn=int64_t)
+cdef int64_t _first_free(Columns c, _Crowd crowd, Grid grid, int64_t slot, Point way) noexcept
+cdef Point _heading(Point way, int64_t turn, double side) noexcept
+cdef bint _is_ground(Grid grid, Point start, Point heading) noexcept
+cdef int64_t _stripe(double x) noexcept
+cdef bint _is_body(Columns c, int64_t slot) noexcept
+
+
+@cython.final
+cdef class _Crowd:
+    cdef tuple _arrays
+    cdef int64_t* _slot
+    cdef int64_t* _begin
+    cdef double* _x
+    cdef double* _y
+    cdef double* _apart
+    cdef Py_ssize_t _many
+    cdef double _widest
+    @cython.locals(separation=double, farthest=double, first=int64_t, end=int64_t, i=int64_t, body=int64_t, x=double,
+                   y=double, apart=double, seen=double)
+    cdef void look_around(self, Columns c, int64_t slot, Point way) noexcept
+    @cython.locals(i=Py_ssize_t, along=double, across=double, reach=double)
+    cdef bint lets_pass(self, Point heading) noexcept
