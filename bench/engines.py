@@ -19,7 +19,7 @@ import sys
 from typing import TYPE_CHECKING, Any, Final
 
 from bench.figures import Figure
-from khala_simulator.compiled import VARIABLE
+from khala_simulator.native.engine import VARIABLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ ENGINES: Final = ("compiled", "python")
 BATTLES: Final[Mapping[str, float]] = {"llm_smac/2s3z": 6.0, "armies of 100": 3.0}
 """What is played, by the name of its row in `bench.simulator_engine`: the least ratio that is good enough."""
 PLAYED: Final = ("--maps", "llm_smac/2s3z", "--sizes", "200")
-WHICH: Final = "from khala_simulator.compiled import engine; print(engine())"
+WHICH: Final = "from khala_simulator.native.engine import check, engine; check(); print(engine())"
 MISSING: Final = "was not built"
 """What the simulator says where there is no compiled engine; all else is an error of it."""
 

@@ -16,6 +16,7 @@ from setuptools import Extension, setup
 sys.path.insert(0, str(Path(__file__).parent))
 
 from builder import has_compiler
+
 from khala_simulator.native import declare, flags
 
 ENGINE = os.environ.get("KHALA_ENGINE") or "auto"
@@ -63,9 +64,7 @@ def extensions() -> list[Extension]:
         for member in members()
     ]
     jobs = os.cpu_count() or 1
-    return list(
-        cythonize(modules, compiler_directives=flags.CYTHON, nthreads=jobs if sys.platform == "linux" else 0)
-    )
+    return list(cythonize(modules, compiler_directives=flags.CYTHON, nthreads=jobs if sys.platform == "linux" else 0))
 
 
 setup(ext_modules=extensions(), options={"build_ext": {"parallel": os.cpu_count() or 1}})

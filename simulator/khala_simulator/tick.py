@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from khala_simulator import compiled
 from khala_simulator.native import engine
 from khala_simulator.systems import (
     acquire,
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
 
 engine.check()
 
-RULES: Final[tuple[Callable[[World], None], ...]] = (
+SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
     death.bury,  # what a debug command killed since the last loop
     opponents.run,  # computer players give their orders
     orders.carry_out,  # finished orders end, queued ones begin
@@ -83,8 +82,6 @@ RULES: Final[tuple[Callable[[World], None], ...]] = (
     vision.look,
     triggers.run,  # the map's own script, which may end the game
 )
-SYSTEMS: Final = compiled.chosen(RULES)
-"""The rules as they are played: compiled where that was built."""
 
 
 def new_game(

@@ -63,7 +63,7 @@ def test_only_a_broken_limit_fails_the_command(
 def test_without_a_compiled_engine_the_comparison_is_left_out_and_says_why(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = "ImportError: KHALA_ENGINE=compiled, but khala_simulator.compiled.columns was not built: install with a C"
+    words = "ImportError: KHALA_ENGINE=compiled, but the rules were not compiled: install with a C compiler"
     failed = subprocess.CompletedProcess([], 1, "", f"Traceback:\n{words}\n")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
     figures = list(engines.measures(engines.measure(3, 1.0)))

@@ -228,11 +228,11 @@ def touches(c: Columns, affects: Affects, shot: Shot, slot: int) -> bool:
     """Return whether a splash, a search or a sweep may touch a living unit."""
     if not c.targetable[slot] or not c.life[slot] > 0.0:
         return False
-    if not affects.allies and c.owner[slot] == shot.owner or not affects.neutral and c.owner[slot] == 0:
+    if (not affects.allies and c.owner[slot] == shot.owner) or (not affects.neutral and c.owner[slot] == 0):
         return False
-    if affects.only == "structure" and not c.walled[slot] or affects.excluding == "structure" and c.walled[slot]:
+    if (affects.only == "structure" and not c.walled[slot]) or (affects.excluding == "structure" and c.walled[slot]):
         return False
-    if affects.not_self and slot == shot.source or affects.not_target and slot == shot.target:
+    if (affects.not_self and slot == shot.source) or (affects.not_target and slot == shot.target):
         return False
     plane = affects.plane
     return plane == "any" or c.plane_bits[slot] & (GROUND_PLANE if plane == "ground" else AIR_PLANE) != 0

@@ -16,7 +16,6 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
-    from khala_simulator.tables.records import Weapon
     from khala_simulator.world.world import World
 
 WIDEST_AIM_DEG = 180.0

@@ -56,6 +56,8 @@ cdef class Flow:
     @cython.locals(walker=Walker, missing=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t, place=int64_t,
                    old=int64_t, older=int64_t, stop=int64_t, step=int64_t, i=int64_t)
     cdef bint spread(self, list walkers) except -1
+    @cython.locals(new=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t)
+    cdef int64_t expect(self, Walker walker) noexcept
     cdef int64_t arrive(self, int64_t cell, int64_t step) noexcept
     @cython.locals(cell=int64_t, x=int64_t, y=int64_t, best_x=int64_t, best_y=int64_t, dx=int64_t, dy=int64_t,
                    goal_x=double, goal_y=double, beside_x=double, beside_y=double, cost=double, best=double, hop=int64_t)

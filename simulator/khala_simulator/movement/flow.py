@@ -156,19 +156,11 @@ class Flow:
         wanted = self.arrays[1]
         self.arrays[2].fill(0)
         np.subtract(NOWHERE + 1, free, out=self.arrays[3], casting="unsafe")
-        missing = 0
         self.end = 0
+        missing = 0
         for walker in walkers:
-            if walker.settled:
-                continue
-            middle = self.cell(walker.at)
-            for y in range(-1, 2):
-                for x in range(-1, 2):
-                    cell = middle + y * self.width + x
-                    if self.free[cell]:
-                        if not self.awaited[cell]:
-                            missing += 1
-                        self.awaited[cell] = 1
+            if not walker.settled:
+                missing += self.expect(walker)
         for place in np.flatnonzero(free & wanted).tolist():
             missing -= self.arrive(place, 0)
         old = 0
@@ -192,6 +184,18 @@ class Flow:
             older = old
             old = stop
         return self.end > 0
+
+    def expect(self, walker: Walker) -> int:
+        """Await the cells around a walker; return how many were not awaited before."""
+        new = 0
+        middle = self.cell(walker.at)
+        for y in range(-1, 2):
+            for x in range(-1, 2):
+                cell = middle + y * self.width + x
+                if self.free[cell] and not self.awaited[cell]:
+                    self.awaited[cell] = 1
+                    new += 1
+        return new
 
     def arrive(self, cell: int, step: int) -> int:
         """Note that a cell is reached now, if it is free and was not before; return how many awaited ones that are."""

@@ -17,7 +17,6 @@ from khala_simulator.tables.layers import Layer
 if TYPE_CHECKING:
     from khala_simulator.movement.pathfinding import Surface
     from khala_simulator.movement.ways import Field
-    from khala_simulator.native.memory import Cells, Points
     from khala_simulator.world.ground import Ground
 
 SIDE_CLEARANCE: Final = 0.3

@@ -239,4 +239,4 @@ class _Heap:
 
 
 def _comes_before(distance: float, cell: int, other_distance: float, other_cell: int) -> bool:
-    return distance < other_distance or distance == other_distance and cell < other_cell
+    return distance < other_distance or (distance == other_distance and cell < other_cell)

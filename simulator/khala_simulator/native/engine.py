@@ -94,9 +94,7 @@ def _sources() -> Iterator[Path]:
 class _Interpreted:
     """Finds the source of a module of this package, where Python would take what was compiled from it."""
 
-    def find_spec(
-        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
+    def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         if path is None or not name.startswith(f"{PACKAGE}."):
             return None
         finders = (FileFinder(place, (SourceFileLoader, SOURCE_SUFFIXES)) for place in path)

@@ -60,6 +60,7 @@ cdef bint _is_better(Columns c, _Foes foes, int64_t slot, int64_t foe, double ga
                best_worth=double, farthest=double, i=Py_ssize_t, foe=int64_t, x=double, y=double, gap=double,
                sight=double, worth=double)
 cdef (int64_t, double, double) _find_best(Columns c, _Foes foes, int64_t slot) noexcept
+cdef bint _may_aim(Columns c, int64_t slot, int64_t foe, double gap) noexcept
 @cython.locals(ground=double, air=double)
 cdef double _longest_reach(Columns c, _Foes foes, int64_t slot) noexcept
 @cython.locals(on_ground=bint, row=int64_t, touch=double)

@@ -24,7 +24,6 @@ from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
-    from khala_simulator.native.memory import Cells
     from khala_simulator.world.world import World
 
 IDLE: Final = int(OrderKind.IDLE)
@@ -73,7 +72,7 @@ def choose_targets(world: World) -> None:
 
 def _is_due(c: Columns, slot: int, loop: int, looks_up: bool) -> bool:
     """Return whether a unit looks for a target now: the best one there is, if it has one in reach, rarely."""
-    if not (c.looks_around[slot] or c.guns_walking[slot] and c.walks[slot]):
+    if not (c.looks_around[slot] or (c.guns_walking[slot] and c.walks[slot])):
         return False
     if not c.acquires[slot] or c.scan_loop[slot] > loop or not c.windup[slot] < 0.0 or c.leashed[slot]:
         return False
@@ -105,7 +104,7 @@ def _gives_up(c: Columns, slot: int) -> bool:
     c.leashed[slot] = too_far
     return (
         too_far
-        or _stays(c, slot) and not c.in_reach[slot]
+        or (_stays(c, slot) and not c.in_reach[slot])
         or not c.visible[c.owner[slot] * c.capacity + c.target[slot]]
     )
 
@@ -146,10 +145,7 @@ class _Foes:
 def is_foe(c: Columns, player: int, slot: int) -> bool:
     """Return whether a unit is an enemy of a player that it sees and can aim at."""
     return (
-        c.owner[slot] != player
-        and c.owner[slot] != 0
-        and c.targetable[slot]
-        and c.visible[player * c.capacity + slot]
+        c.owner[slot] != player and c.owner[slot] != 0 and c.targetable[slot] and c.visible[player * c.capacity + slot]
     )
 
 
@@ -178,9 +174,8 @@ def _seek(world: World, c: Columns, player: int, seekers: list[int]) -> None:
         rank_now = rank_of(c, slot, now) if now != NOBODY else OUT_OF_SIGHT
         c.rank[slot] = rank_now
         foe, gap, worth = _find_best(c, foes, slot)
-        if foe == NOBODY or foe == now or not _is_better(c, foes, slot, foe, gap, worth + gap - rank_now):
-            continue
-        chosen.append((slot, foe, worth + gap))
+        if foe not in (NOBODY, now) and _is_better(c, foes, slot, foe, gap, worth + gap - rank_now):
+            chosen.append((slot, foe, worth + gap))
     for slot, foe, rank in chosen:
         _take(world, c, slot, foe)
         c.rank[slot] = rank
@@ -226,15 +221,21 @@ def _find_best(c: Columns, foes: _Foes, slot: int) -> tuple[int, float, float]:
         worth = ((THREAT_WEIGHT if foes.threatens[i] & planes else 0.0) + foes.rank[i]) - gap
         if gap > sight or worth <= best_worth:
             continue
-        if foes.filters:
-            if c.least_range[slot] > 0.0 and gap < c.least_range[slot] or c.spares_structures[slot] and c.walled[foe]:
-                continue
+        if foes.filters and not _may_aim(c, slot, foe, gap):
+            continue
         if foes.zones and not targets.inside_zone(c, slot, foe):
             continue
         best = foe
         best_gap = gap
         best_worth = worth
     return best, best_gap, best_worth
+
+
+def _may_aim(c: Columns, slot: int, foe: int, gap: float) -> bool:
+    """Return whether a unit picks a foe that stands so near, or is a structure."""
+    return not (c.least_range[slot] > 0.0 and gap < c.least_range[slot]) and not (
+        c.spares_structures[slot] and c.walled[foe]
+    )
 
 
 def _longest_reach(c: Columns, foes: _Foes, slot: int) -> float:

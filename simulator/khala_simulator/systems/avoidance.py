@@ -24,7 +24,6 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from khala_simulator.movement.grids import Grid
     from khala_simulator.native.columns import Columns
-    from khala_simulator.native.memory import Cells, Points
     from khala_simulator.numeric.geometry import Floats
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import World

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.movement import grids
-from khala_simulator.movement import contacts, pushing
+from khala_simulator.movement import contacts, grids, pushing
 from khala_simulator.native import columns, memory
 from khala_simulator.systems import avoidance
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.grids import Grid
     from khala_simulator.movement.contacts import Crowd
+    from khala_simulator.movement.grids import Grid
     from khala_simulator.movement.pathfinding import Surface
     from khala_simulator.native.columns import Columns
     from khala_simulator.native.memory import Cells

@@ -43,7 +43,8 @@ def run(world: World) -> None:
     quick = [player.id for player in world.players if "fast_build" in player.cheats]
     for slot in growing:
         _grow(c, slot, c.owner[slot] in quick, world.unit_type(slot).structure)
-    for slot in [slot for slot in growing if c.build_progress[slot] >= WHOLE]:
+    finished = [slot for slot in growing if c.build_progress[slot] >= WHOLE]
+    for slot in finished:
         _finish(world, slot)
 
 

@@ -12,6 +12,7 @@ cdef int64_t NOBODY
 
 @cython.locals(n=Py_ssize_t, slot=Py_ssize_t, lost=bint)
 cpdef fire(object world)
+cdef void _count_down(Columns c, int64_t slot) noexcept
 cdef bint _takes_effect(Columns c, int64_t slot) noexcept
 @cython.locals(i=Py_ssize_t, slot=int64_t, row=int64_t, turrets=bint, delay=double, low=double, high=double)
 cdef _start_attacks(object world, Columns c, boolean* in_windup)

@@ -41,17 +41,12 @@ def fire(world: World) -> None:
     in_windup = memory.bools(started)
     lost = False
     for slot in range(n):
-        if c.cooldown[slot] > 0.0:
-            c.cooldown[slot] -= 1.0
-        if c.backswing[slot] > 0.0:
-            c.backswing[slot] -= 1.0
-        if c.windup[slot] >= 0.0:
-            in_windup[slot] = True
-            c.windup[slot] -= 1.0
-            if not c.in_reach[slot]:  # the target got away before the damage point; that leaves no cooldown
-                c.windup[slot] = NOT_STARTED
-                c.cooldown[slot] = 0.0
-                lost = True
+        in_windup[slot] = c.windup[slot] >= 0.0
+        _count_down(c, slot)
+        if in_windup[slot] and not c.in_reach[slot]:  # the target got away before the damage point
+            c.windup[slot] = NOT_STARTED
+            c.cooldown[slot] = 0.0
+            lost = True
     if lost:
         world.scan_now = True
     if len(world.fighters):
@@ -61,8 +56,17 @@ def fire(world: World) -> None:
             _take_effect(world, attackers)
             c = columns.columns_of(world)
     for slot in range(n):
-        if c.cooldown[slot] < 0.0:
-            c.cooldown[slot] = 0.0  # a fraction is carried over only into the very next attack
+        c.cooldown[slot] = max(c.cooldown[slot], 0.0)  # a fraction is carried over only into the very next attack
+
+
+def _count_down(c: Columns, slot: int) -> None:
+    """Count what a unit's attacks take by one loop."""
+    if c.cooldown[slot] > 0.0:
+        c.cooldown[slot] -= 1.0
+    if c.backswing[slot] > 0.0:
+        c.backswing[slot] -= 1.0
+    if c.windup[slot] >= 0.0:
+        c.windup[slot] -= 1.0
 
 
 def _takes_effect(c: Columns, slot: int) -> bool:

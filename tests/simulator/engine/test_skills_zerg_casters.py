@@ -30,7 +30,7 @@ CASTERS = {
 @pytest.fixture(autouse=True)
 def _peace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep all units from picking fights by themselves."""
-    laws = tuple(law for law in tick.RULES if law is not acquire.choose_targets)
+    laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
     monkeypatch.setattr(tick, "SYSTEMS", laws)
 
 

@@ -34,7 +34,7 @@ def field(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any
 @pytest.fixture
 def peace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep all units from picking fights by themselves."""
-    laws = tuple(law for law in tick.RULES if law is not acquire.choose_targets)
+    laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
     monkeypatch.setattr(tick, "SYSTEMS", laws)
 
 
