@@ -20,7 +20,7 @@ from khala_simulator.process.status import AFTER, LEGAL, Status
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.mechanics import entries
 from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
-from khala_simulator.tick import RULES
+from khala_simulator.tick import SYSTEMS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +47,7 @@ def page() -> str:
         "The systems of the world, in the order in which they run.",
         table(
             ("system", "in words"),
-            [(code(system.__module__.rpartition(".")[2]), _system(system)) for system in RULES],
+            [(code(system.__module__.rpartition(".")[2]), _system(system)) for system in SYSTEMS],
         ),
         "## What a player can order",
         _abilities(),

@@ -8,13 +8,15 @@ of the step before, until every walker is reached. ``systems.flanking`` follows 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from khala_simulator.native import memory
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from khala_simulator.movement.grids import Grid
     from khala_simulator.native.memory import Cells
 
@@ -83,8 +85,9 @@ class Flow:
         fine[:, [0, -1]] = 0
         self.low = memory.point(x0 - grid.shift, y0 - grid.shift)
         self.height, self.width = fine.shape
-        bytes_alike = (np.zeros_like(fine) for _ in range(3))
-        self.arrays = (fine, *bytes_alike, memory.new_ints(fine.size))
+        self.arrays: tuple[NDArray[Any], ...] = (
+            fine, np.zeros_like(fine), np.zeros_like(fine), np.zeros_like(fine), memory.new_ints(fine.size)
+        )  # fmt: skip
         self.free = memory.uint8s(self.arrays[0])
         self.wanted = memory.uint8s(self.arrays[1])
         self.awaited = memory.uint8s(self.arrays[2])  # the cells around walkers

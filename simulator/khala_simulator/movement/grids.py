@@ -44,7 +44,7 @@ class Grid:
         self.open = memory.bools(surface.open)
         self.part = memory.ints(surface.part)
         self.sums = memory.ints(surface.sums)
-        self.steps = memory.bools(surface.steps)
+        self.steps = memory.uint8s(surface.steps)
         self.walls_low = memory.points(surface.walls_low)
         self.walls_high = memory.points(surface.walls_high)
         self.spiked = memory.bools(surface.spiked)
@@ -66,7 +66,8 @@ def read(surface: Surface) -> Grid:
     """Return the grid of a surface."""
     if surface.grid is None:
         surface.grid = Grid(surface)
-    return surface.grid
+    grid: Grid = surface.grid  # type: ignore[assignment]  # a surface does not know its grid
+    return grid
 
 
 def grid_of(ground: Ground, layer: int) -> Grid:
@@ -75,7 +76,7 @@ def grid_of(ground: Ground, layer: int) -> Grid:
     if grid is None:
         grid = read(pathfinding.surface(ground, Layer(layer)))
         ground.grids[layer] = grid
-    return grid
+    return grid  # type: ignore[return-value]  # the ground does not know its grids
 
 
 def cell_at(grid: Grid, x: float, y: float) -> int:

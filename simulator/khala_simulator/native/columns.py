@@ -18,20 +18,20 @@ class Columns(UnitColumns if TYPE_CHECKING else object):  # type: ignore[misc]  
     if TYPE_CHECKING:
         visible: Cells
         """(players * capacity,) player by player."""
-        pos: Points  # type: ignore[assignment]
-        heading: Points  # type: ignore[assignment]
-        order_point: Points  # type: ignore[assignment]
-        order_origin: Points  # type: ignore[assignment]
-        guard: Points  # type: ignore[assignment]
-        turret: Points  # type: ignore[assignment]
-        zone: Points  # type: ignore[assignment]
-        nav_point: Points  # type: ignore[assignment]
-        nav_goal: Points  # type: ignore[assignment]
-        aside: Points  # type: ignore[assignment]
-        toward: Points  # type: ignore[assignment]
-        intended: Points  # type: ignore[assignment]
-        goal: Points  # type: ignore[assignment]
-        walls: Points  # type: ignore[assignment]
+        pos: Points
+        heading: Points
+        order_point: Points
+        order_origin: Points
+        guard: Points
+        turret: Points
+        zone: Points
+        nav_point: Points
+        nav_goal: Points
+        aside: Points
+        toward: Points
+        intended: Points
+        goal: Points
+        walls: Points
 
     def __init__(self, world: World) -> None:
         self.capacity = world.capacity

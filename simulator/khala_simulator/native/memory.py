@@ -31,7 +31,8 @@ class Points:
     __slots__ = ("_cells",)
 
     def __init__(self, array: NDArray[np.float64]) -> None:
-        self._cells = memoryview(array.reshape(-1))
+        cells: Any = array.reshape(-1)
+        self._cells: Any = memoryview(cells)
 
     def __getitem__(self, slot: int) -> Point:
         """Return a point."""

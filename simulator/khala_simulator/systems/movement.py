@@ -9,7 +9,7 @@ facing.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -143,7 +143,7 @@ def _cell(at: memory.Point, width: int, height: int) -> int:
     return min(max(row, 0), height - 1) * width + min(max(column, 0), width - 1)
 
 
-def _choose(c: Columns, walks: _Walks, i: int, top_speed: float, brakers: bool, queue: list[object]) -> None:
+def _choose(c: Columns, walks: _Walks, i: int, top_speed: float, brakers: bool, queue: list[Any]) -> None:
     """Choose the way and the step of a walker of some top speed."""
     slot = walks.slot[i]
     x = c.nav_point[slot].x - c.pos[slot].x

@@ -10,7 +10,7 @@ import pytest
 
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
-from khala_simulator.movement import pathfinding
+from khala_simulator.movement import pathfinding, ways
 from khala_simulator.movement.placement import free_places
 from khala_simulator.tables.layers import Layer
 
@@ -82,7 +82,7 @@ def test_100_units_pass_the_ramp_of_a_base(make_field: Callable[..., Any]) -> No
     field = make_field("simple64")
     world = field.world
     slots = crowd(world, "Zergling", 100, BASE)
-    way = pathfinding.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    way = ways.distance(pathfinding.surface(world.ground, Layer.WALK), np.array(BASE), np.array(OUTSIDE))
     commands.move(world, slots.tolist(), OUTSIDE)
     alone = way / (world.catalog.unit("Zergling").speed_n / 16)
     near = loops_until(field, lambda: np.hypot(*(world.pos[slots] - OUTSIDE).T).max() < 9, 2000)
@@ -95,7 +95,7 @@ def test_a_walk_is_as_long_as_the_distance_that_is_told(make_field: Callable[...
     field = make_field("simple64")
     world = field.world
     marine = field.put("Marine", 1, *BASE)
-    told = pathfinding.surface(world.ground, Layer.WALK).distance(np.array(BASE), np.array(OUTSIDE))
+    told = ways.distance(pathfinding.surface(world.ground, Layer.WALK), np.array(BASE), np.array(OUTSIDE))
     assert told > 1.2 * math.dist(BASE, OUTSIDE), "there is something to walk around"
     commands.move(world, [marine], OUTSIDE)
     walked = 0.0

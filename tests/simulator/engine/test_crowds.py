@@ -10,9 +10,6 @@ import pytest
 
 from bench.crowds import BATTLES, binomial, mirror
 from khala_simulator.abilities import commands
-from khala_simulator.movement import pathfinding
-from khala_simulator.movement.flow import Flow
-from khala_simulator.tables.layers import Layer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,30 +62,6 @@ def test_a_second_row_goes_round_the_first_to_the_other_side(field: Any) -> None
     field.until(lambda: world.in_reach[slots].sum() >= 13, most=110)
     behind = world.pos[slots, 0] > 20.4
     assert (world.in_reach[slots] & behind).sum() >= 3
-
-
-def test_the_way_leads_round_those_who_stand_and_past_a_place_that_is_about_to_be_taken(field: Any) -> None:
-    flow = Flow(pathfinding.surface(field.world.ground, Layer.WALK), np.array([[10.0, 16.0], [20.0, 16.0]]))
-    flow.stand(np.array([[16.0, 16.0], [15.0, 15.3], [15.0, 16.0], [15.0, 16.7]]), np.full(4, 0.74))
-    flow.reach(np.array([[16.0, 16.0]]), np.array([0.95]))
-    walkers = np.array([[14.0, 16.1], [13.9, 15.9], [15.6, 17.1]])
-    points, found = flow.points(walkers[:2], np.full((2, 2), 16.0), 0.74)
-    assert found.all()
-    assert points[0, 1] > 16.3
-    assert points[1, 1] < 15.7
-    points, found = flow.points(walkers, np.full((3, 2), 16.0), 0.74)
-    assert found.all()
-    assert math.dist(points[2], (16, 16)) < 0.96
-    assert points[0, 1] < 15.7, "the place above is as good as taken"
-
-
-def test_who_is_shut_out_has_no_way(field: Any) -> None:
-    flow = Flow(pathfinding.surface(field.world.ground, Layer.WALK), np.array([[10.0, 16.0], [20.0, 16.0]]))
-    ring = [(16 + 2 * math.cos(a), 16 + 2 * math.sin(a)) for a in np.arange(0.0, 6.3, 0.3)]
-    flow.stand(np.array(ring), np.full(len(ring), 0.74))
-    flow.reach(np.array([[16.0, 16.0]]), np.array([0.95]))
-    _, found = flow.points(np.array([[11.0, 16.0], [15.5, 16.0]]), np.full((2, 2), 16.0), 0.74)
-    assert found.tolist() == [False, True]
 
 
 def test_who_comes_through_a_gap_behind_others_goes_on_to_either_side(field: Any) -> None:
