@@ -15,7 +15,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 
-.PHONY: help install install-tests check format types test pysc2 slow numpy cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,8 +59,8 @@ pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the 
 slow: install-tests ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
-numpy: install-tests ## The tests of the simulator's rules without the compiled systems
-	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) tests/simulator/engine tests/simulator/api
+interpreted: install-tests ## Unit tests of the rules in the interpreter, as a debugger plays them
+	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) tests/simulator/engine/test_damage.py tests/simulator/engine/test_weapons.py tests/simulator/engine/test_acquire.py tests/simulator/engine/test_regeneration.py tests/simulator/engine/test_melee_contact.py
 
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from khala_simulator.tables.layers import Layer
 
 if TYPE_CHECKING:
     from khala_simulator.movement.pathfinding import Surface
-    from khala_simulator.movement.ways import Field
     from khala_simulator.world.ground import Ground
 
 SIDE_CLEARANCE: Final = 0.3
@@ -37,7 +36,7 @@ class Grid:
     def __init__(self, surface: Surface) -> None:
         self.surface = surface
         self.fields_kept = surface.fields_kept
-        self.fields: dict[int, Field] = {}
+        self.fields: dict[int, Any] = {}
         self.height, self.width = surface.free.shape
         self.shift = surface.shift
         self.flat = memory.bools(surface.flat)
