@@ -17,18 +17,12 @@ import khala_orchestrator.cli
 import khala_simulator.cli
 import khala_simulator.process.install
 from khala import __version__
-from khala.actions import EPILOG as ACTIONS_EPILOG
-from khala.actions import actions
 from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
-from khala.dataset.cli import app as dataset
-from khala.experiment.cli import app as experiment
-from khala.fork.cli import FORK_EPILOG, fork
-from khala.help import Group
-from khala.keys import app as keys
-from khala.knowledge.cli import app as knowledge
-from khala.mcp.cli import MCP_EPILOG, mcp
-from khala.openenv.cli import OPENENV_EPILOG, openenv
-from khala.options import (
+from khala.commands.actions import EPILOG as ACTIONS_EPILOG
+from khala.commands.actions import actions
+from khala.commands.help import Group
+from khala.commands.keys import app as keys
+from khala.commands.options import (
     Assemble,
     BaseUrl,
     BudgetUsd,
@@ -59,6 +53,12 @@ from khala.options import (
     Task,
     ThinkingLoops,
 )
+from khala.dataset.cli import app as dataset
+from khala.experiment.cli import app as experiment
+from khala.fork.cli import FORK_EPILOG, fork
+from khala.knowledge.cli import app as knowledge
+from khala.mcp.cli import MCP_EPILOG, mcp
+from khala.openenv.cli import OPENENV_EPILOG, openenv
 from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
 from khala.view.cli import VIEW_EPILOG, view
 from khala_agents.cli import Trust
@@ -143,8 +143,8 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.run import Wanted  # noqa: PLC0415  # see there
-    from khala.run import run as play  # noqa: PLC0415
+    from khala.commands.run import Wanted  # noqa: PLC0415  # see there
+    from khala.commands.run import run as play  # noqa: PLC0415
 
     match = {
         "seed": seed, "episodes": episodes, "assemble_s": assemble, "executor": executor, "rule": clock,
@@ -196,9 +196,9 @@ def host(
 
     With --listen the host is its own router; with --connect it uses one, see `khala router`.
     """
-    from khala.commands import bus_of, until_interrupted  # noqa: PLC0415  # see there
-    from khala.local import play_hosted  # noqa: PLC0415
-    from khala.matches import new_or_resumed  # noqa: PLC0415
+    from khala.commands.host import bus_of, until_interrupted  # noqa: PLC0415  # see there
+    from khala.playing.local import play_hosted  # noqa: PLC0415
+    from khala.playing.matches import new_or_resumed  # noqa: PLC0415
 
     config, past = new_or_resumed(
         task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
@@ -236,8 +236,8 @@ def advise(
     Each line of stdin is a message, which agents read in their next observation; `@Stalkers fall back` is for one of
     them. The recording marks it as human, and the result counts it.
     """
-    from khala.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
-    from khala_orchestrator.mailbox import EVERYONE  # noqa: PLC0415
+    from khala.commands.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
+    from khala_orchestrator.words.mailbox import EVERYONE  # noqa: PLC0415
 
     names = {what: check_name(value, what) for what, value in (("run", run), ("side", side), ("name", name))}
     adviser = Adviser(**names, recipient=agent or EVERYONE)
@@ -258,7 +258,7 @@ def doctor(
     as_json: Json = False,
 ) -> None:
     """Look at this machine as a match would, and say what to do."""
-    from khala import commands  # noqa: PLC0415  # see there
+    from khala.commands import host as commands  # noqa: PLC0415  # see there
 
     commands.doctor(tls, game, as_json=as_json)
 

@@ -17,10 +17,10 @@ from rich.text import Text
 from khala import __version__
 from khala.calibrate import compare, report
 from khala.calibrate.estimates import estimates
-from khala.environment import plain
-from khala.exit_codes import FAILED, SIGNALLED
+from khala.commands.exit_codes import FAILED, SIGNALLED
 from khala.experiment.numbers import plain as plain_value
-from khala.games import find
+from khala.playing.environment import plain
+from khala.playing.games import find
 from khala_bridge.calibrate.catalogue import choose
 from khala_bridge.calibrate.connection import started, version
 from khala_bridge.calibrate.record import Calibration, Values, load

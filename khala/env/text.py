@@ -1,7 +1,7 @@
 """Any task in words, as PettingZoo has it: agents read observations and write replies, as over the bus.
 
-The match is played by the host of every other match (`khala.seats`); a step lasts until somebody is asked again. Above:
-`khala.env.parallel_env`. Below: `khala.seats`, `khala.env.onlooker`.
+The match is played by the host of every other match (`khala.playing.seats`); a step lasts until somebody is asked
+again. Above: `khala.env.parallel_env`. Below: `khala.playing.seats`, `khala.env.onlooker`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from khala.env.onlooker import Onlooker
-from khala.loop_thread import LoopThread
-from khala.minds import Minds, minds_of
-from khala.rewards import battle
-from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.env.rewards import battle
+from khala.playing.loop_thread import LoopThread
+from khala.playing.minds import Minds, minds_of
+from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_bridge.game.processes import IdleGames
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from khala.rewards import SideReward
+    from khala.env.rewards import SideReward
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Result
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
 from khala.experiment.played import unread
-from khala.minds import share_budget
-from khala_orchestrator.tally import REFUSED
+from khala.playing.minds import share_budget
+from khala_orchestrator.match.tally import REFUSED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from khala.fork.futures import Future
-    from khala_orchestrator.fork import Trunk
+    from khala_orchestrator.past.fork import Trunk
     from khala_protocol.messages import Result
 
 

@@ -1,6 +1,6 @@
 """A match whose seats are played by sessions, each at its own pace.
 
-Above: `khala.mcp.server`, which gives one seat to an MCP client. Below: `khala.seats`, which plays the match.
+Above: `khala.mcp.server`, which gives one seat to an MCP client. Below: `khala.playing.seats`, which plays the match.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Self
 
-from khala.seats import NotAsked, Seat, SeatedMatch
+from khala.playing.seats import NotAsked, Seat, SeatedMatch
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
     from types import TracebackType
 
-    from khala.minds import Minds
-    from khala.seats import Seen, Turn
+    from khala.playing.minds import Minds
+    from khala.playing.seats import Seen, Turn
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Report, Result
 

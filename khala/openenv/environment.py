@@ -1,7 +1,8 @@
 """One session of OpenEnv: a match, some of whose agents the client plays.
 
 The match is played by the host of every other match; a step lasts until somebody is asked again. Above:
-`khala.openenv.server`. Below: `khala.openenv.settings`, which makes the match, and `khala.seats`, which plays it.
+`khala.openenv.server`. Below: `khala.openenv.settings`, which makes the match, and `khala.playing.seats`, which plays
+it.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from openenv.core.env_server.interfaces import Environment
 from openenv.core.env_server.types import EnvironmentMetadata
 
 from khala import __version__
-from khala.loop_thread import LoopThread
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, ResetOptions
 from khala.openenv.places import Places
 from khala.openenv.settings import Settings
 from khala.openenv.views import outcome_of, view_of
-from khala.seats import Turn
+from khala.playing.loop_thread import LoopThread
+from khala.playing.seats import Turn
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.configfile import loads
 from khala_protocol.errors import KhalaError
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala.openenv.settings import Chosen
-    from khala.seats import Seat, SeatedMatch
+    from khala.playing.seats import Seat, SeatedMatch
 
 CLOSE_S: Final = 30.0
 """Longest wait for the end of a game, which takes 0.1 s."""

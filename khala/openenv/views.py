@@ -9,7 +9,7 @@ from khala.openenv.models import AgentView, ChatTurn, Outcome, Picture
 from khala_agents.prompt import Prompt
 
 if TYPE_CHECKING:
-    from khala.seats import Seen
+    from khala.playing.seats import Seen
     from khala_protocol.messages import Briefing, Result
 
 

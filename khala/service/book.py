@@ -16,7 +16,7 @@ from khala_protocol.service import MAX_WORDS, OPEN, MatchCard, Matches
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala.minds import Minds
+    from khala.playing.minds import Minds
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report, Result
     from khala_protocol.service import MatchState, Submit

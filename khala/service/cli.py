@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from khala.options import (
+from khala.commands.options import (
     Assemble,
     BaseUrl,
     BudgetUsd,
@@ -151,8 +151,8 @@ def submit(
 
     Options are those of `khala run`; keys, policies and model files are those of the service's machine.
     """
-    from khala.matches import new, refuse_others  # noqa: PLC0415
-    from khala.minds import Minds, named_sides  # noqa: PLC0415
+    from khala.playing.matches import new, refuse_others  # noqa: PLC0415
+    from khala.playing.minds import Minds, named_sides  # noqa: PLC0415
     from khala.service import client, commands  # noqa: PLC0415  # see there
     from khala_protocol.service import Submit  # noqa: PLC0415
 

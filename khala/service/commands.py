@@ -16,8 +16,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from khala.exit_codes import DONE, FAILED, NOT_VALID
-from khala.local_bus import local_endpoint
+from khala.commands.exit_codes import DONE, FAILED, NOT_VALID
+from khala.playing.local_bus import local_endpoint
 from khala.service import client, logs, memory
 from khala.service.book import Limits
 from khala.service.daemon import Service

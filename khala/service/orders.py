@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from khala.matches import free_recording, resumed
-from khala.minds import Minds, groups_of, minds_of
+from khala.playing.matches import free_recording, resumed
+from khala.playing.minds import Minds, groups_of, minds_of
 from khala_bridge.observe import Observer
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 from aiohttp import web
 
+from khala.commands.exit_codes import SIGNALLED
 from khala.doors.rules import TOKEN
-from khala.exit_codes import SIGNALLED
 from khala.view.export import export
 from khala.view.guard import view_door
 from khala.view.server import Server, page
 from khala.view.sources import Sources, find
 from khala_orchestrator.console import stderr_console
-from khala_orchestrator.transcript import StepSelection
+from khala_orchestrator.past.transcript import StepSelection
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import read_limited

@@ -8,9 +8,9 @@ import pytest
 import typer
 
 from khala.cli import app
-from khala.matches import RECORDED, new, new_or_resumed
+from khala.playing.matches import RECORDED, new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, run_key
