@@ -264,7 +264,7 @@ def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> lis
 
 
 def missing(matches: Iterable[PlannedMatch], played: dict[str, Played]) -> Iterable[PlannedMatch]:
-    """Yield the matches that were not played, or say nothing."""
+    """Return the matches that were not played, or whose match did not end as it should."""
     return (match for match in matches if match.key not in played or played[match.key].state != "done")
 
 

@@ -179,5 +179,5 @@ def loops_to_think(clock: Clock, answer: Answer) -> int:
         case "token":
             pace = answer.reply.pace if answer.reply and answer.reply.pace else clock.pace
             return math.ceil(pace.seconds(answer.usage) * LOOPS_PER_S)
-        case _:
+        case "frozen" | "realtime":
             return 0

@@ -12,7 +12,7 @@ from khala_bridge.catalogue.functions import functions
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 RICH = (debug_pb2.all_resources, debug_pb2.food)
 FREE = (*RICH, debug_pb2.tech_tree)

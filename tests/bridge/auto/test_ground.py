@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_bridge.state import Snapshot
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 MELEE = ("Simple64", "Simple96", "Simple128", "Flat32", "Flat48", "Flat64", "Flat96", "Flat128")
 CATALOG = load_catalog("4.10")

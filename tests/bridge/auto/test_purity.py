@@ -18,7 +18,7 @@ from khala_bridge.state.means import ledger_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 SIDES = {
     race: [

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_bridge.auto import RuleOrder
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 RICH = (debug_pb2.all_resources, debug_pb2.food)
 

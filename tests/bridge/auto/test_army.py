@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_bridge.auto import RuleOrder
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 
 @pytest.fixture

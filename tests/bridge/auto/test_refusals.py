@@ -13,7 +13,7 @@ from khala_bridge.frames import WorldPoint
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 RICH = (debug_pb2.all_resources, debug_pb2.food)
 

@@ -14,7 +14,7 @@ from khala_bridge.frames import WorldPoint
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 UNITS = ("Zealot", "Stalker", "Sentry", "Adept", "HighTemplar", "DarkTemplar")
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.auto import RuleOrder
     from khala_bridge.state import Unit
-    from tests.bridge.macro.conftest import Game
+    from tests.bridge.auto.conftest import Game
 
 MAPS = ("Simple64", "Flat48", "Flat64", "Simple96")
 RACES = ("protoss", "terran", "zerg")
