@@ -7,6 +7,7 @@ pydantic, no game and no bus. `tests/khala/test_imports.py` holds them to it.
 import logging
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -23,35 +24,14 @@ from khala.commands.actions import actions
 from khala.commands.help import Group
 from khala.commands.keys import app as keys
 from khala.commands.options import (
-    Assemble,
-    BaseUrl,
-    BudgetUsd,
-    Episodes,
-    ExecutorName,
-    Fallback,
     Game,
-    Grace,
-    Images,
-    Latency,
-    MaxSteps,
-    MaxWait,
-    Memory,
-    Mind,
-    Model,
-    ModelName,
-    Opponent,
+    MatchOptions,
+    MindOptions,
     Out,
-    PolicyName,
     Resume,
-    Rhythm,
-    Rule,
     RunName,
-    Seed,
-    SideModel,
-    Speed,
-    StepLoops,
     Task,
-    ThinkingLoops,
+    with_options,
 )
 from khala.dataset.cli import app as dataset
 from khala.experiment.cli import app as experiment
@@ -103,38 +83,16 @@ Examples:\n
 """
 
 
+@with_options
 def run(
     task: Task = None,
     *,
     resume: Resume = None,
-    model: Model = "scripted",
-    model_name: ModelName = None,
-    base_url: BaseUrl = None,
-    policy: PolicyName = None,
-    fallback: Fallback = None,
-    blue: Mind = None,
-    red: Mind = None,
-    side_model: SideModel = None,
-    budget_usd: BudgetUsd = None,
-    latency: Latency = 0.2,
+    minds: MindOptions,
     game: Game = "simulator",
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
-    opponent: Opponent = None,
-    seed: Seed = None,
-    episodes: Episodes = None,
-    executor: ExecutorName = None,
-    clock: Rule = None,
-    max_wait: MaxWait = None,
-    step_loops: StepLoops = None,
-    rhythm: Rhythm = None,
-    thinking_loops: ThinkingLoops = None,
-    speed: Speed = None,
-    grace: Grace = None,
-    max_steps: MaxSteps = None,
-    memory: Memory = None,
-    images: Images = None,
+    match: MatchOptions,
     run: RunName = None,
-    assemble: Assemble = 60.0,
     out: Out = Path("runs"),
     as_json: Json = False,
 ) -> None:
@@ -146,20 +104,10 @@ def run(
     from khala.commands.run import Wanted  # noqa: PLC0415  # see there
     from khala.commands.run import run as play  # noqa: PLC0415
 
-    match = {
-        "seed": seed, "episodes": episodes, "assemble_s": assemble, "executor": executor, "rule": clock,
-        "max_wait_s": max_wait, "step_loops": step_loops, "rhythm": rhythm, "thinking_loops": thinking_loops,
-        "speed": speed, "grace_s": grace, "max_steps": max_steps, "memory": memory, "images": images,
-        "opponent": opponent,
-    }  # fmt: skip
-    minds = {
-        "model": model, "model_name": model_name, "base_url": base_url, "policy": policy, "budget_usd": budget_usd,
-        "latency_s": latency, "fallback": fallback,
-    }  # fmt: skip
-    wanted = Wanted(task, resume, run, out, game, match, minds, side_model or (), {"blue": blue, "red": red})
-    play(wanted, as_json=as_json)
+    play(Wanted(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
 
 
+@with_options
 def host(
     task: Task = None,
     *,
@@ -174,21 +122,7 @@ def host(
     insecure: Insecure = False,
     game: Game = "simulator",
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
-    opponent: Opponent = None,
-    seed: Seed = None,
-    episodes: Episodes = None,
-    executor: ExecutorName = None,
-    clock: Rule = None,
-    max_wait: MaxWait = None,
-    step_loops: StepLoops = None,
-    rhythm: Rhythm = None,
-    thinking_loops: ThinkingLoops = None,
-    speed: Speed = None,
-    grace: Grace = None,
-    max_steps: MaxSteps = None,
-    memory: Memory = None,
-    images: Images = None,
-    assemble: Assemble = 60.0,
+    match: MatchOptions,
     out: Out = Path("runs"),
     as_json: Json = False,
 ) -> None:
@@ -200,12 +134,7 @@ def host(
     from khala.playing.local import play_hosted  # noqa: PLC0415
     from khala.playing.matches import new_or_resumed  # noqa: PLC0415
 
-    config, past = new_or_resumed(
-        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
-        thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
-    )  # fmt: skip
+    config, past = new_or_resumed(task, resume, run, out, **asdict(match))
     bus = bus_of(config, connect, listen, tls, insecure=insecure)
     until_interrupted(
         config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch, past=past)

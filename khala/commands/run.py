@@ -21,9 +21,10 @@ from khala_protocol.commandline import say
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
+    from khala.commands.options import MindOptions
     from khala_bridge.game.processes import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Result
@@ -40,11 +41,7 @@ class Wanted:
     game: str
     match: Mapping[str, Any]
     """How it is played, as `khala.playing.matches.new_or_resumed` takes it."""
-    minds: Mapping[str, Any]
-    """Of all sides, as `khala.playing.minds.Minds` takes it."""
-    side_model: Sequence[str]
-    sides: Mapping[str, str | None]
-    """What single sides have instead, by name."""
+    minds: MindOptions
 
 
 def run(wanted: Wanted, *, as_json: bool) -> None:
@@ -66,12 +63,12 @@ async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
         with _game_for(wanted) as launched:
             from khala.playing.local import Supplies, play  # noqa: PLC0415  # a second, in which the others import as well
             from khala.playing.matches import new_or_resumed  # noqa: PLC0415
-            from khala.playing.minds import Minds, minds_of, named_sides, trust_options  # noqa: PLC0415
+            from khala.playing.minds import Minds, minds_of, trust_options  # noqa: PLC0415
             from khala_orchestrator.console import Progress, stderr_console  # noqa: PLC0415
 
             config, past = new_or_resumed(wanted.task, wanted.resume, wanted.run, wanted.out, **wanted.match)
-            named = named_sides(wanted.side_model, **wanted.sides)
-            common = Minds(**wanted.minds)
+            named = wanted.minds.of_sides()
+            common = Minds(**wanted.minds.of_all())
             trust_options(common, named)
             minds = minds_of([side.side for side in config.task.per_side()], common, named)
             known.append(config)

@@ -29,28 +29,6 @@ if TYPE_CHECKING:
     from khala_orchestrator.past.resume import Unfinished
 
 
-RECORDED = {
-    "task": "the task",
-    "run": "--run",
-    "seed": "--seed",
-    "episodes": "--episodes",
-    "executor": "--executor",
-    "rule": "--clock",
-    "max_wait_s": "--max-wait",
-    "step_loops": "--step-loops",
-    "rhythm": "--rhythm",
-    "thinking_loops": "--thinking-loops",
-    "speed": "--speed",
-    "grace_s": "--grace",
-    "max_steps": "--max-steps",
-    "memory": "--memory",
-    "images": "--images",
-    "opponent": "--opponent",
-}
-"""Options of what a run card holds, so that a match keeps them when it is gone on with. All others may be new: where it
-is played and recorded, how long it waits for its agents at the start, and how they decide."""
-
-
 _TRY = re.compile(r"recording(?:-([0-9]{1,9}))?\.mcap")
 
 
@@ -67,7 +45,7 @@ def new_or_resumed(
         if task is None:
             raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume")
         return new(task, run, out, **given), None
-    config, past = resumed(resume, out, assemble_s=given.pop("assemble_s"))
+    config, past = resumed(resume, out, assemble_s=given["assemble_s"])
     refuse_others(config, task=task, run=run, **given)
     return config, past
 
@@ -77,20 +55,27 @@ def refuse_others(config: MatchConfig | None, **given: Any) -> None:
 
     Args:
         config: the match; None if it is not known here, and no option can be seen to say the same.
-        given: by the names in `RECORDED`; None for an option that was left out.
+        given: by the names that `new` takes; None for an option that was left out. How long a match waits for its
+            agents at the start may change.
 
     Raises:
         ConfigError: there are some; the text names them all.
     """
     others = [
-        f"{option} {value}"
-        for name, option in RECORDED.items()
-        if (value := given.get(name)) is not None and (config is None or not _says(config, name, value))
+        f"{_option(name)} {value}"
+        for name, value in given.items()
+        if name != "assemble_s" and value is not None and (config is None or not _says(config, name, value))
     ]
     if others:
         raise ConfigError(
             f"--resume goes on with a match as it was begun: leave out {', '.join(others)}, or begin a new one"
         )
+
+
+def _option(name: str) -> str:
+    """Return what a user calls an option: the units of its value are no part of that."""
+    named = {"task": "the task", "rule": "--clock"}
+    return named.get(name, f"--{name.removesuffix('_s').replace('_', '-')}")
 
 
 def _says(config: MatchConfig, name: str, value: object) -> bool:

@@ -12,12 +12,13 @@ import pytest
 import typer
 
 from khala.commands.exit_codes import SIGNALLED
+from khala.commands.options import MindOptions
 from khala.commands.run import Wanted, _game_for, run
 
 
 def wanted(task: str | None, **match: Any) -> Wanted:
     given = {"images": None, "opponent": None} | match
-    return Wanted(task, None, None, Path("runs"), "nowhere", given, {}, (), {})
+    return Wanted(task, None, None, Path("runs"), "nowhere", given, MindOptions())
 
 
 def test_a_signal_before_the_match_is_known_ends_it_in_order(
