@@ -69,7 +69,8 @@ class Adviser:
         Raises:
             ConfigError: it is too long, or for nobody of this side.
         """
-        recipient, text = self.recipient, line.strip()
+        recipient = self.recipient
+        text = line.strip()
         if text.startswith("@"):
             recipient, _, text = text[1:].partition(" ")
         if not text.strip():
@@ -215,7 +216,8 @@ async def card_of(bus: Bus, adviser: Adviser, find_s: float) -> Run:
 
 async def lines_of(stream: TextIO) -> AsyncIterator[str]:
     """Yield the lines of a stream as they come; a thread waits for them, and does not keep the process from ending."""
-    loop, lines = asyncio.get_running_loop(), asyncio.Queue[str | None]()
+    loop = asyncio.get_running_loop()
+    lines = asyncio.Queue[str | None]()
 
     def read() -> None:
         with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits for lines any more

@@ -71,7 +71,8 @@ def _pysc2() -> Iterator[Finding]:
         yield Finding("PySC2", "wrong", str(error), "run `make install`, or `uv sync`: it keeps enum34 out")
         return
     yield Finding("PySC2", "ok", importlib.metadata.version("pysc2"))
-    kind, version = compat.protobuf_kind(), importlib.metadata.version("protobuf")
+    kind = compat.protobuf_kind()
+    version = importlib.metadata.version("protobuf")
     if kind == "upb":
         yield Finding("protobuf", "ok", f"{version} ({kind})")
     else:

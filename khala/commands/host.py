@@ -64,7 +64,8 @@ def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json:
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
-    reasons, idle = list(reasons_not_valid(results)), without_orders(results)
+    reasons = list(reasons_not_valid(results))
+    idle = without_orders(results)
     said = f"no order of {', '.join(idle)} was carried out" if idle else ""
     if reasons:
         words = visible_line("; ".join([*reasons, *filter(None, [said])]))

@@ -140,7 +140,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         if self._match is None or seed is not None or self.agents or self._turn.over:
             self._leave()
             self._enter(secrets.randbelow(_MOST_SEED) if seed is None else seed)
-        self.agents, self._texts = list(self.possible_agents), dict.fromkeys(self.possible_agents, "")
+        self.agents = list(self.possible_agents)
+        self._texts = dict.fromkeys(self.possible_agents, "")
         self._turn = Turn()
         self._turn = self._next({})
         return self._seen(), self._infos({})
@@ -156,7 +157,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         if not self.agents:
             return {}, {}, {}, {}, {}
         self._turn = self._next(actions)
-        agents, results = self.agents, {result.side: result for result in self._turn.results}
+        agents = self.agents
+        results = {result.side: result for result in self._turn.results}
         cut = any(result.cause in TRUNCATED for result in results.values())
         if results:
             self.agents = []
@@ -203,7 +205,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _enter(self, seed: int) -> None:
         if self._thread is None:
-            self._thread, self._games = LoopThread(), IdleGames()
+            self._thread = LoopThread()
+            self._games = IdleGames()
         config = MatchConfig(task=self._task, run=self._task.name, seed=seed, episodes=EPISODES)
         self._match = SeatedMatch(config, self._seats.values(), self._minds, game=self._game, processes=self._games)
         if self.render_mode is not None:

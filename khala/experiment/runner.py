@@ -148,7 +148,8 @@ class Runner:
             processes=self.processes,
         )
         done = await self.engine.play(job)
-        tries, crash = self._tries[match.key], _CRASHES.get(done.state, "")
+        tries = self._tries[match.key]
+        crash = _CRASHES.get(done.state, "")
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
             cost_usd = (await asyncio.to_thread(self.store.booked_usd)).get(match.key)
@@ -198,7 +199,8 @@ class Runner:
     def _too_dear(self, match: PlannedMatch) -> str:
         """Return why there is too little money for a match; "" if there is enough."""
         usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
-        left, short = self._left_usd(), self._short_usd.get(str(match.cell))
+        left = self._left_usd()
+        short = self._short_usd.get(str(match.cell))
         if left is not None and (left < LEAST_USD or left < SPARE * usual_usd):
             return f"the budget of {self.budget.usd:g} USD is used up ({self.spent.usd:.4f} were spent)"
         if left is not None and short is not None and left <= short:

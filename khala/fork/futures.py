@@ -163,7 +163,8 @@ async def play_all(
     Returns:
         what became of them, in their order.
     """
-    purse, room = Purse(budget_usd, len(forks)), asyncio.Semaphore(engine.slots)
+    purse = Purse(budget_usd, len(forks))
+    room = asyncio.Semaphore(engine.slots)
 
     async def one(fork: Fork) -> Future:
         async with room:

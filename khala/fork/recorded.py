@@ -57,7 +57,8 @@ async def repeated(trunk: Trunk, directory: Path, *, game: str) -> Repeated:
     """
     path = directory / "recorded.mcap"
     write_whole(trunk, path)
-    copy, results = Recording.open(path), _Results()
+    copy = Recording.open(path)
+    results = _Results()
     sc2path, _ = games.find(game)
     async with game_of(recorded_config(copy), sc2path) as sides:
         differences = await replay(copy, sides, observer=results)

@@ -118,7 +118,8 @@ class Table:
         Raises:
             KhalaError: the match failed; the text says what to do.
         """
-        place, known = self._places[seat], self._step
+        place = self._places[seat]
+        known = self._step
         playing = self._begin()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(within_s):
@@ -138,7 +139,8 @@ class Table:
         if place.seen is None or not place.waits:
             return Look(None, None, fates, results, self._over, others)
         place.looked = True
-        within_s, now_s = place.seen.observation.answer_within_s, asyncio.get_running_loop().time()
+        within_s = place.seen.observation.answer_within_s
+        now_s = asyncio.get_running_loop().time()
         left_s = None if within_s is None else max(0.0, within_s - (now_s - place.arrived_s))
         return Look(place.seen, left_s, fates, results, self._over, others)
 
@@ -174,7 +176,8 @@ class Table:
         if not place.looked:
             raise NotAsked("the time for an answer to what you saw is over: call observe, and answer what it says")
         self._match.act(seat, with_messages(reply, place.messages))
-        place.waits, place.messages = False, []
+        place.waits = False
+        place.messages = []
 
     def _begin(self) -> asyncio.Task[None]:
         if self._playing is None:
@@ -204,7 +207,9 @@ class Table:
             place.results += [result for result in turn.results if result.side == seat.side]
             seen = turn.asked.get(seat)
             if seen is not None and seen is not place.seen:
-                place.seen, place.looked, place.arrived_s = seen, False, asyncio.get_running_loop().time()
+                place.seen = seen
+                place.looked = False
+                place.arrived_s = asyncio.get_running_loop().time()
             place.waits = seen is not None
 
 

@@ -53,7 +53,8 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         """Take what the server decides, and the processes and places that its sessions share, or make its own."""
         self._settings = settings or Settings()
         self._places = places or Places(1)
-        self._games, self._owns_games = games or IdleGames(), games is None
+        self._games = games or IdleGames()
+        self._owns_games = games is None
         super().__init__(rubric=self._settings.rubric())
         self._choice = ResetOptions()
         self._match: SeatedMatch | None = None
@@ -103,12 +104,14 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         if wanted.seed is not None or wanted.choice() != self._choice or not goes_on:
             await self._leave()
             await self._enter(await asyncio.to_thread(self._settings.match, wanted, self._games))
-            self._choice, self._ended = wanted.choice(), ""
+            self._choice = wanted.choice()
+            self._ended = ""
         else:
             assert self._state.seed is not None
             self._state.seed += 1
         self._state.episode_id = wanted.episode_id or str(uuid.uuid4())
-        self._state.step_count, self._state.over = 0, False
+        self._state.step_count = 0
+        self._state.over = False
         self._briefed.clear()
         self._game_loop = 0
         await self._reset_rubric_async()

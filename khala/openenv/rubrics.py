@@ -64,7 +64,10 @@ class Battle(Rubric):
     def __init__(self, *, win: float = 1.0, value: float = 1.0, legality: float = 0.1, tempo: float = 0.1) -> None:
         """Take the weights."""
         super().__init__()
-        self.win, self.value, self.legality, self.tempo = Win(), Value(), Legality(), Tempo()
+        self.win = Win()
+        self.value = Value()
+        self.legality = Legality()
+        self.tempo = Tempo()
         self.weights = {"win": win, "value": value, "legality": legality, "tempo": tempo}
 
     def forward(self, action: Action, observation: KhalaObservation) -> float:

@@ -96,7 +96,8 @@ class Book:
         """
         if self.draining:
             return "the service is ending, and takes no more matches"
-        waiting, party = self.of("queued"), self._party(owner)
+        waiting = self.of("queued")
+        party = self._party(owner)
         if len(waiting) >= self.limits.queued:
             return f"{self.limits.queued} matches are waiting already: try again when some are over"
         if (mine := sum(self._party(entry.card.owner) == party for entry in waiting)) >= self.limits.queued - len(

@@ -55,7 +55,8 @@ def deeds(
     unread = max((one for one in rejections if one.reason == "too_many_actions"), key=_start, default=None)
     found: list[Deed] = []
     for call, start, end in calls:
-        why, ok = _taken(rejections, start, end), None
+        why = _taken(rejections, start, end)
+        ok = None
         if why is None and (ok := _was_accepted(call, accepted)) is None and unread and start > unread.start:
             why = unread  # one rejection stands for all calls behind it
         found.append(_deed(reply[start:end], call, start, False if why else ok, why, frames, screens))

@@ -58,7 +58,9 @@ class Opened:
         changed: Callable[[], None] = lambda: None,
         adviser: str = "",
     ) -> None:
-        self.id, self.path, self.shown = id, path, shown or path.name
+        self.id = id
+        self.path = path
+        self.shown = shown or path.name
         self._adviser = adviser
         self.index = Index(path)
         self.scanning = Scanning(self.index, changed)
@@ -81,7 +83,8 @@ class Opened:
 
     def view(self) -> bytes:
         """Return the `RunView`."""
-        card, line = self._card, self.line()
+        card = self._card
+        line = self.line()
         return RunView(
             line=line,
             sides=self.sides,

@@ -33,7 +33,8 @@ WIDTH, ROW, EDGE = 7.6, 0.27, 1.15
 """Inches: of the picture, of a row, and of what is above and below all rows."""
 LONGEST = 40
 """Characters of a name."""
-LEAST_KD, MOST_KD = 1 / 32, 32
+LEAST_KD = 1 / 32
+MOST_KD = 32
 """K/D outside of these stands at the edge, with an arrow."""
 WINS_CAPTION = "Games won, with Wilson intervals of 95 %."
 KD_CAPTION = (
@@ -130,7 +131,8 @@ def _draw(axes: Axes, row: _Row, value: Callable[[Summary], Interval], low: floa
     for number, one in row.dots:
         interval = value(one)
         y = row.y + (number - (colours - 1) / 2) * 0.42 if colours else row.y
-        left, right = max(low, interval.low), min(high, interval.high)
+        left = max(low, interval.low)
+        right = min(high, interval.high)
         colour = COLOURS[number]
         assert interval.value is not None
         known = math.isfinite(interval.high)

@@ -125,7 +125,8 @@ class Match:
         snapshots: Sequence[Snapshot] = await self.game.reset()
         self.pacing.begin()
         both = zip(self.sides, snapshots, strict=True)
-        tallies, at = [self._tally(side, snapshot) for side, snapshot in both], StepId(episode, 0)
+        tallies = [self._tally(side, snapshot) for side, snapshot in both]
+        at = StepId(episode, 0)
         lost: Mapping[Seat, str] = {}
         while not (lost or any(snapshot.ended for snapshot in snapshots) or at.step == self.config.task.max_steps):
             reports, snapshots, lost = await self._step(at, snapshots)
@@ -140,7 +141,8 @@ class Match:
         return results
 
     async def _step(self, at: StepId, snapshots: Sequence[Snapshot]) -> StepOutcome:
-        watch, loop = Stopwatch(), snapshots[0].game_loop
+        watch = Stopwatch()
+        loop = snapshots[0].game_loop
         lag_s = await self.pacing.until(loop)
         with watch.phase("observe"):
             for side, snapshot in zip(self.sides, snapshots, strict=True):

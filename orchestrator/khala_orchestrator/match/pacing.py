@@ -48,7 +48,8 @@ class WallClock:
 
     def begin(self) -> None:
         """Start the clock with the next step."""
-        self._before, self._lag_s = None, 0.0
+        self._before = None
+        self._lag_s = 0.0
 
     async def until(self, loop: int) -> float:
         """Wait until it is time for a game loop; return the seconds lost since the beginning."""

@@ -68,7 +68,8 @@ class Scenery:
         await showing
 
     async def _show(self, at: StepId, snapshots: Sequence[Snapshot]) -> None:
-        frames, whole = self._task.frames, await self._whole()
+        frames = self._task.frames
+        whole = await self._whole()
         if self._terrain is None or self._terrain.episode != at.episode:
             self._terrain = terrain_of(snapshots, whole, frames, run=self._run, episode=at.episode)
             self._before = None

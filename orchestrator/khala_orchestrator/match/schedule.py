@@ -126,7 +126,8 @@ class Schedule:
         due = [seat for seat in free if self._is_due(seat, loop, happened)]
         asked = [seat for seat in due if is_needed(seat)]
         for seat in asked:
-            self._places[seat].asked, self._places[seat].thinks = (at, loop), True
+            self._places[seat].asked = (at, loop)
+            self._places[seat].thinks = True
         return Asked(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
 
     def decide(self, answers: Mapping[Seat, Answer], loop: int) -> None:
@@ -136,14 +137,16 @@ class Schedule:
             assert place.asked is not None and place.thinks, f"{seat} was not asked"
             asked, asked_loop = place.asked
             due_loop = loop if self.clock.rule == "realtime" else asked_loop + loops_to_think(self.clock, answer)
-            place.thinks, place.decided = False, Decision(seat, answer, asked, asked_loop, due_loop)
+            place.thinks = False
+            place.decided = Decision(seat, answer, asked, asked_loop, due_loop)
 
     def due(self, loop: int) -> Sequence[Decision]:
         """Return the decisions that take effect now, in the order of the match; their agents are free afterwards."""
         due = [p.decided for p in self._places.values() if p.decided is not None and p.decided.due_loop <= loop]
         for decision in due:
             place = self._places[decision.seat]
-            place.decided, place.next_loop = None, loop + self.clock.step_loops
+            place.decided = None
+            place.next_loop = loop + self.clock.step_loops
         return due
 
     def loops(self, loop: int) -> int:

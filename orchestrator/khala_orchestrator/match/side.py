@@ -79,7 +79,8 @@ class Side:
     def __post_init__(self) -> None:
         task = self.task
         reach = {self.seat(a.name): [self.seat(other.name) for other in task.correspondents(a)] for a in task.agents}
-        self.observer, self.actor = Observer(task), Actor(task)
+        self.observer = Observer(task)
+        self.actor = Actor(task)
         advisers = {self.seat(adviser.name): adviser.role for adviser in task.advisers}
         memory = {agent.name: task.memory_of(agent) for agent in task.agents}
         self.notebook = Notebook({name: rule.notes for name, rule in memory.items()})
@@ -125,7 +126,8 @@ class Side:
     def _all_for(self, agent: str, loop: int) -> Feedback:
         new = self._pending[agent]
         messages = self.letters.of(agent, new.messages, loop)
-        notes, standing = self.notebook.of(agent), self.actor.standing.views(agent)
+        notes = self.notebook.of(agent)
+        standing = self.actor.standing.views(agent)
         return replace(new, messages=messages, notes=notes, standing=standing)
 
     def happened(self, agent: str) -> Collection[Trigger]:
@@ -282,7 +284,8 @@ class Side:
         )
         if any(decision.seat == seat for decision in played.decisions):
             rejections = self._repeats.counted(seat.agent, rejections, self._offers(seat.agent))
-        accepted, wrote = joint.accepted.get(seat.agent, ()), any(m.agent == seat.agent for m in played.post.taken)
+        accepted = joint.accepted.get(seat.agent, ())
+        wrote = any(m.agent == seat.agent for m in played.post.taken)
         received = played.post.received.get(seat, ())
         return Feedback(accepted, shortened(rejections), received, ordered=bool(accepted) or wrote)
 
@@ -343,5 +346,6 @@ def _too_old(decision: Decision, text: str, start: int) -> Rejection:
 def _joined(before: Feedback, more: Feedback) -> Feedback:
     """Return two feedbacks as one, the older first; of the messages those that still fit into an observation."""
     accepted, rejections = before.accepted + more.accepted, before.rejections + more.rejections
-    messages, ordered = newest(before.messages + more.messages), before.ordered or more.ordered
+    messages = newest(before.messages + more.messages)
+    ordered = before.ordered or more.ordered
     return Feedback(accepted, rejections, messages, ordered=ordered)

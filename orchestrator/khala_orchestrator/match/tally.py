@@ -44,7 +44,9 @@ class Tally:
             opponent: who it plays against, in words.
             undecided: the part of its decisions that a required agent may leave to others or to nobody.
         """
-        self._side, self._required, self._opponent = side, tuple(required), opponent
+        self._side = side
+        self._required = tuple(required)
+        self._opponent = opponent
         self._limit = undecided
         self._deeds = Deeds()
         self._first = self._last = snapshot

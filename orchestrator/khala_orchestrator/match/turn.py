@@ -203,7 +203,8 @@ class Turn:
             wait: wait until every open question is settled: answered, or past its deadline.
         """
         now = asyncio.get_running_loop().time
-        publish_s, asked = 0.0, list[_Question]()
+        publish_s = 0.0
+        asked = list[_Question]()
         for question in questions:
             began = now()
             asked.append(await self._publish(question, began))
@@ -213,7 +214,8 @@ class Turn:
             one.wait_until_answered(began)
         if wait:
             await self._settled()
-        wait_s, answers = now() - began, self._collect()
+        wait_s = now() - began
+        answers = self._collect()
         held_s = min(max(self._held_until - began, 0.0), wait_s)
         return replace(answers, publish_s=publish_s, wait_s=wait_s, held_s=held_s)
 
@@ -265,7 +267,8 @@ class Turn:
         await self._publishers[seat].put(asked.payload)
 
     def _end_hold(self, asked: _Question, now: float) -> None:
-        asked.held_at, self._held_until = None, now
+        asked.held_at = None
+        self._held_until = now
 
     # --- collecting ---------------------------------------------------------------------------------
 
@@ -366,13 +369,15 @@ class Turn:
             log.warning("agent %s sent no valid reply: %s", seat, error)
             self._ignored[seat] += 1
             if asked is not None and asked.reply is None and not asked.held:  # one that is away did not send it
-                asked.fault, asked.waiting = str(error), False
+                asked.fault = str(error)
+                asked.waiting = False
                 self._changed.set()
             return
         if asked is None or not asked.answers_to(reply):
             self._ignored[seat] += 1
             return
-        asked.reply, asked.arrived_at = reply, asyncio.get_running_loop().time()
+        asked.reply = reply
+        asked.arrived_at = asyncio.get_running_loop().time()
         asked.waiting = False
         if asked.held:
             self._end_hold(asked, asked.arrived_at)

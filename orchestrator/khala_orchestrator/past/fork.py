@@ -264,7 +264,8 @@ def _samples(recording: Recording, episode: int, until: int | None, sides: int) 
 
     What models were asked for these steps is among them, although it may be written later.
     """
-    at, left = -1, 0 if until == 0 else sides
+    at = -1
+    left = 0 if until == 0 else sides
     for sample in recording:
         message = sample.message
         if isinstance(message, Briefing | Observation | Report | Result):

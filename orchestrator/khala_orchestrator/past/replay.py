@@ -150,7 +150,8 @@ class RecordedTurn:
     def _taken_in(self, step: RecordedStep) -> Iterator[tuple[Seat, Answer]]:
         """Yield the answers that arrived in this step, whenever their questions were asked."""
         for agent in (agent for report in step.of(Report) for agent in report.agents):
-            seat, asked = Seat(agent.side, agent.agent), agent.asked_step
+            seat = Seat(agent.side, agent.agent)
+            asked = agent.asked_step
             yield seat, self._answer(step.episode, step.step if asked is None else asked, seat, agent)
 
     def _arrived(self, episode: int, asked: int, seat: Seat) -> Answer:
@@ -171,7 +172,8 @@ class RecordedTurn:
             message = sample.message if sample.is_of(Observation) else None
             if not isinstance(message, Observation) or message.step != step.step:
                 continue  # a host that goes on after it was killed asks again what was open, maybe for some steps
-            now, recorded = sent.get((message.side, message.agent), ""), sample.payload.decode()
+            now = sent.get((message.side, message.agent), "")
+            recorded = sample.payload.decode()
             missing.pop((message.side, message.agent), None)
             if now != recorded:
                 self._differ(message.agent, step, recorded, now)

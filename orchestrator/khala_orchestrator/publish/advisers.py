@@ -70,7 +70,8 @@ class AdviceInbox:
                 log.warning("advice under %s is dropped: %s", sample.key, error)
 
     def _read(self, sample: Sample) -> Advice:
-        address, advice = parse(sample.key), decode_as(Advice, sample.payload)
+        address = parse(sample.key)
+        advice = decode_as(Advice, sample.payload)
         if (advice.run, advice.side, advice.agent) != (self._run, address.side, address.agent):
             raise WrongKey(f"it is of {advice.side}/{advice.agent} in run {advice.run}")
         if Seat(advice.side, advice.agent) not in self._advisers:

@@ -200,7 +200,8 @@ class Exchanges:
         """Take what a recorded message says of them."""
         if address.topic not in {Topic.REPLY, Topic.EXCHANGE} or address.side is None or address.agent is None:
             return
-        seat, step = Seat(address.side, address.agent), (said.get("episode"), said.get("step"))
+        seat = Seat(address.side, address.agent)
+        step = (said.get("episode"), said.get("step"))
         if not isinstance(step[0], int) or not isinstance(step[1], int):
             return
         at = (step[0], step[1])

@@ -129,7 +129,8 @@ class Mailbox:
 
 def newest(messages: Sequence[Received]) -> tuple[Received, ...]:
     """Return the newest messages of several steps, as far as an observation has room for them."""
-    room, kept = MAX_RECEIVED_CHARACTERS, 0
+    room = MAX_RECEIVED_CHARACTERS
+    kept = 0
     for message in reversed(messages):
         room -= len(message.text)
         if room < 0:

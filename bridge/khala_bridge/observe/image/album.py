@@ -120,7 +120,8 @@ def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> 
 
 
 def _layer(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:
-    layer, extent = LAYERS[spec.layer], team.camera.size
+    layer = LAYERS[spec.layer]
+    extent = team.camera.size
     values = _values(spec, moment, team.camera, layer, inner_px(spec.size_px, extent))
     if values is not None:
         image = _on_canvas(spec, layer, extent, values)
@@ -128,7 +129,8 @@ def _layer(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:
 
 
 def _minimap_layer(spec: ImageSpec, moment: Moment, world: MapFrame) -> Iterator[Drawing]:
-    layer, extent = LAYERS[spec.layer], world.minimap_size
+    layer = LAYERS[spec.layer]
+    extent = world.minimap_size
     values = own.minimap_layer(moment.snapshot, layer.name, inner_px(spec.size_px, extent))
     if values is not None:
         image = _on_canvas(spec, layer, extent, values)

@@ -93,7 +93,8 @@ def _disc(name: str, side: Side, radius_px: int) -> Stamp:
     colour = style.colour or LIVERIES[side].body
     size = 2 * radius_px + 5
     large = np.zeros((size * _FINER, size * _FINER), np.uint8)
-    middle, radius = (size * _FINER // 2, size * _FINER // 2), radius_px * _FINER
+    middle = (size * _FINER // 2, size * _FINER // 2)
+    radius = radius_px * _FINER
     cv2.circle(large, middle, radius, round(255 * style.fill), -1)
     cv2.circle(large, middle, radius, 215 if name != "Power" else 90, 2 * _FINER)
     if style.figure == "bolts":

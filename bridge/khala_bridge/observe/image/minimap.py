@@ -146,7 +146,8 @@ def _name_teams(
     canvas: Canvas, teams: Sequence[TeamMark], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
 ) -> None:
     """Draw frames of the teams' screens, crosses at their heads, and their names."""
-    image, half = canvas.inner, round(CAMERA_WIDTH / 2 * scale)
+    image = canvas.inner
+    half = round(CAMERA_WIDTH / 2 * scale)
     marked = []
     for number, team in enumerate(teams):
         x, y = canvas.pixel(*world.minimap(team.camera.x, team.camera.y))
