@@ -132,7 +132,7 @@ def _make(directory: Path, make: Callable[[], list[Path]]) -> None:
     from khala_protocol.bus.certificate import read  # noqa: PLC0415
     from khala_protocol.certificates import certificates  # noqa: PLC0415
 
-    before = {one.path: one for one in certificates(directory) if not one.has_expired}
+    before = {certificate.path: certificate for certificate in certificates(directory) if not certificate.has_expired}
     for place in make():
         made = read(place / "certificate.pem")
         at = f", which listens at {', '.join(made.hosts)}" if made.hosts else ""

@@ -242,7 +242,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _rewards(self, agents: Sequence[str], results: Mapping[str, Result]) -> dict[str, float]:
         by_side = {
-            side: self._reward([one for one in self._turn.reports if one.side == side], results.get(side))
+            side: self._reward([report for report in self._turn.reports if report.side == side], results.get(side))
             for side in {seat.side for seat in self._seats.values()}
         }
         return {agent: by_side[self._seats[agent].side] for agent in agents}
@@ -251,7 +251,9 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         return {agent: self._info(seat, results.get(seat.side)) for agent, seat in self._seats.items()}
 
     def _info(self, seat: Seat, result: Result | None) -> dict[str, Any]:
-        heard = (one for report in self._turn.reports for one in report.agents if Seat(one.side, one.agent) == seat)
+        heard = (
+            agent for report in self._turn.reports for agent in report.agents if Seat(agent.side, agent.agent) == seat
+        )
         reports = [one.but(latency_s=None) for one in heard]
         info: dict[str, Any] = {"asked": seat in self._turn.asked, "reports": reports}
         if seat in self._turn.asked:

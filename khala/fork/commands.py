@@ -129,7 +129,9 @@ def _progress(forks: int) -> Iterator[Callable[[Future], None]]:
 
 def _ending(future: Future) -> str:
     named = len(future.results) > 1
-    return future.error or ", ".join(f"{one.side}: {one.outcome}" if named else one.outcome for one in future.results)
+    return future.error or ", ".join(
+        f"{result.side}: {result.outcome}" if named else result.outcome for result in future.results
+    )
 
 
 def _until_interrupted(work: Coroutine[Any, Any, T], what_is_left: str) -> T:

@@ -134,11 +134,11 @@ def _fates(report: Report) -> JsonValue:
         "value killed": report.killed_value,
         "value lost": report.lost_value,
         "agents": {
-            one.agent: {
-                "fate": one.fate,
-                "accepted": list(one.accepted),
-                "refused": [f"{rejection.text}: {rejection.message}" for rejection in one.rejections],
+            agent.agent: {
+                "fate": agent.fate,
+                "accepted": list(agent.accepted),
+                "refused": [f"{rejection.text}: {rejection.message}" for rejection in agent.rejections],
             }
-            for one in report.agents
+            for agent in report.agents
         },
     }

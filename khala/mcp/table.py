@@ -200,9 +200,9 @@ class Table:
         self._over = turn.over
         for report in turn.reports:
             self._step = report
-            for one in report.agents:
-                if place := self._places.get(Seat(report.side, one.agent)):
-                    place.fates.append(one)
+            for agent in report.agents:
+                if place := self._places.get(Seat(report.side, agent.agent)):
+                    place.fates.append(agent)
         for seat, place in self._places.items():
             place.results += [result for result in turn.results if result.side == seat.side]
             seen = turn.asked.get(seat)

@@ -271,9 +271,9 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     def _observed(self) -> KhalaObservation:
         turn, before = self._turn, self._game_loop
         reports = [one for one in turn.reports if one.side == self._state.side]
-        agents = [one for report in reports for one in report.agents if one.agent in self._seats]
-        results = [one for one in turn.results if one.side == self._state.side]
-        loops = [seen.observation.game_loop for seen in turn.asked.values()] + [one.game_loop for one in results]
+        agents = [agent for report in reports for agent in report.agents if agent.agent in self._seats]
+        results = [result for result in turn.results if result.side == self._state.side]
+        loops = [seen.observation.game_loop for seen in turn.asked.values()] + [result.game_loop for result in results]
         self._game_loop = max([before, *loops])
         asked = {name: turn.asked[seat] for name, seat in self._seats.items() if seat in turn.asked}
         views = {name: view_of(seen, briefed=name in self._briefed) for name, seen in asked.items()}
@@ -281,11 +281,13 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         return KhalaObservation(
             episode_id=self._state.episode_id or "",
             agents=views,
-            step=max([seen.observation.step for seen in asked.values()] + [one.steps for one in results], default=0),
+            step=max(
+                [seen.observation.step for seen in asked.values()] + [result.steps for result in results], default=0
+            ),
             killed_value=sum(report.killed_value or 0.0 for report in reports),
             lost_value=sum(report.lost_value or 0.0 for report in reports),
-            accepted=sum(len(one.accepted) for one in agents),
-            refused=sum(len(one.rejections) for one in agents),
+            accepted=sum(len(agent.accepted) for agent in agents),
+            refused=sum(len(agent.rejections) for agent in agents),
             elapsed_s=(self._game_loop - before) / LOOPS_PER_S,
             result=outcome_of(results[0]) if results else None,
             done=self._state.over,

@@ -232,9 +232,9 @@ class SeatedMatch:
 
     def _end_episode(self) -> None:
         results, self._results = self._results, []
-        aborted = any(one.outcome == "aborted" for one in results)
+        aborted = any(result.outcome == "aborted" for result in results)
         self._over = aborted or results[0].episode == self._config.episodes - 1
-        theirs = tuple(one for one in results if one.side in self._sides)
+        theirs = tuple(result for result in results if result.side in self._sides)
         self._ended.append(Turn(reports=self._take_reports(), results=theirs, over=self._over))
         self._questions.changed.set()
 

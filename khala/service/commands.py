@@ -99,7 +99,7 @@ async def _serve(
             bus, BusConfig(connect=(socket,)), pool.take, out, limits, drain_s, listeners, exchanges=traced,
             used_mb=lambda: memory.rss_mb(os.getpid()),
         )  # fmt: skip
-        endpoints = [one for one in bus.endpoints if one != socket]
+        endpoints = [endpoint for endpoint in bus.endpoints if endpoint != socket]
         about = {"endpoints": endpoints, "matches": limits.matches, "memory_mb": limits.memory_mb, "metrics_port": port}
         if as_json:
             typer.echo(json.dumps(about))

@@ -266,7 +266,7 @@ def _from_player(player: Json, side: str) -> Json:
 def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     found = {f"{name}/{side}": value for name, value in view["resources"].items() if name != "promised"}
     if counts := view.get("counts"):
-        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in WORKERS)
+        found[f"workers/{side}"] = sum(count["ready"] for count in counts["units"] if count["type"] in WORKERS)
     if army := view.get("army"):
         found[f"army_value/{side}"] = army["value"]
         if alone:

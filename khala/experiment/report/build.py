@@ -79,7 +79,7 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
         Section("Not counted", tables=_some(not_counted(summaries))),
         Section("How it was played", tables=(conditions(store, played, rows),)),
     ]
-    sections = [one for one in sections if one.tables or one.figures]
+    sections = [section for section in sections if section.tables or section.figures]
     found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
     paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
     return Report(Document(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)

@@ -253,7 +253,9 @@ class Side:
             episode=at.episode,
             step=at.step,
             game_loop=result.snapshot.game_loop,
-            agents=tuple(self._agent(at, one, played, heard[one.seat.agent]) for one in played.decisions),
+            agents=tuple(
+                self._agent(at, decision, played, heard[decision.seat.agent]) for decision in played.decisions
+            ),
             messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in played.post.taken),
             advisers=tuple(m.agent for m in played.post.taken if m.human),
             functions=result.played.functions,

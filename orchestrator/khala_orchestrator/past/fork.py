@@ -125,7 +125,7 @@ def trunk_of(recording: Recording, episode: int = 0) -> Trunk:
     loops = _loops(recording, episode, sides=len(config.task.per_side()))
     if not loops:
         raise ForkError(f"{recording.path} has no complete step of episode {episode}")
-    results = [one for one in recording.results if one.episode == episode and one.outcome != "aborted"]
+    results = [result for result in recording.results if result.episode == episode and result.outcome != "aborted"]
     with recording.path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     alone = config.model_copy(update={"seed": config.seed + episode, "episodes": 1, "labels": {}})

@@ -166,7 +166,7 @@ class RecordedTurn:
         return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
-        sent = {(one.side, one.agent): encode(one).decode() for one in observations}
+        sent = {(observation.side, observation.agent): encode(observation).decode() for observation in observations}
         missing = dict(sent)
         for sample in step.samples:
             message = sample.message if sample.is_of(Observation) else None

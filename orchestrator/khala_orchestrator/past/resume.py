@@ -160,7 +160,7 @@ class ResumedTurn:
 
     async def _again(self, recorded: RecordedTurn, questions: list[Question], *, wait: bool) -> Answers:
         answers = await recorded.ask(questions, wait=wait)
-        self._open |= {Seat(one.observation.side, one.observation.agent): one for one in questions}
+        self._open |= {Seat(question.observation.side, question.observation.agent): question for question in questions}
         for seat in answers.by_seat:
             del self._open[seat]
         return answers

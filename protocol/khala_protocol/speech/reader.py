@@ -347,7 +347,7 @@ class _Walk:
     def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
         """Return the arguments at this place, if all of them are tags and points; otherwise none."""
         args = read_arguments(self._plain[start:stop])
-        return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
+        return args if all(not isinstance(arg, str) or arg.startswith("0x") for arg in args) else ()
 
     def _words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
         """Read a message, a note or a standing order, whose words begin at `at`."""

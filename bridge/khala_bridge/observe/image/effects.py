@@ -74,11 +74,11 @@ def draw_patches(image: Image, patches: Iterable[Patch], place: Place, scale: fl
 
 def draw_orders(image: Image, subjects: Iterable[Subject], place: Place) -> None:
     """Draw the goals and targets of units: a line with a dot at its end, red for attacks, green for the rest."""
-    for one in subjects:
-        if one.target is None:
+    for subject in subjects:
+        if subject.target is None:
             continue
-        colour = palette.ATTACKING if one.order in _ATTACKS else palette.MOVING
-        start, end = place(one.x, one.y), place(*one.target)
+        colour = palette.ATTACKING if subject.order in _ATTACKS else palette.MOVING
+        start, end = place(subject.x, subject.y), place(*subject.target)
         cv2.line(image, start, end, colour, 1, cv2.LINE_AA)
         cv2.circle(image, end, 2, colour, -1, cv2.LINE_AA)
 
