@@ -46,7 +46,8 @@ def init(
     """Make an authority, and certificates for a router and for the host.
 
     An authority that is there already stays, and the two get new certificates; copies of the old ones stay good. The
-    folder `ca` should not leave this machine: who has its key can be anyone.
+    folder `ca` should not leave this machine: anyone who holds its key can
+    impersonate any agent.
     """
     from khala_protocol.certificates import make_authority  # noqa: PLC0415  # the library is not for --help
 

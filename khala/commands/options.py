@@ -101,7 +101,9 @@ Model = Annotated[
 ]
 ModelName = Annotated[
     str | None,
-    typer.Option(help="Another model of the endpoint; scripted has skilled, focus-fire, random-legal, silent."),
+    typer.Option(
+        help="Another model of the endpoint; the scripted model plays skilled, focus-fire, random-legal or silent."
+    ),
 ]
 BaseUrl = Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")]
 PolicyName = Annotated[

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from khala.experiment.store import Store
 
 LEAST_USD = 1e-6
-"""Less is nothing: sums of money are not exact."""
+"""Smaller sums are ignored: floating-point money is not exact."""
 SPARE = 1.2
 """A match is begun with so many times what is usual: its last requests are held at the most that they may cost."""
 ROOM = 2.0

@@ -90,7 +90,7 @@ def fork(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Ask what would have been if others had decided from a step of a recorded match on.
+    """Replay a recorded match up to a step, and let other agents play on from there.
 
     The match is played again with its recorded decisions up to the step, where each observation must be the recorded
     one; then others decide, to the end, in this many forks. Each is recorded like any match. A table sets what became

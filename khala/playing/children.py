@@ -42,7 +42,7 @@ class ChildDied(KhalaError):
 
 
 class Spawn(Protocol):
-    """How a process comes to be."""
+    """How a process is started."""
 
     async def __call__(
         self, arguments: Sequence[str], environ: Mapping[str, str], log: Path

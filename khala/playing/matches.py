@@ -51,7 +51,7 @@ def new_or_resumed(
 
 
 def refuse_others(config: MatchConfig | None, **given: Any) -> None:
-    """Refuse options that say something else than the match that is gone on with.
+    """Refuse options that contradict the resumed match.
 
     Args:
         config: the match; None if it is not known here, and no option can be seen to say the same.
@@ -67,9 +67,7 @@ def refuse_others(config: MatchConfig | None, **given: Any) -> None:
         if name != "assemble_s" and value is not None and (config is None or not _says(config, name, value))
     ]
     if others:
-        raise ConfigError(
-            f"--resume goes on with a match as it was begun: leave out {', '.join(others)}, or begin a new one"
-        )
+        raise ConfigError(f"a resumed match keeps its options: leave out {', '.join(others)}, or begin a new one")
 
 
 def _option(name: str) -> str:

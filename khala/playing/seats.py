@@ -107,7 +107,7 @@ class SeatedMatch:
 
     Attributes:
         seats: those that the caller plays.
-        broker: of the bus, for whoever wants to listen to it.
+        broker: endpoint of the bus, for external listeners.
     """
 
     def __init__(

@@ -181,7 +181,7 @@ class Book:
             entry.update(episode=report.episode, step=report.step + 1, cost_usd=cost_usd)
 
     def result(self, result: Result) -> None:
-        """Take the result of an episode, which a match that was gone on with brings again."""
+        """Take the result of an episode, which a resumed match reports again."""
         if (entry := self.entry(result.run)) is not None:
             known = entry.results | {(result.episode, result.side): result.outcome}
             entry.results = known

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _MINDS = TypeAdapter(Minds)
 ASSEMBLE_S = 60.0
-"""How long a match that is gone on with waits for its agents."""
+"""How long a resumed match waits for its agents."""
 
 
 def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, dict[str, Minds]]:

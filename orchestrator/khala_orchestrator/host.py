@@ -141,8 +141,8 @@ def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> A
 class _PublishingObserver:
     """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
 
-    While a step takes long, what there is of it is flushed, too: who follows the file sees the map that agents think
-    about. A context manager.
+    During a long step it flushes what was recorded so far, so that a reader of the file sees the map that the agents
+    are thinking about. A context manager.
 
     Attributes:
         live: False while a recording is played again: then it only keeps the briefings, and the map of the open step.

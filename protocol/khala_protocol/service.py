@@ -50,7 +50,7 @@ class Submit(Wire):
 
 
 class Stop(Wire):
-    """Client → service: end a match; its recording stays, and can be gone on with."""
+    """Client → service: end a match; its recording stays, and can be resumed."""
 
     kind: Literal["stop"] = "stop"
     number: str

@@ -1,4 +1,4 @@
-"""A match that is gone on with stays as it was begun: which options --resume takes, and which it refuses."""
+"""A resumed match keeps its options: which options --resume takes, and which it refuses."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_options_that_say_the_same_as_the_recording_are_taken(out: Path, given: 
 def test_options_that_say_something_else_are_refused_by_name(out: Path, given: dict[str, Any], named: str) -> None:
     with pytest.raises(ConfigError) as caught:
         resume(out, **given)
-    words = f"--resume goes on with a match as it was begun: leave out {named}, or begin a new one"
+    words = f"a resumed match keeps its options: leave out {named}, or begin a new one"
     assert str(caught.value) == words
 
 

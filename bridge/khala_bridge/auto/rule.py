@@ -103,7 +103,7 @@ class RuleOrder:
 
 
 class NotAvailable(Exception):
-    """The rule finds no order; the message is a sentence for the model."""
+    """The rule finds no order; the message tells the model why."""
 
     def __init__(
         self,

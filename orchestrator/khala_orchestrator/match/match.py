@@ -201,7 +201,7 @@ class Match:
         return next(side for side in self.sides if side.name == seat.side)
 
     def _whole(self, at: StepId, reports: Sequence[Report], results: Sequence[StepResult]) -> Sequence[Report]:
-        """Return the reports of the last step of an episode, with the decisions that came to nothing."""
+        """Return the reports of the last step of an episode, with the decisions that were dropped."""
         loop = results[0].snapshot.game_loop
         pending = self.schedule.drop(loop)
         dropped = [side.dropped(at, pending, loop) for side in self.sides]

@@ -36,7 +36,7 @@ FORKED = "the match was forked here: all decisions before are recorded ones"
 
 
 class ResumeError(RecordingError):
-    """A recorded match cannot be gone on with."""
+    """A recorded match cannot be resumed."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Unfinished:
     """A match that was not played to its end.
 
     Attributes:
-        recording: what there is of it.
+        recording: the part that was written.
         config: the match, as it was recorded.
         results: of the episodes that are over.
         steps: number of complete steps of the next episode to play.
@@ -171,7 +171,7 @@ def _check_same(recorded: RecordedTurn) -> None:
         first = recorded.differences[0]
         raise ResumeError(
             f"the new game differs from the recorded one at step {first.step} of episode {first.episode}, in what "
-            f"{first.agent} sees: the match cannot be gone on with; is it the same version of Khala?"
+            f"{first.agent} sees: the match cannot be resumed; is it the same version of Khala?"
         )
 
 
