@@ -67,12 +67,13 @@ cover: install-tests ## Branch coverage per package by the tests of `make test`;
 	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
 	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
-check: install-tests ## Lint, format, types, import contracts, and rows of bench/doors for every command
+check: install-tests ## Lint, format, types, import contracts, rows of bench/doors for every command, and habits of the code
 	$(RUN)ruff check .
 	$(RUN)ruff format --check .
 	$(RUN)mypy
 	$(RUN)lint-imports --no-logo
 	$(RUN)python -m bench.doors --check
+	$(RUN)python -m bench.house
 
 format: install ## Format the code and fix what the linter can
 	$(RUN)ruff format .

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any, get_args
 from rich.console import Console
 from rich.table import Table
 
-from khala import games
-from khala.hosting import game_of
+from khala.playing import games
+from khala.playing.hosting import game_of
 from khala.testing import replay_host
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.figures import Figure
 from bench.smac import package_root
-from khala import games
+from khala.playing import games
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bench.smac import package_root
-from khala import games
 from khala.env.numeric import MAPS, StarCraft2Env
+from khala.playing import games
 from khala_simulator.api.game import HostedGame
 from khala_simulator.process.replay import Replay
 from khala_simulator.tables.versions import DEFAULT_VERSION

@@ -35,8 +35,8 @@ from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer, shortened
 from khala_bridge.observe.text import Page, reply
 from khala_orchestrator.config import load_task
-from khala_orchestrator.mailbox import Mailbox
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.words.mailbox import Mailbox
 from khala_protocol.codec import decode, decode_as, encode
 from khala_protocol.errors import PeerError
 from khala_protocol.messages import MESSAGE_TYPES, Message, Reply, Usage

@@ -32,8 +32,8 @@ from rich.console import Console
 from khala_agents.config import AgentsFile, ModelConfig
 from khala_bridge.task.config import TaskConfig
 from khala_configs import CONFIGS
-from khala_orchestrator.replay import recorded_config
-from khala_orchestrator.transcript import StepSelection, summary, transcript
+from khala_orchestrator.past.replay import recorded_config
+from khala_orchestrator.past.transcript import StepSelection, summary, transcript
 from khala_protocol.configfile import load
 from khala_protocol.errors import KhalaError, RecordingError
 from khala_protocol.recording import Recorder, Recording, read

@@ -22,9 +22,9 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING, get_args
 
-from khala import games
 from khala.experiment.statistics import wilson
-from khala.hosting import hosted
+from khala.playing import games
+from khala.playing.hosting import hosted
 from khala_agents.scripted.players import PLAYERS, PlayerName
 from khala_bridge.task.maps import Difficulty, Race
 from khala_bridge.task.opponent import Opponent

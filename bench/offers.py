@@ -24,7 +24,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from khala import games
+from khala.playing import games
 from khala_agents.scripted.players import PLAYERS, random_calls
 from khala_agents.scripted.reading import read
 from khala_bridge.act import Actor, executor_of

@@ -10,7 +10,8 @@
 Straight on the engine, without the SC2 API. A pair plays each seed from both seats in turn. A game that is not over
 after `--minutes` goes to the side whose units and structures cost more, if it has a quarter more; else it is drawn.
 The levels were tuned on seeds below 100; the ladder begins with seed 100. `--json` for one JSON object. With `--log`
-each game is written down when it is over, and a long ladder can be cut and gone on with; `--games 0` prints the file.
+each game is written down when it is over, and a long ladder can be interrupted and continued; `--games 0`
+prints the file.
 """
 
 from __future__ import annotations

@@ -27,8 +27,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from khala.local import play
-from khala.minds import Minds
+from khala.playing.local import play
+from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import LOOPS_PER_S, Report
 from khala_protocol.recording import Recording

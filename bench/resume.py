@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.processes import Processes, free_port, until_listening
-from khala.local import shares
+from khala.playing.local import shares
 from khala.testing import replay_host
 from khala_orchestrator.config import load_task
 from khala_protocol.bus import Delivery

@@ -27,14 +27,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from khala.hosting import game_of
+from khala.playing.hosting import game_of
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
-from khala_orchestrator.match import Match, SilentObserver
+from khala_orchestrator.match.match import Match, SilentObserver
+from khala_orchestrator.match.scenery import Scenery
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.turn import Answer, Answers
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.scenery import Scenery
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import Reply
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from khala_bridge.game.game import Sides
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
-    from khala_orchestrator.schedule import StepId
-    from khala_orchestrator.turn import Question
+    from khala_orchestrator.match.schedule import StepId
+    from khala_orchestrator.match.turn import Question
     from khala_protocol.messages import Report, Scene, Terrain
 
 KINDS = ("none", "seen", "whole")

@@ -17,8 +17,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from khala.matches import new
-from khala.minds import Minds
+from khala.playing.matches import new
+from khala.playing.minds import Minds
 from khala.service import client
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig

@@ -27,7 +27,7 @@ from rich.table import Table
 
 from bench.orphans import processes_of
 from bench.processes import Processes, free_port
-from khala.local import shares
+from khala.playing.local import shares
 from khala_orchestrator.config import change, load_task
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig

@@ -35,7 +35,7 @@ IMPORTS = {
     "khala.cli": "every command",
     "khala_agents.commands": "agents",
     "khala_bridge.game.pysc2_game": "PySC2 and the bridge",
-    "khala.local": "the host",
+    "khala.playing.local": "the host",
 }
 COUNT = "; import sys; print(len(sys.modules))"
 MATCH = ("run", "2s3z_pair", "--max-steps", "1", "--latency", "0")
@@ -113,7 +113,12 @@ def held(host: psutil.Process) -> list[dict[str, Any]]:
 
 def _name(process: psutil.Process) -> str:
     line = " ".join(process.cmdline())
-    known = {"khala_simulator": "game", "khala.spare": "agents", "khala agent": "agents", "khala llm": "endpoint"}
+    known = {
+        "khala_simulator": "game",
+        "khala.playing.spare": "agents",
+        "khala agent": "agents",
+        "khala llm": "endpoint",
+    }
     return next((name for mark, name in known.items() if mark in line), "host")
 
 

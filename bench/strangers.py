@@ -34,12 +34,12 @@ from bench.bus import open_raw
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.announce import Announcer
-from khala_orchestrator.cards import briefing, run_card
 from khala_orchestrator.config import MatchConfig, load_task
-from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.match.cards import briefing, run_card
+from khala_orchestrator.match.turn import Question, Turn
+from khala_orchestrator.publish.announce import Announcer
+from khala_orchestrator.publish.record import Listener, RecordingBus
 from khala_orchestrator.roster import Roster, Seat
-from khala_orchestrator.turn import Question, Turn
 from khala_protocol.access import REPLY_BYTES, router_settings
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig, TlsFiles, host_port_of

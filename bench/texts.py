@@ -24,23 +24,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from khala.hosting import game_of
+from khala.playing.hosting import game_of
 from khala_agents.prompt import Prompt
 from khala_agents.scripted.players import PLAYERS
 from khala_bridge.observe.text import SECTIONS, tokens
-from khala_orchestrator.cards import briefing
 from khala_orchestrator.config import MatchConfig, change, load_task
-from khala_orchestrator.match import Match, SilentObserver
+from khala_orchestrator.match.cards import briefing
+from khala_orchestrator.match.match import Match, SilentObserver
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.turn import Answer, Answers
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Reply
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from khala_orchestrator.turn import Question
+    from khala_orchestrator.match.turn import Question
     from khala_protocol.messages import Report, Result
 
 

@@ -32,20 +32,20 @@ from rich.table import Table
 
 from bench.figures import Figure
 from bench.original import step_s
-from khala import games
-from khala.children import Children
-from khala.hosting import game_of
-from khala.local import shares
-from khala.local_bus import LOOPBACK, local_endpoint
+from khala.playing import games
+from khala.playing.children import Children
+from khala.playing.hosting import game_of
+from khala.playing.local import shares
+from khala.playing.local_bus import LOOPBACK, local_endpoint
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
 from khala_bridge.state.teams import Team, TeamRoster
-from khala_orchestrator.announce import Announcer
-from khala_orchestrator.cards import briefing
 from khala_orchestrator.config import MatchConfig, load_task
+from khala_orchestrator.match.cards import briefing
+from khala_orchestrator.match.turn import Question, Turn
+from khala_orchestrator.publish.announce import Announcer
 from khala_orchestrator.roster import Roster as Attendance
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.turn import Question, Turn
 from khala_protocol.access import router_settings
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe import SideObservation
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import AgentConfig, TaskConfig
-    from khala_orchestrator.turn import Answer, Answers
+    from khala_orchestrator.match.turn import Answer, Answers
     from khala_protocol.bus import Bus, Sample, Subscription
 
 GOALS_MS = {1: 8, 8: 15, 32: 40, 128: 130}

@@ -10,13 +10,13 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala.hosting import game_of
+from khala.playing.hosting import game_of
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig
-from khala_orchestrator.match import Match, SilentObserver
+from khala_orchestrator.match.match import Match, SilentObserver
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.turn import Answer, Answers
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Reply
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala_bridge.task.config import TaskConfig
-    from khala_orchestrator.turn import Question
+    from khala_orchestrator.match.turn import Question
     from khala_protocol.messages import Result
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from khala_bridge.task.config import TaskConfig
-    from khala_orchestrator.turn import Question
+    from khala_orchestrator.match.turn import Question
     from khala_protocol.messages import ImageRef
 
 DOCS = Path(__file__).parent

@@ -1,4 +1,4 @@
-"""`python -m khala` is `khala`, and what `khala.children` starts."""
+"""`python -m khala` is `khala`, and what `khala.playing.children` starts."""
 
 if __name__ == "__main__":
     from khala_protocol.parent_watch import end_with_parent

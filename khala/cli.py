@@ -7,6 +7,7 @@ pydantic, no game and no bus. `tests/khala/test_imports.py` holds them to it.
 import logging
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -17,48 +18,27 @@ import khala_orchestrator.cli
 import khala_simulator.cli
 import khala_simulator.process.install
 from khala import __version__
-from khala.actions import EPILOG as ACTIONS_EPILOG
-from khala.actions import actions
 from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
+from khala.commands.actions import EPILOG as ACTIONS_EPILOG
+from khala.commands.actions import actions
+from khala.commands.help import Group
+from khala.commands.keys import app as keys
+from khala.commands.options import (
+    Game,
+    MatchOptions,
+    MindOptions,
+    Out,
+    Resume,
+    RunName,
+    Task,
+    with_options,
+)
 from khala.dataset.cli import app as dataset
 from khala.experiment.cli import app as experiment
 from khala.fork.cli import FORK_EPILOG, fork
-from khala.help import Group
-from khala.keys import app as keys
 from khala.knowledge.cli import app as knowledge
 from khala.mcp.cli import MCP_EPILOG, mcp
 from khala.openenv.cli import OPENENV_EPILOG, openenv
-from khala.options import (
-    Assemble,
-    BaseUrl,
-    BudgetUsd,
-    Episodes,
-    ExecutorName,
-    Fallback,
-    Game,
-    Grace,
-    Images,
-    Latency,
-    MaxSteps,
-    MaxWait,
-    Memory,
-    Mind,
-    Model,
-    ModelName,
-    Opponent,
-    Out,
-    PolicyName,
-    Resume,
-    Rhythm,
-    Rule,
-    RunName,
-    Seed,
-    SideModel,
-    Speed,
-    StepLoops,
-    Task,
-    ThinkingLoops,
-)
 from khala.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
 from khala.view.cli import VIEW_EPILOG, view
 from khala_agents.cli import Trust
@@ -103,38 +83,16 @@ Examples:\n
 """
 
 
+@with_options
 def run(
     task: Task = None,
     *,
     resume: Resume = None,
-    model: Model = "scripted",
-    model_name: ModelName = None,
-    base_url: BaseUrl = None,
-    policy: PolicyName = None,
-    fallback: Fallback = None,
-    blue: Mind = None,
-    red: Mind = None,
-    side_model: SideModel = None,
-    budget_usd: BudgetUsd = None,
-    latency: Latency = 0.2,
+    minds: MindOptions,
     game: Game = "simulator",
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
-    opponent: Opponent = None,
-    seed: Seed = None,
-    episodes: Episodes = None,
-    executor: ExecutorName = None,
-    clock: Rule = None,
-    max_wait: MaxWait = None,
-    step_loops: StepLoops = None,
-    rhythm: Rhythm = None,
-    thinking_loops: ThinkingLoops = None,
-    speed: Speed = None,
-    grace: Grace = None,
-    max_steps: MaxSteps = None,
-    memory: Memory = None,
-    images: Images = None,
+    match: MatchOptions,
     run: RunName = None,
-    assemble: Assemble = 60.0,
     out: Out = Path("runs"),
     as_json: Json = False,
 ) -> None:
@@ -143,23 +101,13 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.run import Wanted  # noqa: PLC0415  # see there
-    from khala.run import run as play  # noqa: PLC0415
+    from khala.commands.run import Wanted  # noqa: PLC0415  # see there
+    from khala.commands.run import run as play  # noqa: PLC0415
 
-    match = {
-        "seed": seed, "episodes": episodes, "assemble_s": assemble, "executor": executor, "rule": clock,
-        "max_wait_s": max_wait, "step_loops": step_loops, "rhythm": rhythm, "thinking_loops": thinking_loops,
-        "speed": speed, "grace_s": grace, "max_steps": max_steps, "memory": memory, "images": images,
-        "opponent": opponent,
-    }  # fmt: skip
-    minds = {
-        "model": model, "model_name": model_name, "base_url": base_url, "policy": policy, "budget_usd": budget_usd,
-        "latency_s": latency, "fallback": fallback,
-    }  # fmt: skip
-    wanted = Wanted(task, resume, run, out, game, match, minds, side_model or (), {"blue": blue, "red": red})
-    play(wanted, as_json=as_json)
+    play(Wanted(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
 
 
+@with_options
 def host(
     task: Task = None,
     *,
@@ -174,21 +122,7 @@ def host(
     insecure: Insecure = False,
     game: Game = "simulator",
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
-    opponent: Opponent = None,
-    seed: Seed = None,
-    episodes: Episodes = None,
-    executor: ExecutorName = None,
-    clock: Rule = None,
-    max_wait: MaxWait = None,
-    step_loops: StepLoops = None,
-    rhythm: Rhythm = None,
-    thinking_loops: ThinkingLoops = None,
-    speed: Speed = None,
-    grace: Grace = None,
-    max_steps: MaxSteps = None,
-    memory: Memory = None,
-    images: Images = None,
-    assemble: Assemble = 60.0,
+    match: MatchOptions,
     out: Out = Path("runs"),
     as_json: Json = False,
 ) -> None:
@@ -196,16 +130,11 @@ def host(
 
     With --listen the host is its own router; with --connect it uses one, see `khala router`.
     """
-    from khala.commands import bus_of, until_interrupted  # noqa: PLC0415  # see there
-    from khala.local import play_hosted  # noqa: PLC0415
-    from khala.matches import new_or_resumed  # noqa: PLC0415
+    from khala.commands.host import bus_of, until_interrupted  # noqa: PLC0415  # see there
+    from khala.playing.local import play_hosted  # noqa: PLC0415
+    from khala.playing.matches import new_or_resumed  # noqa: PLC0415
 
-    config, past = new_or_resumed(
-        task, resume, run, out, seed=seed, episodes=episodes, assemble_s=assemble,
-        executor=executor, rule=clock, max_wait_s=max_wait, step_loops=step_loops, rhythm=rhythm,
-        thinking_loops=thinking_loops,
-        speed=speed, grace_s=grace, max_steps=max_steps, memory=memory, images=images, opponent=opponent,
-    )  # fmt: skip
+    config, past = new_or_resumed(task, resume, run, out, **asdict(match))
     bus = bus_of(config, connect, listen, tls, insecure=insecure)
     until_interrupted(
         config, as_json, lambda watch: play_hosted(config, bus, out / config.run, game=game, watch=watch, past=past)
@@ -236,8 +165,8 @@ def advise(
     Each line of stdin is a message, which agents read in their next observation; `@Stalkers fall back` is for one of
     them. The recording marks it as human, and the result counts it.
     """
-    from khala.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
-    from khala_orchestrator.mailbox import EVERYONE  # noqa: PLC0415
+    from khala.commands.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
+    from khala_orchestrator.words.mailbox import EVERYONE  # noqa: PLC0415
 
     names = {what: check_name(value, what) for what, value in (("run", run), ("side", side), ("name", name))}
     adviser = Adviser(**names, recipient=agent or EVERYONE)
@@ -258,7 +187,7 @@ def doctor(
     as_json: Json = False,
 ) -> None:
     """Look at this machine as a match would, and say what to do."""
-    from khala import commands  # noqa: PLC0415  # see there
+    from khala.commands import host as commands  # noqa: PLC0415  # see there
 
     commands.doctor(tls, game, as_json=as_json)
 

@@ -50,7 +50,8 @@ def connect(path: Path, schema: str, version: int | None = None) -> sqlite3.Conn
     db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
     try:
         db.executescript("pragma trusted_schema = off; pragma cell_size_check = on;")
-        tables, found = _tables(db), db.execute("pragma user_version").fetchone()[0]
+        tables = _tables(db)
+        found = db.execute("pragma user_version").fetchone()[0]
     except BaseException:
         db.close()
         raise

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala import games
-from khala.hosting import game_of
+from khala.playing import games
+from khala.playing.hosting import game_of
 from khala_agents.policy import as_policy
 from khala_agents.replay import replay_agent
-from khala_orchestrator.replay import recorded_config, replay
+from khala_orchestrator.past.replay import recorded_config, replay
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:

@@ -39,7 +39,8 @@ class UsageLedger:
 
     def open(self, step: Step) -> None:
         """Open the account of a step, given as episode and number."""
-        self._step, self._spent = step, []
+        self._step = step
+        self._spent = []
 
     def note(self, exchange: ModelCall) -> None:
         """Note an exchange; a decision's of an older step is published, but not counted for this step.

@@ -166,7 +166,8 @@ class Worker:
         async for briefing in self._read(partial(decode_as, Briefing), links.briefings):
             newest = self._briefings.newest
             if newest is not None and briefing.episode <= newest.episode:  # another host, with steps from 0 perhaps
-                self._began_again, self._last_result = True, None
+                self._began_again = True
+                self._last_result = None
             if await self._briefings.put(briefing):
                 _cancel(self._preparing)
                 preparing = self._guard.safely("preparing the policy", self._policy.prepare, briefing)
@@ -188,7 +189,8 @@ class Worker:
             if not self._is_new(observation):
                 await self._repeat(at, links)
                 continue
-            self._newest, self._began_again = observation, False
+            self._newest = observation
+            self._began_again = False
             self._supersede()
             answering = self._answer(observation, links, group)
             self._deciding = group.create_task(answering, name=f"answer {self._name} {at}")

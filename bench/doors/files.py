@@ -24,8 +24,8 @@ from khala.dataset.export import export
 from khala.dataset.files import Form
 from khala.experiment import commands, results
 from khala.experiment.store import INDEX, MATCHES, Store
-from khala.matches import new, newest_recording
-from khala.minds import Minds
+from khala.playing.matches import new, newest_recording
+from khala.playing.minds import Minds
 from khala.service import client
 from khala.service import commands as service_commands
 from khala.service.book import Book, Limits
@@ -34,11 +34,11 @@ from khala.view.scan import whole
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
 from khala_orchestrator.commands import replay
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.console import Progress, stdout_console
-from khala_orchestrator.record import Listener, RecordingBus
+from khala_orchestrator.match.cards import run_card
+from khala_orchestrator.publish.record import Listener, RecordingBus
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBroker

@@ -34,10 +34,10 @@ from bench.doors.rows import Row, Skipped
 from khala.doors.serving import uvicorn_config
 from khala.mcp.serve import SeatAddress, routes_of
 from khala.mcp.table import Table
-from khala.minds import Minds
 from khala.openenv.client import KhalaAction, KhalaEnv
 from khala.openenv.server import MOST_WAITING, app_of, openenv_door, server_config
-from khala.seats import seats_of, unhurried
+from khala.playing.minds import Minds
+from khala.playing.seats import seats_of, unhurried
 from khala.service.metrics import Metrics
 from khala.view.guard import view_door
 from khala.view.server import Server

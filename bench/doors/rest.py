@@ -26,15 +26,15 @@ from cryptography.x509.oid import NameOID
 from bench.doors.files import EVIL, GAME, FullFile, printed
 from bench.doors.rows import Row
 from bench.doors.trust import GOLDEN
-from khala.advise import Adviser, Advising, told
 from khala.calibrate import commands as calibrating
+from khala.commands.advise import Adviser, Advising, told
 from khala.knowledge import cli as knowledge
 from khala.knowledge import files as facts
 from khala_agents.scripted.endpoint import Endpoint
 from khala_bridge.calibrate.record import Calibration, Measured, Values
-from khala_orchestrator.cards import run_card
 from khala_orchestrator.commands import access_rules
 from khala_orchestrator.config import MatchConfig, load_task
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.certificate import read
 from khala_protocol.bus.config import BusConfig, TlsFiles, host_port_of
@@ -177,7 +177,7 @@ async def _evil_words(_: Path) -> str:
 
 async def _lines_of_json(directory: Path) -> str:
     """Read what `khala advise --json` prints of words with escape sequences."""
-    from khala import advise  # noqa: PLC0415  # its session is replaced below
+    from khala.commands import advise  # noqa: PLC0415  # its session is replaced below
 
     class Stub:
         def __init__(self, *_: Any, show: Callable[[Any], None], **__: Any) -> None:

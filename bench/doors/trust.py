@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 GOLDEN: Final = Path(__file__).parent.parent.parent / "tests" / "khala" / "golden.mcap"
 MODULE: Final = "open('it-ran', 'w').close()\n"
 SECTIONS: Final = ["foreign_code:mine"]
-PATIENCE_S: Final = 25.0
-"""Then a command that goes on is ended: it has opened its door, and imported what it would."""
+PATIENCE_S: Final = 60.0
+LISTENS: Final = b"http://"
+"""A command that prints an address has opened its door, and imported what it would: it is ended."""
 SIDES: Final = {"one side": "llm_smac/2s3z_pair.yaml", "two sides": "duels/duel_3m.yaml"}
 
 
@@ -127,12 +128,18 @@ async def _at_the_command(
         sys.executable, "-P", "-m", "khala", *words, cwd=directory, env=environ, start_new_session=True,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
+    said = b""
+    assert process.stdout is not None
     try:
         async with asyncio.timeout(PATIENCE_S):
-            said, _ = await process.communicate()
-    except (TimeoutError, asyncio.CancelledError):
-        process.terminate()
-        said, _ = await process.communicate()
+            async for line in process.stdout:
+                said += line
+                if LISTENS in line:
+                    break
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        await process.wait()
     if (directory / "it-ran").exists():
         return "the code ran"
     return f"it ended in a traceback: {said.decode()[-200:]}" if b"Traceback" in said else ""

@@ -6,7 +6,7 @@
     observe   snapshot → views and text           act                    words → commands → the game
     rules     why something is not possible now   auto                   arguments that an agent leaves open
 
-A turn goes through it like this (`khala_orchestrator.match` has the loop):
+A turn goes through it like this (`khala_orchestrator.match.match` has the loop):
 
     observation = observer.observe(snapshot, feedback)
     joint = actor.joint(observation, {agent: parse(reply) for agent, reply in replies.items()})

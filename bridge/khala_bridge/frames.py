@@ -93,12 +93,14 @@ class Camera:
 
     def screen(self, x: float, y: float) -> ScreenPoint:
         """Return the screen position of a world position; outside of `[0, size)` if the camera does not see it."""
-        scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
+        scale = self._cells_per_unit
+        half = CAMERA_WIDTH / 2
         return ScreenPoint((x - self.x + half) * scale, (self.y - y + half) * scale)
 
     def world(self, point: ScreenPoint) -> WorldPoint:
         """Return the world position of a screen position; the inverse of `screen`."""
-        scale, half = self._cells_per_unit, CAMERA_WIDTH / 2
+        scale = self._cells_per_unit
+        half = CAMERA_WIDTH / 2
         return WorldPoint(point.x / scale - half + self.x, self.y + half - point.y / scale)
 
     def bounds(self, world: MapFrame) -> tuple[float, float, float, float]:

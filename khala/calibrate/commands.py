@@ -17,10 +17,10 @@ from rich.text import Text
 from khala import __version__
 from khala.calibrate import compare, report
 from khala.calibrate.estimates import estimates
-from khala.environment import plain
-from khala.exit_codes import FAILED, SIGNALLED
+from khala.commands.exit_codes import FAILED, SIGNALLED
 from khala.experiment.numbers import plain as plain_value
-from khala.games import find
+from khala.playing.environment import plain
+from khala.playing.games import find
 from khala_bridge.calibrate.catalogue import choose
 from khala_bridge.calibrate.connection import started, version
 from khala_bridge.calibrate.record import Calibration, Values, load
@@ -49,7 +49,10 @@ def show_probes(patterns: Sequence[str], *, as_json: bool) -> None:
     probes = choose(patterns)
     if as_json:
         names = ("id", "measures", "settles", "unit", "exact", "resolution")
-        rows = [{name: getattr(one, name) for name in names} | {"estimates": waiting.get(one.id, [])} for one in probes]
+        rows = [
+            {name: getattr(probe, name) for name in names} | {"estimates": waiting.get(probe.id, [])}
+            for probe in probes
+        ]
         typer.echo(json.dumps(rows))
         return
     table = Table("probe", "measures", "settles", "estimates", box=None, pad_edge=False)
@@ -117,7 +120,7 @@ class _Watch:
 
     def __init__(self, progress: Progress, probes: Sequence[Probe], earlier: Calibration | None) -> None:
         done = earlier.probes if earlier else {}
-        left = [one for one in probes if one.id not in done or done[one.id].failed]
+        left = [probe for probe in probes if probe.id not in done or done[probe.id].failed]
         self._progress = progress
         self._bar = progress.add_task("", total=len(left))
 
@@ -134,7 +137,7 @@ class _Watch:
 
 def _end(screen: Console, out: Path, done: Calibration, *, as_json: bool) -> None:
     failed = [name for name, one in done.probes.items() if one.failed]
-    seconds = sum(one.run_s for one in done.probes.values())
+    seconds = sum(probe.run_s for probe in done.probes.values())
     screen.print(f"{len(done.probes)} probes in {seconds:.0f} s: {out}", soft_wrap=True)
     if as_json:
         typer.echo(json.dumps({"file": str(out), "probes": len(done.probes), "failed": failed, "run_s": seconds}))

@@ -60,9 +60,9 @@ def _estimate(where: str, what: str, said: str) -> Estimate:
 
 
 def _constants() -> Iterator[Estimate]:
-    for one in entries():
-        if one.source == "estimate":
-            yield _estimate(one.name, one.note, one.probe)
+    for entry in entries():
+        if entry.source == "estimate":
+            yield _estimate(entry.name, entry.note, entry.probe)
 
 
 def _weapons(table: dict[str, Any]) -> Iterator[Estimate]:

@@ -85,8 +85,8 @@ def _missing(found: Compared) -> Iterator[str]:
 
 def _estimates(found: Compared) -> Iterable[str]:
     """Name what of the simulator is a guess that these differences could settle."""
-    probes = {one.probe for one in found.differences}
-    concerned = [one for one in estimates() if one.probe in probes]
+    probes = {difference.probe for difference in found.differences}
+    concerned = [estimate for estimate in estimates() if estimate.probe in probes]
     if not concerned:
         return []
     rows = [f"| `{one.probe}` | {one.where} | {one.what} |" for one in concerned]

@@ -91,7 +91,8 @@ class Split:
     def part(self, row: Row) -> str:
         """Return the part that a row belongs to: the hash of its seed, as a number from 0 to 1, falls into it."""
         digest = hashlib.sha256(f"{self.by} {getattr(row, self.by)}".encode()).digest()
-        at, end = int.from_bytes(digest[:8]) / 2**64, 0.0
+        at = int.from_bytes(digest[:8]) / 2**64
+        end = 0.0
         for name, share in zip(self.names, self.shares, strict=True):
             end += share
             if at < end:

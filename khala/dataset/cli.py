@@ -72,7 +72,8 @@ def export(
     forms: tuple[Form, ...] = tuple(dict.fromkeys(formats or Form))
     choice = Choice(tuple(only or ()), tuple(agent or ()))
     contents = write(sources, out, Recipe(forms, choice, Split.of(split, split_by), gamma, images))
-    rows, left_out = dict(contents.rows), {reason: count for reason, count in contents.left_out.items() if count}
+    rows = dict(contents.rows)
+    left_out = {reason: count for reason, count in contents.left_out.items() if count}
     if as_json:
         found = {"out": str(out), "recordings": contents.recordings, "rows": rows, "left_out": left_out}
         typer.echo(json.dumps(found))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 LOST = ".lost-"
-"""In the name of a recording that a whole one stands beside, see `khala.hosting`."""
+"""In the name of a recording that a whole one stands beside, see `khala.playing.hosting`."""
 
 
 def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:

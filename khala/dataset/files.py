@@ -103,7 +103,8 @@ class ShareGPT:
 
     def __init__(self, path: Path, images: bool) -> None:
         self._file = TextIOWrapper(open_private(path, "xb"), encoding="utf-8", newline="\n")
-        self._images, self._pictures = images, path.with_name("images")
+        self._images = images
+        self._pictures = path.with_name("images")
         if images:
             make_private(self._pictures)
 
@@ -178,7 +179,9 @@ def import_pyarrow() -> tuple[Any, Any]:
 
 def _schema(pa: Any) -> Any:
     """Return the columns. The metadata say to `datasets` that the pictures are some."""
-    text, whole, number = pa.string(), pa.int64(), pa.float64()
+    text = pa.string()
+    whole = pa.int64()
+    number = pa.float64()
     fields = {
         "id": text, "run": text, "task": text, "map": text, "game": text, "seed": whole,
         "side": text, "agent": text, "episode": whole, "step": whole, "game_loop": whole,

@@ -26,7 +26,8 @@ class Prompter:
     def messages(self, briefing: Briefing, observation: Observation) -> tuple[ChatMessage, ...]:
         """Return the prompt for an observation, with its pictures."""
         if self._prompt is None or briefing != self._briefing:
-            self._briefing, self._prompt = briefing, Prompt(briefing)
+            self._briefing = briefing
+            self._prompt = Prompt(briefing)
             self._memory = memory_of(briefing.memory)
         recalled = self._memory.recall(observation)
         text = "\n".join(filter(None, (recalled.text, observation.text)))

@@ -55,7 +55,8 @@ class _Episode:
         values = self._by_decision(steps, result)
         if values is None:
             return dict.fromkeys(steps, UNKNOWN)
-        to_go, found = 0.0, {}
+        to_go = 0.0
+        found = {}
         for step, value in zip(reversed(steps), reversed(values), strict=True):
             to_go = value + gamma * to_go
             found[step] = Reward(value, to_go)

@@ -66,7 +66,8 @@ class Brake:
 
     def wait_s(self, peer: str) -> float:
         """Return the seconds for which tries of a peer are not looked at."""
-        now_s, name = self.clock(), _network(peer)
+        now_s = self.clock()
+        name = _network(peer)
         known = self._peers.get(name)
         own_s = known.wait_s(now_s, FREE, MOST_WAIT_S) if known else 0.0
         if name in self._right:

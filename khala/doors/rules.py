@@ -136,7 +136,8 @@ class Door:
         return None
 
     def _is_foreign(self, head: RequestHead) -> bool:
-        origins, site = head.all("origin"), head.first("sec-fetch-site")
+        origins = head.all("origin")
+        site = head.first("sec-fetch-site")
         if not self.has_page and not self.is_near and not self.token:
             # nothing tells a page of a name that points here from one of ours: no page may ask
             return bool(origins) or site not in {"", "none"}

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
+from khala.env.rewards import battle
 from khala.env.text import TextParallelEnv
-from khala.rewards import battle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pettingzoo import AECEnv
 
-    from khala.rewards import SideReward
+    from khala.env.rewards import SideReward
     from khala_bridge.task.config import TaskConfig
 
 __all__ = ["TextParallelEnv", "env", "parallel_env"]

@@ -109,5 +109,6 @@ def _draw(picture: Picture, unit: UnitMark, x: float, y: float, radius: float) -
     ahead = round(x + radius * np.cos(unit.facing)), round(y + radius * np.sin(unit.facing))
     cv2.line(picture, at, ahead, (255, 255, 255), 1, cv2.LINE_AA)
     if unit.health_max:
-        left, over = round(x - radius), round(y - radius) - 4
+        left = round(x - radius)
+        over = round(y - radius) - 4
         cv2.line(picture, (left, over), (round(left + 2 * radius * unit.health / unit.health_max), over), _LIFE, 2)

@@ -1,7 +1,7 @@
 """Any task in words, as PettingZoo has it: agents read observations and write replies, as over the bus.
 
-The match is played by the host of every other match (`khala.seats`); a step lasts until somebody is asked again. Above:
-`khala.env.parallel_env`. Below: `khala.seats`, `khala.env.onlooker`.
+The match is played by the host of every other match (`khala.playing.seats`); a step lasts until somebody is asked
+again. Above: `khala.env.parallel_env`. Below: `khala.playing.seats`, `khala.env.onlooker`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from khala.env.onlooker import Onlooker
-from khala.loop_thread import LoopThread
-from khala.minds import Minds, minds_of
-from khala.rewards import battle
-from khala.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.env.rewards import battle
+from khala.playing.loop_thread import LoopThread
+from khala.playing.minds import Minds, minds_of
+from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_bridge.game.processes import IdleGames
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from khala.rewards import SideReward
+    from khala.env.rewards import SideReward
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Result
 
@@ -140,7 +140,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         if self._match is None or seed is not None or self.agents or self._turn.over:
             self._leave()
             self._enter(secrets.randbelow(_MOST_SEED) if seed is None else seed)
-        self.agents, self._texts = list(self.possible_agents), dict.fromkeys(self.possible_agents, "")
+        self.agents = list(self.possible_agents)
+        self._texts = dict.fromkeys(self.possible_agents, "")
         self._turn = Turn()
         self._turn = self._next({})
         return self._seen(), self._infos({})
@@ -156,7 +157,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         if not self.agents:
             return {}, {}, {}, {}, {}
         self._turn = self._next(actions)
-        agents, results = self.agents, {result.side: result for result in self._turn.results}
+        agents = self.agents
+        results = {result.side: result for result in self._turn.results}
         cut = any(result.cause in TRUNCATED for result in results.values())
         if results:
             self.agents = []
@@ -203,7 +205,8 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _enter(self, seed: int) -> None:
         if self._thread is None:
-            self._thread, self._games = LoopThread(), IdleGames()
+            self._thread = LoopThread()
+            self._games = IdleGames()
         config = MatchConfig(task=self._task, run=self._task.name, seed=seed, episodes=EPISODES)
         self._match = SeatedMatch(config, self._seats.values(), self._minds, game=self._game, processes=self._games)
         if self.render_mode is not None:
@@ -239,7 +242,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _rewards(self, agents: Sequence[str], results: Mapping[str, Result]) -> dict[str, float]:
         by_side = {
-            side: self._reward([one for one in self._turn.reports if one.side == side], results.get(side))
+            side: self._reward([report for report in self._turn.reports if report.side == side], results.get(side))
             for side in {seat.side for seat in self._seats.values()}
         }
         return {agent: by_side[self._seats[agent].side] for agent in agents}
@@ -248,7 +251,9 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         return {agent: self._info(seat, results.get(seat.side)) for agent, seat in self._seats.items()}
 
     def _info(self, seat: Seat, result: Result | None) -> dict[str, Any]:
-        heard = (one for report in self._turn.reports for one in report.agents if Seat(one.side, one.agent) == seat)
+        heard = (
+            agent for report in self._turn.reports for agent in report.agents if Seat(agent.side, agent.agent) == seat
+        )
         reports = [one.but(latency_s=None) for one in heard]
         info: dict[str, Any] = {"asked": seat in self._turn.asked, "reports": reports}
         if seat in self._turn.asked:

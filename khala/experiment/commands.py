@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.table import Table
 
-from khala.exit_codes import FAILED, NOT_VALID, SIGNALLED
+from khala.commands.exit_codes import FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.plan import check_playable, plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store

@@ -178,7 +178,8 @@ def _one(
         rows_a, rows_b = ([pair[i] for pair in pairs] for i in (0, 1))
     else:
         rows_a, rows_b = ([row for group in groups for row in games[group].values()] for games in (games_a, games_b))
-    value, tested = _estimate(measure), _paired(measure) if pairs else _unpaired(measure)
+    value = _estimate(measure)
+    tested = _paired(measure) if pairs else _unpaired(measure)
     test = tested(rows_a, rows_b) if tested else None
     needed = _needed(rows_a, rows_b, test, paired=bool(pairs)) if measure == WIN else None
     games = min(len(rows_a), len(rows_b))

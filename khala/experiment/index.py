@@ -107,7 +107,8 @@ def add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
 
 def played_in(index: sqlite3.Connection) -> dict[str, Played]:
     """Return the matches; raise `ValueError` if one is not as we write it."""
-    names, columns = Played.__slots__, ", ".join(Played.__slots__)
+    names = Played.__slots__
+    columns = ", ".join(Played.__slots__)
     found = index.execute(f"select {columns} from matches order by rowid")  # noqa: S608  # our own names
     rows = (dict(zip(names, row, strict=True)) for row in found)
     plain = (row | {name: json.loads(row[name]) for name in ("cell", "card")} for row in rows)
@@ -121,7 +122,8 @@ def _match() -> TypeAdapter[Played]:
 
 def results_in(index: sqlite3.Connection) -> list[dict[str, Any]]:
     """Return the rows; raise `ValueError` or `LookupError` if one is not as we write it."""
-    matches, kinds = played_in(index), _annotations()
+    matches = played_in(index)
+    kinds = _annotations()
     columns = ", ".join(f'"{name}"' for name in kinds)
     found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
     return [_joined(matches[key], _checked(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]

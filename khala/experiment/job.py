@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path  # noqa: TC003  # pydantic evaluates it
 from typing import Literal
 
-from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
+from khala.playing.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala_orchestrator.config import MatchConfig  # noqa: TC001
 from khala_protocol.messages import Frozen
 

@@ -13,9 +13,9 @@ import json
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from khala import games
 from khala.experiment.spec import MOST_MATCHES, Level, Settings, level_of
-from khala.minds import Minds, groups_of, minds_of
+from khala.playing import games
+from khala.playing.minds import Minds, groups_of, minds_of
 from khala_agents.config import load_model
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.observe import Observer

@@ -46,7 +46,8 @@ def games_for_power(share_a: float, share_b: float, *, power: float = POWER, con
     The usual normal approximation (Fleiss 1981, without correction), which Boschloo's test comes near to.
     """
     low, high = _apart(share_a, share_b)
-    middle, detect = (low + high) / 2, float(stats.norm.ppf(power))
+    middle = (low + high) / 2
+    detect = float(stats.norm.ppf(power))
     null, real = 2 * middle * (1 - middle), low * (1 - low) + high * (1 - high)
     return math.ceil(((deviations(confidence) * math.sqrt(null) + detect * math.sqrt(real)) / (high - low)) ** 2)
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Literal
 
 from khala.experiment.job import Job
 from khala.experiment.played import unread
-from khala.minds import share_budget
-from khala_orchestrator.tally import REFUSED
+from khala.playing.minds import share_budget
+from khala_orchestrator.match.tally import REFUSED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from khala.experiment.store import Store
 
 LEAST_USD = 1e-6
-"""Less is nothing: sums of money are not exact."""
+"""Smaller sums are ignored: floating-point money is not exact."""
 SPARE = 1.2
 """A match is begun with so many times what is usual: its last requests are held at the most that they may cost."""
 ROOM = 2.0
@@ -148,7 +148,8 @@ class Runner:
             processes=self.processes,
         )
         done = await self.engine.play(job)
-        tries, crash = self._tries[match.key], _CRASHES.get(done.state, "")
+        tries = self._tries[match.key]
+        crash = _CRASHES.get(done.state, "")
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
             cost_usd = (await asyncio.to_thread(self.store.booked_usd)).get(match.key)
@@ -198,7 +199,8 @@ class Runner:
     def _too_dear(self, match: PlannedMatch) -> str:
         """Return why there is too little money for a match; "" if there is enough."""
         usual_usd = _mean(self._numbers(match, "cost_usd")) or 0.0
-        left, short = self._left_usd(), self._short_usd.get(str(match.cell))
+        left = self._left_usd()
+        short = self._short_usd.get(str(match.cell))
         if left is not None and (left < LEAST_USD or left < SPARE * usual_usd):
             return f"the budget of {self.budget.usd:g} USD is used up ({self.spent.usd:.4f} were spent)"
         if left is not None and short is not None and left <= short:
@@ -264,7 +266,7 @@ def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> lis
 
 
 def missing(matches: Iterable[PlannedMatch], played: dict[str, Played]) -> Iterable[PlannedMatch]:
-    """Yield the matches that were not played, or say nothing."""
+    """Return the matches that were not played, or whose match did not end as it should."""
     return (match for match in matches if match.key not in played or played[match.key].state != "done")
 
 

@@ -239,7 +239,8 @@ def compare_values(
 ) -> Comparison:
     """Compare means of games that are not paired, by a permutation test."""
     (x,), (y,) = _known(a), _known(b)
-    n, value = min(len(x), len(y)), float(x.mean() - y.mean()) if len(x) and len(y) else None
+    n = min(len(x), len(y))
+    value = float(x.mean() - y.mean()) if len(x) and len(y) else None
     if n < 2:
         return Comparison("permutation test", Interval(value, -math.inf, math.inf, n, confidence), 1.0)
     bounds = _bootstrap(_difference, (x, y), confidence, seed, paired=False)

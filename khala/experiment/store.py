@@ -26,8 +26,8 @@ from khala.experiment.index import CALLS, Row, add, connect, create, played_in, 
 from khala.experiment.measures import measure_with_calls
 from khala.experiment.played import Played, judged
 from khala.experiment.spec import Experiment
-from khala.matches import free_recording, tries_in
-from khala.spending import paid_usd
+from khala.playing.matches import free_recording, tries_in
+from khala.playing.spending import paid_usd
 from khala_agents.llm.money import SUFFIX, Ledger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError

@@ -1,7 +1,7 @@
 """The process that plays matches of an experiment, one after the other.
 
 A job is a line of JSON on stdin, the answer a line of JSON on stdout; stdin's end ends the process. The agents decide
-in this process (`khala.one_process`), unless the job wants processes for them.
+in this process (`khala.playing.one_process`), unless the job wants processes for them.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import logging
 import sys
 from typing import TYPE_CHECKING
 
-from khala import one_process
 from khala.experiment.job import Done, Job
-from khala.local import Supplies
-from khala.local import play as play_with_processes
+from khala.playing import one_process
+from khala.playing.local import Supplies
+from khala.playing.local import play as play_with_processes
 from khala_agents.llm.limits import own_turns
 from khala_bridge.game.processes import IdleGames
-from khala_orchestrator.resume import unfinished
+from khala_orchestrator.past.resume import unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
 from khala_protocol.recording import Recording

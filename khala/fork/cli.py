@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from khala.options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
+from khala.commands.options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 from khala_protocol.errors import ConfigError
@@ -90,7 +90,7 @@ def fork(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Ask what would have been if others had decided from a step of a recorded match on.
+    """Replay a recorded match up to a step, and let other agents play on from there.
 
     The match is played again with its recorded decisions up to the step, where each observation must be the recorded
     one; then others decide, to the end, in this many forks. Each is recorded like any match. A table sets what became
@@ -103,7 +103,7 @@ def fork(
     Only matches on the simulator can be forked, and none with the clock realtime.
     """
     from khala.fork import commands  # noqa: PLC0415  # PySC2 takes a second that --help need not wait for
-    from khala.minds import Minds, named_sides  # noqa: PLC0415
+    from khala.playing.minds import Minds, named_sides  # noqa: PLC0415
     from khala_protocol.trust import trust_named  # noqa: PLC0415
 
     if (at is None) != scan:

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from khala.exit_codes import FAILED, NOT_VALID, SIGNALLED
+from khala.commands.exit_codes import FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.engine import Local, slots_of_this_machine
 from khala.fork import scan as scans
 from khala.fork.figures import are_alike, outcomes, plain
 from khala.fork.futures import Plan, play_all
 from khala.fork.players import players_of
 from khala.fork.recorded import repeated
-from khala.matches import newest_recording
+from khala.playing.matches import newest_recording
 from khala_orchestrator.console import stderr_console, stdout_console
-from khala_orchestrator.fork import Trunk, trunk_of
+from khala_orchestrator.past.fork import Trunk, trunk_of
 from khala_protocol.errors import RecordingError
 from khala_protocol.signals import cancelled_by_signal
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from typing import TypeVar
 
     from khala.fork.futures import Fork, Future
-    from khala.minds import Minds
+    from khala.playing.minds import Minds
 
     T = TypeVar("T")
 
@@ -129,7 +129,9 @@ def _progress(forks: int) -> Iterator[Callable[[Future], None]]:
 
 def _ending(future: Future) -> str:
     named = len(future.results) > 1
-    return future.error or ", ".join(f"{one.side}: {one.outcome}" if named else one.outcome for one in future.results)
+    return future.error or ", ".join(
+        f"{result.side}: {result.outcome}" if named else result.outcome for result in future.results
+    )
 
 
 def _until_interrupted(work: Coroutine[Any, Any, T], what_is_left: str) -> T:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from khala.fork.futures import Future
-    from khala_orchestrator.fork import Trunk
+    from khala_orchestrator.past.fork import Trunk
     from khala_protocol.messages import Result
 
 
@@ -52,7 +52,8 @@ def figures(results: Iterable[Result], *, from_loop: int) -> Figures:
     """Return what became of futures that began at a game loop."""
     every = list(results)
     valid = [result for result in every if result.valid]
-    endings, number = Counter(result.outcome for result in valid), len(valid)
+    endings = Counter(result.outcome for result in valid)
+    number = len(valid)
     win_rate = wilson(endings["win"], number)
     killed, lost = sum(result.killed.value for result in valid), sum(result.lost.value for result in valid)
     return Figures(

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from khala.experiment.job import Job
-from khala.minds import groups_of, share_budget
-from khala.spending import paid_usd
-from khala_orchestrator.fork import advice_of, write_beginning
+from khala.playing.minds import groups_of, share_budget
+from khala.playing.spending import paid_usd
+from khala_orchestrator.past.fork import advice_of, write_beginning
 from khala_protocol.files import make_private
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala.experiment.engine import Engine
-    from khala.minds import Minds
+    from khala.playing.minds import Minds
     from khala_orchestrator.config import MatchConfig
-    from khala_orchestrator.fork import Trunk
+    from khala_orchestrator.past.fork import Trunk
     from khala_protocol.messages import AgentReport, Message, Result
 
 LONGEST_NAME = 40
@@ -163,7 +163,8 @@ async def play_all(
     Returns:
         what became of them, in their order.
     """
-    purse, room = Purse(budget_usd, len(forks)), asyncio.Semaphore(engine.slots)
+    purse = Purse(budget_usd, len(forks))
+    room = asyncio.Semaphore(engine.slots)
 
     async def one(fork: Fork) -> Future:
         async with room:

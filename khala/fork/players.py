@@ -6,7 +6,7 @@ from collections import defaultdict
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from khala.minds import Minds, groups_of, minds_of
+from khala.playing.minds import Minds, groups_of, minds_of
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala import games
-from khala.hosting import game_of
-from khala_orchestrator.fork import write_whole
-from khala_orchestrator.match import SilentObserver
-from khala_orchestrator.replay import recorded_config, replay
+from khala.playing import games
+from khala.playing.hosting import game_of
+from khala_orchestrator.match.match import SilentObserver
+from khala_orchestrator.past.fork import write_whole
+from khala_orchestrator.past.replay import recorded_config, replay
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from khala_orchestrator.fork import Trunk
+    from khala_orchestrator.past.fork import Trunk
     from khala_protocol.messages import Result
     from khala_protocol.recording.difference import Difference
 
@@ -53,11 +53,12 @@ async def repeated(trunk: Trunk, directory: Path, *, game: str) -> Repeated:
     Args:
         trunk: the episode.
         directory: for a copy of it.
-        game: as in `khala.games.find`.
+        game: as in `khala.playing.games.find`.
     """
     path = directory / "recorded.mcap"
     write_whole(trunk, path)
-    copy, results = Recording.open(path), _Results()
+    copy = Recording.open(path)
+    results = _Results()
     sc2path, _ = games.find(game)
     async with game_of(recorded_config(copy), sc2path) as sides:
         differences = await replay(copy, sides, observer=results)

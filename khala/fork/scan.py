@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from khala.fork.figures import Figures, figures, of_side, plain, rate, recorded_figures
-from khala_orchestrator.fork import ForkError
+from khala_orchestrator.past.fork import ForkError
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from khala.fork.futures import Future
-    from khala_orchestrator.fork import Trunk
+    from khala_orchestrator.past.fork import Trunk
 
 POINTS = 12
 """Steps of a scan if nothing else is said, or one less."""

@@ -5,5 +5,5 @@
     model     requests of ours to a model of inspect_ai
     scores    win, killed and lost value, legality
 
-It needs the extra `inspect`. Below it: `khala.seats`.
+It needs the extra `inspect`. Below it: `khala.playing.seats`.
 """

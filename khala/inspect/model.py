@@ -35,7 +35,7 @@ class InspectClient:
 
     async def complete(self, request: Request) -> Completion:
         """Return the model's words. Errors are inspect_ai's, and end the sample."""
-        output = await self._model.generate([message_of(one, request.pictures) for one in request.messages])
+        output = await self._model.generate([message_of(message, request.pictures) for message in request.messages])
         return Completion(
             text=output.completion,
             usage=usage_of(output.usage),

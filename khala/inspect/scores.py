@@ -89,7 +89,7 @@ def _scorer(of: Callable[[Result], Score]) -> Scorer:
 
 
 def _sum(scores: list[SampleScore], key: str) -> float:
-    return sum(float(one.score.as_dict()[key] or 0) for one in scores)
+    return sum(float(score.score.as_dict()[key] or 0) for score in scores)
 
 
 def _ratio(over: float, under: float) -> float:

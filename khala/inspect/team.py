@@ -1,7 +1,7 @@
 """The solver: the model plays all agents of the first side of a match, each with its own observations and memory.
 
-Above: `khala.inspect.tasks`. Below: `khala.seats`, which plays the match, and `khala_agents.llm_policy`, which makes
-the prompts, so that a model reads here what it reads in any other match.
+Above: `khala.inspect.tasks`. Below: `khala.playing.seats`, which plays the match, and `khala_agents.llm_policy`, which
+makes the prompts, so that a model reads here what it reads in any other match.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from inspect_ai.solver import solver
 from inspect_ai.util import collect, concurrency, span
 
 from khala.inspect.model import InspectClient, message_of
-from khala.matches import new
-from khala.minds import Minds, minds_of
-from khala.seats import Seat, SeatedMatch, unhurried
+from khala.playing.matches import new
+from khala.playing.minds import Minds, minds_of
+from khala.playing.seats import Seat, SeatedMatch, unhurried
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from inspect_ai.solver import Generate, Solver, TaskState
     from pydantic import JsonValue
 
-    from khala.seats import Seen, Turn
+    from khala.playing.seats import Seen, Turn
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report
 
 RESULT, RECORDING = "khala_result", "khala_recording"
 """What the store of a sample has afterwards: the result of its episode, and the path of its recording."""
 MATCH = "khala_match"
-"""What a sample is to play, in its metadata: the task, the seed, and further options of `khala.matches.new`."""
+"""What a sample is to play, in its metadata: the task, the seed, and further options of `khala.playing.matches.new`."""
 
 
 @solver
@@ -134,11 +134,11 @@ def _fates(report: Report) -> JsonValue:
         "value killed": report.killed_value,
         "value lost": report.lost_value,
         "agents": {
-            one.agent: {
-                "fate": one.fate,
-                "accepted": list(one.accepted),
-                "refused": [f"{rejection.text}: {rejection.message}" for rejection in one.rejections],
+            agent.agent: {
+                "fate": agent.fate,
+                "accepted": list(agent.accepted),
+                "refused": [f"{rejection.text}: {rejection.message}" for rejection in agent.rejections],
             }
-            for one in report.agents
+            for agent in report.agents
         },
     }

@@ -26,7 +26,8 @@ def melee_types(catalog: Catalog) -> frozenset[str]:
         for shell in ("cocoon", "egg")
         if shell in ability.numbers
     }
-    found, new = set(marked), shells - marked
+    found = set(marked)
+    new = shells - marked
     while new:
         found |= new
         new = _products(new, catalog) - found

@@ -7,5 +7,5 @@
     serve     the servers of a match over stdio or streamable HTTP
     cli       the command
 
-It needs the extra `mcp`, the official SDK. Below it: `khala.seats`.
+It needs the extra `mcp`, the official SDK. Below it: `khala.playing.seats`.
 """

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from khala.options import (
+from khala.commands.options import (
     BudgetUsd,
     Episodes,
     Game,

@@ -6,10 +6,10 @@ import asyncio
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from khala.matches import new
 from khala.mcp.table import Table
-from khala.minds import Minds, minds_of
-from khala.seats import seat_named, seats_of, unhurried
+from khala.playing.matches import new
+from khala.playing.minds import Minds, minds_of
+from khala.playing.seats import seat_named, seats_of, unhurried
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import trust_named
 
@@ -31,7 +31,7 @@ class Wanted:
     run: str | None
     out: Path
     match: Mapping[str, Any]
-    """How it is played, as `khala.matches.new` takes it."""
+    """How it is played, as `khala.playing.matches.new` takes it."""
 
 
 def run_mcp(wanted: Wanted) -> None:

@@ -65,7 +65,8 @@ class Holder:
     def leave(self, client: str) -> None:
         """Free the seat when its client ends its session."""
         if client == self._client:
-            self._client, self._briefed = None, False
+            self._client = None
+            self._briefed = False
 
     def greet(self) -> None:
         """Brief again: a client has connected that may have no name of its own."""

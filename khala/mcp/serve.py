@@ -17,10 +17,10 @@ from mcp.server.transport_security import TransportSecuritySettings
 from starlette.applications import Starlette
 from starlette.routing import Mount
 
+from khala.commands.exit_codes import SIGNALLED
 from khala.doors.asgi import Guarded, head_of
 from khala.doors.rules import TOKEN, Door, token_of
 from khala.doors.serving import uvicorn_config
-from khala.exit_codes import SIGNALLED
 from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
 from khala_protocol.commandline import say
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from khala.doors.asgi import Application, Message, Receive, Scope, Send
     from khala.mcp.table import Table
-    from khala.seats import Seat
+    from khala.playing.seats import Seat
 
 HOST = "127.0.0.1"
 """The address to serve on: connections are not encrypted."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator, Mapping
 
     from khala.mcp.table import Look, Table
-    from khala.seats import Seat, Seen
+    from khala.playing.seats import Seat, Seen
     from khala_protocol.messages import Report
 
 WITHIN_S = 25.0

@@ -1,6 +1,6 @@
 """A match whose seats are played by sessions, each at its own pace.
 
-Above: `khala.mcp.server`, which gives one seat to an MCP client. Below: `khala.seats`, which plays the match.
+Above: `khala.mcp.server`, which gives one seat to an MCP client. Below: `khala.playing.seats`, which plays the match.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Self
 
-from khala.seats import NotAsked, Seat, SeatedMatch
+from khala.playing.seats import NotAsked, Seat, SeatedMatch
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
     from types import TracebackType
 
-    from khala.minds import Minds
-    from khala.seats import Seen, Turn
+    from khala.playing.minds import Minds
+    from khala.playing.seats import Seen, Turn
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Report, Result
 
@@ -118,7 +118,8 @@ class Table:
         Raises:
             KhalaError: the match failed; the text says what to do.
         """
-        place, known = self._places[seat], self._step
+        place = self._places[seat]
+        known = self._step
         playing = self._begin()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(within_s):
@@ -138,7 +139,8 @@ class Table:
         if place.seen is None or not place.waits:
             return Look(None, None, fates, results, self._over, others)
         place.looked = True
-        within_s, now_s = place.seen.observation.answer_within_s, asyncio.get_running_loop().time()
+        within_s = place.seen.observation.answer_within_s
+        now_s = asyncio.get_running_loop().time()
         left_s = None if within_s is None else max(0.0, within_s - (now_s - place.arrived_s))
         return Look(place.seen, left_s, fates, results, self._over, others)
 
@@ -174,7 +176,8 @@ class Table:
         if not place.looked:
             raise NotAsked("the time for an answer to what you saw is over: call observe, and answer what it says")
         self._match.act(seat, with_messages(reply, place.messages))
-        place.waits, place.messages = False, []
+        place.waits = False
+        place.messages = []
 
     def _begin(self) -> asyncio.Task[None]:
         if self._playing is None:
@@ -197,14 +200,16 @@ class Table:
         self._over = turn.over
         for report in turn.reports:
             self._step = report
-            for one in report.agents:
-                if place := self._places.get(Seat(report.side, one.agent)):
-                    place.fates.append(one)
+            for agent in report.agents:
+                if place := self._places.get(Seat(report.side, agent.agent)):
+                    place.fates.append(agent)
         for seat, place in self._places.items():
             place.results += [result for result in turn.results if result.side == seat.side]
             seen = turn.asked.get(seat)
             if seen is not None and seen is not place.seen:
-                place.seen, place.looked, place.arrived_s = seen, False, asyncio.get_running_loop().time()
+                place.seen = seen
+                place.looked = False
+                place.arrived_s = asyncio.get_running_loop().time()
             place.waits = seen is not None
 
 

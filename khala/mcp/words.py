@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala.mcp.table import Look
-    from khala.seats import Seat
+    from khala.playing.seats import Seat
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Briefing, Report, Result
 

@@ -8,5 +8,5 @@
     client        the client class
     cli           the command
 
-It needs the extra `openenv`. Below it: `khala.seats`.
+It needs the extra `openenv`. Below it: `khala.playing.seats`.
 """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from khala.minds import Minds
+from khala.playing.minds import Minds
 from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
 from khala_protocol.commandline import say

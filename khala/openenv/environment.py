@@ -1,7 +1,8 @@
 """One session of OpenEnv: a match, some of whose agents the client plays.
 
 The match is played by the host of every other match; a step lasts until somebody is asked again. Above:
-`khala.openenv.server`. Below: `khala.openenv.settings`, which makes the match, and `khala.seats`, which plays it.
+`khala.openenv.server`. Below: `khala.openenv.settings`, which makes the match, and `khala.playing.seats`, which plays
+it.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from openenv.core.env_server.interfaces import Environment
 from openenv.core.env_server.types import EnvironmentMetadata
 
 from khala import __version__
-from khala.loop_thread import LoopThread
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, ResetOptions
 from khala.openenv.places import Places
 from khala.openenv.settings import Settings
 from khala.openenv.views import outcome_of, view_of
-from khala.seats import Turn
+from khala.playing.loop_thread import LoopThread
+from khala.playing.seats import Turn
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.configfile import loads
 from khala_protocol.errors import KhalaError
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala.openenv.settings import Chosen
-    from khala.seats import Seat, SeatedMatch
+    from khala.playing.seats import Seat, SeatedMatch
 
 CLOSE_S: Final = 30.0
 """Longest wait for the end of a game, which takes 0.1 s."""
@@ -52,7 +53,8 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         """Take what the server decides, and the processes and places that its sessions share, or make its own."""
         self._settings = settings or Settings()
         self._places = places or Places(1)
-        self._games, self._owns_games = games or IdleGames(), games is None
+        self._games = games or IdleGames()
+        self._owns_games = games is None
         super().__init__(rubric=self._settings.rubric())
         self._choice = ResetOptions()
         self._match: SeatedMatch | None = None
@@ -102,12 +104,14 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         if wanted.seed is not None or wanted.choice() != self._choice or not goes_on:
             await self._leave()
             await self._enter(await asyncio.to_thread(self._settings.match, wanted, self._games))
-            self._choice, self._ended = wanted.choice(), ""
+            self._choice = wanted.choice()
+            self._ended = ""
         else:
             assert self._state.seed is not None
             self._state.seed += 1
         self._state.episode_id = wanted.episode_id or str(uuid.uuid4())
-        self._state.step_count, self._state.over = 0, False
+        self._state.step_count = 0
+        self._state.over = False
         self._briefed.clear()
         self._game_loop = 0
         await self._reset_rubric_async()
@@ -267,9 +271,9 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     def _observed(self) -> KhalaObservation:
         turn, before = self._turn, self._game_loop
         reports = [one for one in turn.reports if one.side == self._state.side]
-        agents = [one for report in reports for one in report.agents if one.agent in self._seats]
-        results = [one for one in turn.results if one.side == self._state.side]
-        loops = [seen.observation.game_loop for seen in turn.asked.values()] + [one.game_loop for one in results]
+        agents = [agent for report in reports for agent in report.agents if agent.agent in self._seats]
+        results = [result for result in turn.results if result.side == self._state.side]
+        loops = [seen.observation.game_loop for seen in turn.asked.values()] + [result.game_loop for result in results]
         self._game_loop = max([before, *loops])
         asked = {name: turn.asked[seat] for name, seat in self._seats.items() if seat in turn.asked}
         views = {name: view_of(seen, briefed=name in self._briefed) for name, seen in asked.items()}
@@ -277,11 +281,13 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         return KhalaObservation(
             episode_id=self._state.episode_id or "",
             agents=views,
-            step=max([seen.observation.step for seen in asked.values()] + [one.steps for one in results], default=0),
+            step=max(
+                [seen.observation.step for seen in asked.values()] + [result.steps for result in results], default=0
+            ),
             killed_value=sum(report.killed_value or 0.0 for report in reports),
             lost_value=sum(report.lost_value or 0.0 for report in reports),
-            accepted=sum(len(one.accepted) for one in agents),
-            refused=sum(len(one.rejections) for one in agents),
+            accepted=sum(len(agent.accepted) for agent in agents),
+            refused=sum(len(agent.rejections) for agent in agents),
             elapsed_s=(self._game_loop - before) / LOOPS_PER_S,
             result=outcome_of(results[0]) if results else None,
             done=self._state.over,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from openenv.core.rubrics import Rubric
 
-from khala.rewards import VALUE, WIN
+from khala.env.rewards import VALUE, WIN
 
 if TYPE_CHECKING:
     from openenv.core.env_server.types import Action
@@ -58,13 +58,16 @@ class Tempo(Rubric):
 class Battle(Rubric):
     """The sum of `win`, `value`, `legality` and `tempo`, each with a weight.
 
-    With the weights 1, 1, 0 and 0 it is `khala.rewards.battle`, the reward of the environments of PettingZoo.
+    With the weights 1, 1, 0 and 0 it is `khala.env.rewards.battle`, the reward of the environments of PettingZoo.
     """
 
     def __init__(self, *, win: float = 1.0, value: float = 1.0, legality: float = 0.1, tempo: float = 0.1) -> None:
         """Take the weights."""
         super().__init__()
-        self.win, self.value, self.legality, self.tempo = Win(), Value(), Legality(), Tempo()
+        self.win = Win()
+        self.value = Value()
+        self.legality = Legality()
+        self.tempo = Tempo()
         self.weights = {"win": win, "value": value, "legality": legality, "tempo": tempo}
 
     def forward(self, action: Action, observation: KhalaObservation) -> float:

@@ -216,7 +216,7 @@ class _Server(HTTPEnvServer):
     def register_routes(self, app: FastAPI, mode: ServerMode | str = ServerMode.SIMULATION) -> None:
         """Add all routes; ours are in the place of OpenEnv's."""
         super().register_routes(app, mode)
-        app.router.routes[:] = [one for one in app.router.routes if getattr(one, "path", "") not in _OURS]
+        app.router.routes[:] = [route for route in app.router.routes if getattr(route, "path", "") not in _OURS]
         control: dict[str, Any] = {"tags": ["Environment Control"]}
         app.post("/reset", summary="Begin an episode", **control)(self.reset)
         app.post("/step", summary="Send replies, and play until somebody is asked again", **control)(self.step)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from khala.matches import new
-from khala.minds import SCRIPTED, SILENT, Minds, minds_of
 from khala.openenv.rubrics import Battle
-from khala.seats import Seat, SeatedMatch, seat_named, seats_of, unhurried
+from khala.playing.matches import new
+from khala.playing.minds import SCRIPTED, SILENT, Minds, minds_of
+from khala.playing.seats import Seat, SeatedMatch, seat_named, seats_of, unhurried
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.errors import ConfigError
 

@@ -9,7 +9,7 @@ from khala.openenv.models import AgentView, ChatTurn, Outcome, Picture
 from khala_agents.prompt import Prompt
 
 if TYPE_CHECKING:
-    from khala.seats import Seen
+    from khala.playing.seats import Seen
     from khala_protocol.messages import Briefing, Result
 
 
@@ -20,7 +20,7 @@ def view_of(seen: Seen, *, briefed: bool) -> AgentView:
         text=observation.text,
         briefing=[] if briefed else _briefing(seen.briefing),
         accepted=list(observation.accepted),
-        rejections=[f"{one.text}: {one.message}" for one in observation.rejections],
+        rejections=[f"{rejection.text}: {rejection.message}" for rejection in observation.rejections],
         pictures=[
             Picture(title=ref.title or ref.name, media_type=ref.media_type, data=b64encode(picture).decode())
             for ref, picture in seen.arrived()

@@ -5,7 +5,7 @@ client     what the commands say to a service, over the bus
 daemon     the service: orders in, matches out
 book       which matches there are, and whose turn it is; no process, no bus
 pool       workers, and those that wait for a match
-worker     the process that plays one match, with `khala.local.play`
+worker     the process that plays one match, with `khala.playing.local.play`
 spare      a process that has imported everything, and becomes a `khala agent` or `khala llm`
 memory     what processes take
 metrics    for Prometheus, from the messages of matches

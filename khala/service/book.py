@@ -16,7 +16,7 @@ from khala_protocol.service import MAX_WORDS, OPEN, MatchCard, Matches
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala.minds import Minds
+    from khala.playing.minds import Minds
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report, Result
     from khala_protocol.service import MatchState, Submit
@@ -96,7 +96,8 @@ class Book:
         """
         if self.draining:
             return "the service is ending, and takes no more matches"
-        waiting, party = self.of("queued"), self._party(owner)
+        waiting = self.of("queued")
+        party = self._party(owner)
         if len(waiting) >= self.limits.queued:
             return f"{self.limits.queued} matches are waiting already: try again when some are over"
         if (mine := sum(self._party(entry.card.owner) == party for entry in waiting)) >= self.limits.queued - len(
@@ -180,7 +181,7 @@ class Book:
             entry.update(episode=report.episode, step=report.step + 1, cost_usd=cost_usd)
 
     def result(self, result: Result) -> None:
-        """Take the result of an episode, which a match that was gone on with brings again."""
+        """Take the result of an episode, which a resumed match reports again."""
         if (entry := self.entry(result.run)) is not None:
             known = entry.results | {(result.episode, result.side): result.outcome}
             entry.results = known

@@ -3,38 +3,11 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from khala.options import (
-    Assemble,
-    BaseUrl,
-    BudgetUsd,
-    Episodes,
-    ExecutorName,
-    Fallback,
-    Game,
-    Grace,
-    Images,
-    Latency,
-    MaxSteps,
-    MaxWait,
-    Memory,
-    Mind,
-    Model,
-    ModelName,
-    Out,
-    PolicyName,
-    Rule,
-    RunName,
-    Seed,
-    SideModel,
-    Speed,
-    StepLoops,
-    Task,
-    ThinkingLoops,
-)
+from khala.commands.options import Game, MatchOptions, MindOptions, Out, RunName, Task, with_options
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_protocol.commandline import say
@@ -110,6 +83,7 @@ def serve(
     )  # fmt: skip
 
 
+@with_options
 def submit(
     task: Task = None,
     *,
@@ -120,30 +94,9 @@ def submit(
     connect: Connect = None,
     tls: Tls = None,
     insecure: Insecure = False,
-    model: Model = "scripted",
-    model_name: ModelName = None,
-    base_url: BaseUrl = None,
-    policy: PolicyName = None,
-    fallback: Fallback = None,
-    blue: Mind = None,
-    red: Mind = None,
-    side_model: SideModel = None,
-    budget_usd: BudgetUsd = None,
-    latency: Latency = 0.2,
-    seed: Seed = None,
-    episodes: Episodes = None,
-    executor: ExecutorName = None,
-    clock: Rule = None,
-    max_wait: MaxWait = None,
-    step_loops: StepLoops = None,
-    thinking_loops: ThinkingLoops = None,
-    speed: Speed = None,
-    grace: Grace = None,
-    max_steps: MaxSteps = None,
-    memory: Memory = None,
-    images: Images = None,
+    minds: MindOptions,
+    match: MatchOptions,
     run: RunName = None,
-    assemble: Assemble = 60.0,
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Json = False,
 ) -> None:
@@ -151,28 +104,23 @@ def submit(
 
     Options are those of `khala run`; keys, policies and model files are those of the service's machine.
     """
-    from khala.matches import new, refuse_others  # noqa: PLC0415
-    from khala.minds import Minds, named_sides  # noqa: PLC0415
+    from khala.playing.matches import new, refuse_others  # noqa: PLC0415
+    from khala.playing.minds import Minds  # noqa: PLC0415
     from khala.service import client, commands  # noqa: PLC0415  # see there
     from khala_protocol.service import Submit  # noqa: PLC0415
 
     if task is None and resume is None:
         raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a match with --resume")
-    given: dict[str, Any] = {
-        "seed": seed, "episodes": episodes, "executor": executor, "rule": clock, "max_wait_s": max_wait,
-        "step_loops": step_loops, "thinking_loops": thinking_loops, "speed": speed, "grace_s": grace,
-        "max_steps": max_steps, "memory": memory, "images": images,
-    }  # fmt: skip
     if resume is not None:
-        refuse_others(None, task=task, run=None if run == resume else run, **given)
-    config = None if task is None else new(task, run, Path(), assemble_s=assemble, **given)
+        refuse_others(None, task=task, run=None if run == resume else run, **asdict(match))
+    config = None if task is None else new(task, run, Path(), **asdict(match))
     order = Submit(
         run=config.run if config else str(resume),
         number=client.new_number(),
         owner=client.owner(),
         match=config.model_dump(mode="json", exclude={"record", "run"}) if config else {},
-        minds=asdict(Minds(model, model_name, base_url, policy, budget_usd, latency, fallback)),
-        sides=named_sides(side_model or (), blue=blue, red=red),
+        minds=asdict(Minds(**minds.of_all())),
+        sides=minds.of_sides(),
         resume=resume is not None,
     )
     card = commands.ask(connect, tls, insecure, ("host",), lambda bus: client.submit(bus, order))

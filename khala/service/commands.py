@@ -16,8 +16,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from khala.exit_codes import DONE, FAILED, NOT_VALID
-from khala.local_bus import local_endpoint
+from khala.commands.exit_codes import DONE, FAILED, NOT_VALID
+from khala.playing.local_bus import local_endpoint
 from khala.service import client, logs, memory
 from khala.service.book import Limits
 from khala.service.daemon import Service
@@ -99,7 +99,7 @@ async def _serve(
             bus, BusConfig(connect=(socket,)), pool.take, out, limits, drain_s, listeners, exchanges=traced,
             used_mb=lambda: memory.rss_mb(os.getpid()),
         )  # fmt: skip
-        endpoints = [one for one in bus.endpoints if one != socket]
+        endpoints = [endpoint for endpoint in bus.endpoints if endpoint != socket]
         about = {"endpoints": endpoints, "matches": limits.matches, "memory_mb": limits.memory_mb, "metrics_port": port}
         if as_json:
             typer.echo(json.dumps(about))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
-from khala.matches import free_recording
+from khala.playing.matches import free_recording
 from khala.service.book import Book, Entry, Limits
 from khala.service.memory import rss_mb
 from khala.service.orders import match_of
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
     from pathlib import Path
 
-    from khala.minds import Minds
+    from khala.playing.minds import Minds
     from khala.service.pool import Player
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.bus import Bus, Publisher, Sample, Subscription

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from khala.matches import free_recording, resumed
-from khala.minds import Minds, groups_of, minds_of
+from khala.playing.matches import free_recording, resumed
+from khala.playing.minds import Minds, groups_of, minds_of
 from khala_bridge.observe import Observer
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _MINDS = TypeAdapter(Minds)
 ASSEMBLE_S = 60.0
-"""How long a match that is gone on with waits for its agents."""
+"""How long a resumed match waits for its agents."""
 
 
 def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, dict[str, Minds]]:

@@ -94,7 +94,7 @@ class Traces:
         after_s = timings.act_s + timings.game_s
         began_ns = end_ns - _ns(timings.observe_s + timings.publish_s + timings.wait_s + after_s)
         about: dict[str, Any] = {
-            "khala.run": report.run,
+            "khala.commands.run": report.run,
             "khala.side": report.side,
             "khala.episode": report.episode,
             "khala.step": report.step,
@@ -113,7 +113,7 @@ class Traces:
         took_s = agent.latency_s or max((call.began_s + call.took_s for call in calls), default=0.0)
         began_ns = answered_ns - _ns(took_s)
         about: dict[str, Any] = {
-            "khala.run": report.run,
+            "khala.commands.run": report.run,
             "khala.agent": agent.agent,
             "khala.side": agent.side,
             "khala.step": asked,

@@ -15,12 +15,12 @@ import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
-from khala import environment, games
-from khala.local import Supplies, play
-from khala.matches import resumed
-from khala.minds import Minds  # noqa: TC001  # pydantic evaluates it
+from khala.playing import environment, games
+from khala.playing.local import Supplies, play
+from khala.playing.matches import resumed
+from khala.playing.minds import Minds  # noqa: TC001  # pydantic evaluates it
+from khala.playing.spare import Spares
 from khala.service import logs
-from khala.spare import Spares
 from khala_bridge.game.processes import Launched
 from khala_bridge.observe import Observer
 from khala_orchestrator.config import MatchConfig, load_task
@@ -33,7 +33,7 @@ from khala_protocol.signals import cancelled_by_signal
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala_orchestrator.resume import Unfinished
+    from khala_orchestrator.past.resume import Unfinished
     from khala_protocol.messages import Wire
 
 log = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala.advise import FIND_NEAR_S, FIND_S, Adviser, NoMatch, card_of, places
+from khala.commands.advise import FIND_NEAR_S, FIND_S, Adviser, NoMatch, card_of, places
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode

@@ -52,20 +52,23 @@ def deeds(
     calls = sorted([*((call, call.start, call.end) for call in speech.calls), *standing], key=lambda one: one[1])
     rejections = list(report.rejections) if report else []
     accepted = list(report.accepted) if report else []
-    unread = max((one for one in rejections if one.reason == "too_many_actions"), key=_start, default=None)
+    unread = max(
+        (rejection for rejection in rejections if rejection.reason == "too_many_actions"), key=_start, default=None
+    )
     found: list[Deed] = []
     for call, start, end in calls:
-        why, ok = _taken(rejections, start, end), None
+        why = _taken(rejections, start, end)
+        ok = None
         if why is None and (ok := _was_accepted(call, accepted)) is None and unread and start > unread.start:
             why = unread  # one rejection stands for all calls behind it
         found.append(_deed(reply[start:end], call, start, False if why else ok, why, frames, screens))
-    found += (_rejected(one) for one in rejections if one.text)
+    found += (_rejected(rejection) for rejection in rejections if rejection.text)
     return tuple(sorted(found, key=lambda deed: deed.start))
 
 
 def _taken(rejections: list[Rejection], start: int, end: int) -> Rejection | None:
     """Return the rejection of the call at this place, and take it from the list."""
-    mine = next((one for one in rejections if start <= one.start < end), None)
+    mine = next((rejection for rejection in rejections if start <= rejection.start < end), None)
     if mine is not None:
         rejections.remove(mine)
     return mine

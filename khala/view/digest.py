@@ -49,8 +49,14 @@ class Memory:
     def begin(self, episode: int) -> None:
         """Forget what belongs to another episode."""
         if episode != self.episode:
-            self.episode, self.step, self.scenes = episode, 0, False
-            self.places, self.dead, self.made, self.sums, self.fallen = {}, set(), set(), {}, {}
+            self.episode = episode
+            self.step = 0
+            self.scenes = False
+            self.places = {}
+            self.dead = set()
+            self.made = set()
+            self.sums = {}
+            self.fallen = {}
 
     def dump(self) -> Json:
         """Return it as JSON data."""
@@ -90,7 +96,8 @@ class Digest:
 
     def report(self, said: Json) -> None:
         """Take in the report of a side's step."""
-        side, agents = said.get("side", "blue"), said["agents"]
+        side = said.get("side", "blue")
+        agents = said["agents"]
         self.memory.begin(said["episode"])
         self.memory.step = said["step"]
         usages = [agent.get("usage", {}) for agent in agents]
@@ -127,7 +134,8 @@ class Digest:
         return {key: value for key, value in self.memory.sums.items() if key.endswith(f"/{side}")}
 
     def _agent(self, said: Json, side: str, agent: Json) -> None:
-        name, asked = agent["agent"], agent.get("asked_step")
+        name = agent["agent"]
+        asked = agent.get("asked_step")
         asked = said["step"] if asked is None else asked
         self.decisions.append((said["episode"], side, name, asked, said["step"]))
         if (status := agent["status"]) != "ok":
@@ -207,7 +215,8 @@ class Digest:
         for player in said["players"]:
             self.note(said, _from_player(player, names[player["player"]]))
         self._structures(said, names, first=not memory.scenes)
-        memory.scenes, memory.whole = True, bool(said["whole"])
+        memory.scenes = True
+        memory.whole = bool(said["whole"])
         for unit in said["units"]:
             memory.places[hex(unit[0])] = (names.get(unit[2], ""), unit[1], unit[3], unit[4])
 
@@ -257,7 +266,7 @@ def _from_player(player: Json, side: str) -> Json:
 def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     found = {f"{name}/{side}": value for name, value in view["resources"].items() if name != "promised"}
     if counts := view.get("counts"):
-        found[f"workers/{side}"] = sum(one["ready"] for one in counts["units"] if one["type"] in WORKERS)
+        found[f"workers/{side}"] = sum(count["ready"] for count in counts["units"] if count["type"] in WORKERS)
     if army := view.get("army"):
         found[f"army_value/{side}"] = army["value"]
         if alone:

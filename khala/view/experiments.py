@@ -26,7 +26,8 @@ def listed(directories: Sequence[Path]) -> list[ExperimentLine]:
 
 def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | None:
     try:
-        changed, key = (directory / EXPERIMENT).stat().st_ctime_ns, str(directory.absolute())
+        changed = (directory / EXPERIMENT).stat().st_ctime_ns
+        key = str(directory.absolute())
         known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
         with contextlib.suppress(sqlite3.Error):  # an index that is broken is made again below
             if known:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from khala.view.runs import Opened
     from khala.view.sources import Sources
-    from khala_orchestrator.transcript import StepSelection
+    from khala_orchestrator.past.transcript import StepSelection
 
 MOST_BYTES = 50 * MB
 """Of the file: browsers and mail servers take more badly."""

@@ -23,7 +23,8 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from khala import games, indexes
+from khala import indexes
+from khala.playing import games
 from khala_protocol.errors import RecordingError
 from khala_protocol.files import MB, make_private
 from khala_protocol.recording.chunks import chunk_at, payload_at

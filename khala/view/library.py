@@ -188,7 +188,8 @@ def _line(
 ) -> RunLine | None:
     try:
         state = path.stat()
-        key, name = str(path.absolute()), shown(path, below)
+        key = str(path.absolute())
+        name = shown(path, below)
         size, changed, line = known.get(key, (-1, -1, ""))
         if (size, changed) == (state.st_size, state.st_ctime_ns):  # no program can set this one
             return RunLine.model_validate_json(line).but(path=name)

@@ -155,7 +155,7 @@ class Moments:
             reply=text,
             deeds=self._deeds(text, report, seen),
             sent=tuple(self._sent(episode, effect, side, agent)),
-            read=tuple(_letter(one, seen.step) for one in seen.messages),
+            read=tuple(_letter(message, seen.step) for message in seen.messages),
             images=seen.images,
         )
 
@@ -179,7 +179,7 @@ class Moments:
 
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:
         samples = self._index.at(Topic.EXCHANGE, episode, step, step)
-        mine = [one for one in samples if (one.side, one.agent) == (side, agent)]
+        mine = [sample for sample in samples if (sample.side, sample.agent) == (side, agent)]
         for one in mine[:SLOWEST_CALLS]:
             if (call := self._read(ModelCall, one)) is not None:
                 yield call
@@ -219,7 +219,7 @@ class Moments:
             briefing = self._read(Briefing, found)
             frames = briefing.frames if briefing else Frames()
             actions = briefing.actions if briefing else ()
-            self._briefings[found.spot] = frames.screen, {one.name.casefold(): one.args for one in actions}
+            self._briefings[found.spot] = frames.screen, {action.name.casefold(): action.args for action in actions}
         return self._briefings[found.spot]
 
     def _read(self, kind: type[W], found: Found) -> W | None:

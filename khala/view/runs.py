@@ -58,7 +58,9 @@ class Opened:
         changed: Callable[[], None] = lambda: None,
         adviser: str = "",
     ) -> None:
-        self.id, self.path, self.shown = id, path, shown or path.name
+        self.id = id
+        self.path = path
+        self.shown = shown or path.name
         self._adviser = adviser
         self.index = Index(path)
         self.scanning = Scanning(self.index, changed)
@@ -81,7 +83,8 @@ class Opened:
 
     def view(self) -> bytes:
         """Return the `RunView`."""
-        card, line = self._card, self.line()
+        card = self._card
+        line = self.line()
         return RunView(
             line=line,
             sides=self.sides,
@@ -178,15 +181,15 @@ class Opened:
         models = tuple(dict.fromkeys(name for (name,) in self.index.rows("select name from model order by name")))
         episodes = list(self.episodes())
         outcomes = {
-            side: tuple(one.outcomes[side] for one in episodes if side in one.outcomes)
+            side: tuple(episode.outcomes[side] for episode in episodes if side in episode.outcomes)
             for side in self.sides
         }  # fmt: skip
         return found.but(
             models=models or found.models,
             outcomes={side: those for side, those in outcomes.items() if those},
             episodes=max(len(episodes), found.episodes),
-            steps=sum(one.steps for one in episodes),
-            game_s=sum(one.game_s for one in episodes),
+            steps=sum(episode.steps for episode in episodes),
+            game_s=sum(episode.game_s for episode in episodes),
         )
 
     def agents(self) -> tuple[AgentLine, ...]:

@@ -119,7 +119,8 @@ class Scanner:
                 with contextlib.suppress(sqlite3.Error):
                     self._db.execute("rollback")
                 raise
-        self._scan, self._seen = scan, size if scan.offset == before else -1
+        self._scan = scan
+        self._seen = size if scan.offset == before else -1
         return scan.offset > before
 
     @property
@@ -151,12 +152,14 @@ class Scanner:
                 keys = {int(number): key for number, key in state["keys"].items()}
                 scan = Scan(state["offset"], keys=keys, expected=state["expected"])
                 scan.ended, scan.broken = state["ended"], state["broken"]
-                self._memory, self._sides = Memory.load(state["memory"]), tuple(state["sides"])
+                self._memory = Memory.load(state["memory"])
+                self._sides = tuple(state["sides"])
                 self._note("caught_up", 0)
                 return scan
         for table in ("sample", "image", "step", "decision", "loss", "mark", "model", "meta"):
             self._db.execute(f"delete from {table} where true")  # noqa: S608  # our own names
-        self._memory, self._sides = Memory(), ()
+        self._memory = Memory()
+        self._sides = ()
         self._take_lease()
         return Scan()
 

@@ -71,7 +71,8 @@ class _Known:
     """What the agents of all sides know at a step: units by their tags, and the newest view of each side."""
 
     def __init__(self, sides: Sequence[str], scale: float) -> None:
-        self._sides, self._scale = tuple(sides), scale
+        self._sides = tuple(sides)
+        self._scale = scale
         self._units: dict[int, tuple[int, UnitMark]] = {}
         self._views: dict[str, View] = {}
         self._loop = 0
@@ -87,7 +88,8 @@ class _Known:
 
     def take(self, side: str, view: View) -> None:
         """Take in what an agent sees."""
-        own, enemy = self._player(side), self._enemy(side)
+        own = self._player(side)
+        enemy = self._enemy(side)
         for team in view.teams:
             for unit in (*team.units, *team.allies):
                 self._see(unit, own, side)

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 from aiohttp import web
 
+from khala.commands.exit_codes import SIGNALLED
 from khala.doors.rules import TOKEN
-from khala.exit_codes import SIGNALLED
 from khala.view.export import export
 from khala.view.guard import view_door
 from khala.view.server import Server, page
 from khala.view.sources import Sources, find
 from khala_orchestrator.console import stderr_console
-from khala_orchestrator.transcript import StepSelection
+from khala_orchestrator.past.transcript import StepSelection
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import read_limited
@@ -97,7 +97,8 @@ def door_of(look: Look) -> Door:
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near, password = is_near(look.host), password_of(look)
+    near = is_near(look.host)
+    password = password_of(look)
     if not near and not password and look.https is None:
         raise ConfigError(
             f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
@@ -176,7 +177,8 @@ def _name(host: str) -> str:
 async def _listening(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> AsyncIterator[int]:
     """Take connections for the application, and yield the port."""
     assert runner.server is not None
-    patience, listening = Patience(runner.server), bound(look.host.strip("[]"), look.port)
+    patience = Patience(runner.server)
+    listening = bound(look.host.strip("[]"), look.port)
     handshake_s = None if context is None else HANDSHAKE_S
     server = await asyncio.get_running_loop().create_server(
         patience, sock=listening, ssl=context, ssl_handshake_timeout=handshake_s

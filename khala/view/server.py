@@ -124,31 +124,39 @@ class Server:
         return await self._answer(request, opened.view)
 
     async def _timeline(self, request: web.Request) -> web.Response:
-        opened, episode = await self._run(request), _number(request, "episode")
+        opened = await self._run(request)
+        episode = _number(request, "episode")
         return await self._answer(request, lambda: opened.timeline(episode))
 
     async def _terrain(self, request: web.Request) -> web.Response:
-        opened, episode = await self._run(request), _number(request, "episode")
+        opened = await self._run(request)
+        episode = _number(request, "episode")
         return await self._answer(request, lambda: opened.terrain(episode))
 
     async def _scenes(self, request: web.Request) -> web.Response:
-        opened, episode = await self._run(request), _number(request, "episode")
+        opened = await self._run(request)
+        episode = _number(request, "episode")
         first, last = (_asked_number(request, name) for name in ("from", "to"))
         if not 0 <= last - first < MOST_SCENES:
             raise web.HTTPBadRequest(text=f"ask for 1 to {MOST_SCENES} scenes: from={first} and to={last} are not\n")
         return await self._answer(request, lambda: opened.scenes(episode, first, last))
 
     async def _moment(self, request: web.Request) -> web.Response:
-        opened, episode, step = await self._run(request), _number(request, "episode"), _number(request, "step")
+        opened = await self._run(request)
+        episode = _number(request, "episode")
+        step = _number(request, "step")
         return await self._answer(request, lambda: opened.moment(episode, step))
 
     async def _asked(self, request: web.Request) -> web.Response:
-        opened, episode, step = await self._run(request), _number(request, "episode"), _number(request, "step")
+        opened = await self._run(request)
+        episode = _number(request, "episode")
+        step = _number(request, "step")
         side, agent = request.match_info["side"], request.match_info["agent"]
         return await self._answer(request, lambda: opened.asked(episode, step, side, agent))
 
     async def _image(self, request: web.Request) -> web.Response:
-        opened, digest = await self._run(request), request.match_info["sha256"]
+        opened = await self._run(request)
+        digest = request.match_info["sha256"]
         kind, data = await self._made(lambda: opened.picture(digest))
         headers = {"Cache-Control": "private, max-age=86400, immutable"}
         return web.Response(body=data, content_type=kind, headers=headers)

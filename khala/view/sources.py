@@ -30,7 +30,9 @@ class Sources:
 
     def __init__(self, title: str, directory: Path | None, opened: Sequence[Path] = (), *, adviser: str = "") -> None:
         self.title = title
-        self._directory, self._first, self._adviser = directory, tuple(opened), adviser
+        self._directory = directory
+        self._first = tuple(opened)
+        self._adviser = adviser
         self._recordings = {run_id(path): path for path in opened}
         self._experiments: dict[str, Path] = {}
 

@@ -57,7 +57,8 @@ def _changed_ns(path: Path) -> int:
 @lru_cache(maxsize=8)
 def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> ExperimentView:  # noqa: ARG001  # as they were
     store = Store.opened(directory)
-    made, played = report(store), list(store.played().values())
+    made = report(store)
+    played = list(store.played().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
     recordings = [directory / one.recording for one in played if one.recording]
     line = line_of(directory)

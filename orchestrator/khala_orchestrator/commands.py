@@ -16,7 +16,7 @@ from rich.text import Text
 
 from khala_orchestrator.config import all_tasks, load_task
 from khala_orchestrator.console import stderr_console, stdout_console
-from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
+from khala_orchestrator.past.transcript import StepSelection, save_pictures, summary, transcript
 from khala_protocol.bus.zenoh import open_bus, probe
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError, RecordingError
@@ -144,7 +144,7 @@ def replay(
 
 
 def _paces(recording: Recording, *, as_json: bool) -> None:
-    from khala_orchestrator.measured_pace import measured_paces, yaml  # noqa: PLC0415  # numpy, for this alone
+    from khala_orchestrator.past.measured_pace import measured_paces, yaml  # noqa: PLC0415  # numpy, for this alone
 
     found = list(measured_paces(recording.of(ModelCall)))
     if not found:

@@ -10,17 +10,17 @@ import asyncio
 import contextlib
 from typing import TYPE_CHECKING, Self
 
-from khala_orchestrator.advisers import AdviceInbox
-from khala_orchestrator.announce import Announcer
-from khala_orchestrator.cards import run_card
-from khala_orchestrator.match import Match
-from khala_orchestrator.pacing import AtOnce, pacing_of
-from khala_orchestrator.record import BestEffort, Listener, RecordingBus
-from khala_orchestrator.resume import ResumedTurn
+from khala_orchestrator.match.cards import run_card
+from khala_orchestrator.match.match import Match
+from khala_orchestrator.match.pacing import AtOnce, pacing_of
+from khala_orchestrator.match.scenery import Scenery
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.turn import Turn
+from khala_orchestrator.past.resume import ResumedTurn
+from khala_orchestrator.publish.advisers import AdviceInbox
+from khala_orchestrator.publish.announce import Announcer
+from khala_orchestrator.publish.record import BestEffort, Listener, RecordingBus
 from khala_orchestrator.roster import Roster
-from khala_orchestrator.scenery import Scenery
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Turn
 from khala_protocol.errors import RecordingError
 from khala_protocol.garbage import tidy_memory
 from khala_protocol.recording import Recorder
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
-    from khala_orchestrator.match import Asks
-    from khala_orchestrator.record import OwnedSink
-    from khala_orchestrator.resume import Unfinished
+    from khala_orchestrator.match.match import Asks
+    from khala_orchestrator.past.resume import Unfinished
+    from khala_orchestrator.publish.record import OwnedSink
     from khala_orchestrator.roster import Seat
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Briefing, Message, Report, Result, Scene, Terrain, Wire
@@ -141,8 +141,8 @@ def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> A
 class _PublishingObserver:
     """An observer that publishes what happens, calls `watch`, and flushes the recording after each step.
 
-    While a step takes long, what there is of it is flushed, too: who follows the file sees the map that agents think
-    about. A context manager.
+    During a long step it flushes what was recorded so far, so that a reader of the file sees the map that the agents
+    are thinking about. A context manager.
 
     Attributes:
         live: False while a recording is played again: then it only keeps the briefings, and the map of the open step.

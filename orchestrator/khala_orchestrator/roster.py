@@ -1,7 +1,7 @@
 """Which agents are present: found by their liveliness tokens.
 
-Below it: the bus. Above it: `khala_orchestrator.match`, which starts when all required agents are there, and
-`khala_orchestrator.turn`, which stops waiting for one that has left. Two instances of the same agent (a restart
+Below it: the bus. Above it: `khala_orchestrator.match.match`, which starts when all required agents are there, and
+`khala_orchestrator.match.turn`, which stops waiting for one that has left. Two instances of the same agent (a restart
 that overlaps, or two people with one name) are one presence here, and a warning in the log.
 """
 

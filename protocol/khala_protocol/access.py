@@ -61,8 +61,10 @@ def router_settings(
     """
     root = f"{ROOT}/{check_name(run, 'run') if run else '*'}"
     names, advising = sorted(set(agents)), sorted(set(advisers))
-    rules, rates = [*_host(root), *_observer(root)], list(_rates(names, advising))
-    subjects, policies = [HOST, OBSERVER], {HOST: ["host"], OBSERVER: ["listen:observer", "hear:observer"]}
+    rules = [*_host(root), *_observer(root)]
+    rates = list(_rates(names, advising))
+    subjects = [HOST, OBSERVER]
+    policies = {HOST: ["host"], OBSERVER: ["listen:observer", "hear:observer"]}
     agents_rules = {agent_name(*who): _agent(root, agent_name(*who), f"{root}/{'/'.join(who)}") for who in names}
     advisers_rules = {adviser_name(*who): _adviser(root, *who) for who in advising}
     for name, own in (agents_rules | advisers_rules).items():
@@ -118,7 +120,8 @@ def _agent(root: str, name: str, own: str) -> list[dict[str, Any]]:
 
 
 def _adviser(root: str, side: str, adviser: str) -> list[dict[str, Any]]:
-    name, own = adviser_name(side, adviser), f"{root}/{side}/{adviser}/{Topic.ADVICE}"
+    name = adviser_name(side, adviser)
+    own = f"{root}/{side}/{adviser}/{Topic.ADVICE}"
     keys = _with_caches(f"{root}/run", f"{root}/report", f"{root}/result", f"{root}/host")
     return [
         _rule(f"listen:{name}", ["ingress"], _LISTEN, keys),

@@ -134,7 +134,11 @@ def files_of(directory: Path, *names: str) -> TlsFiles:
         ConfigError: there is none for any of them.
         BusError: a certificate cannot be read.
     """
-    found = {one.name: one.path.parent for one in reversed(certificates(directory)) if one.name != AUTHORITY}
+    found = {
+        certificate.name: certificate.path.parent
+        for certificate in reversed(certificates(directory))
+        if certificate.name != AUTHORITY
+    }
     for name in names or found:
         if name in found:
             place = found[name]

@@ -82,7 +82,8 @@ class Document:
 
     def _known_below(self, place: Place) -> tuple[Document, Place] | None:
         """Return the document below and the place in it, if the value at `place` comes from there."""
-        same, field = self._same.get(place[:2]), place[: 1 if place[:2] not in self._same else 3]
+        same = self._same.get(place[:2])
+        field = place[: 1 if place[:2] not in self._same else 3]
         there = (*same, *place[2:]) if same else place
         if self._below is None or field in self.lines or not self._below.knows(there[: len(field)]):
             return None

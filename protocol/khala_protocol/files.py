@@ -2,8 +2,8 @@
 
 What is read is a regular file of a limited size, so that no pipe or device stops or fills a process. What is written
 holds prompts, replies or results: other users of the machine may not read it, whatever the umask says, and a file that
-could not be written whole leaves what was in its place. Every refusal is an `OSError` whose `strerror` is a sentence,
-as those of the operating system are.
+could not be written whole leaves what was in its place. The `strerror` of every `OSError`
+says in words what was refused, as that of the operating system does.
 """
 
 from __future__ import annotations

@@ -94,7 +94,8 @@ class _Connection(asyncio.Protocol):
         self._patience, self._inner = patience, inner
         self._transport: asyncio.Transport | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._head_bytes, self._tail = 0, b""
+        self._head_bytes = 0
+        self._tail = b""
         self._is_admitted = False
 
     @property

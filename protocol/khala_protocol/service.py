@@ -42,7 +42,7 @@ class Submit(Wire):
     match: dict[str, Any] = Field(default={})
     """A `khala_orchestrator.config.MatchConfig`; that of its recording if it is resumed."""
     minds: dict[str, Any] = Field(default={})
-    """A `khala.minds.Minds`: how the agents decide."""
+    """A `khala.playing.minds.Minds`: how the agents decide."""
     sides: dict[str, str] = Field(default={})
     """By side, the model or policy of agents that decide otherwise, as `khala run --side-model` takes it."""
     resume: bool = False
@@ -50,7 +50,7 @@ class Submit(Wire):
 
 
 class Stop(Wire):
-    """Client → service: end a match; its recording stays, and can be gone on with."""
+    """Client → service: end a match; its recording stays, and can be resumed."""
 
     kind: Literal["stop"] = "stop"
     number: str

@@ -19,7 +19,8 @@ SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 def stop_on_signal() -> asyncio.Event:
     """Return an event that the first signal sets; the second one ends the process at once."""
-    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
 
     def end() -> None:
         stop.set()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.environment import plain, with_model
+from khala.playing.environment import plain, with_model
 from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import games, local_bus
-from khala.advise import Adviser, Advising, MatchGone, run_advise, told
-from khala.hosting import game_of
+from khala.commands.advise import Adviser, Advising, MatchGone, run_advise, told
+from khala.playing import games, local_bus
+from khala.playing.hosting import game_of
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_workers
 from khala_bridge.task.config import AdviserConfig
-from khala_orchestrator.advisers import AdviceInbox
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
+from khala_orchestrator.publish.advisers import AdviceInbox
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import environment
-from khala.children import ChildDied, Children
+from khala.playing import environment
+from khala.playing.children import ChildDied, Children
 from khala_agents.config import ModelConfig
 from khala_protocol import parent_watch
 from khala_simulator.process import parent_watch as simulator_watch
@@ -150,7 +150,7 @@ async def begun() -> asyncio.Event:
 async def test_a_child_that_fails_again_and_again_has_failed_for_good_in_its_last_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("khala.children.PAUSES_S", (0.0,))
+    monkeypatch.setattr("khala.playing.children.PAUSES_S", (0.0,))
     async with Children(tmp_path) as children:
         await children.start("wrong", "agent", "A", "--run", "r", "--policy", "nope:decide")
         with pytest.raises(ChildDied) as died:

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from khala.cli import main
-from khala.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
+from khala.commands.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
 from khala.service.commands import exit_code
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording

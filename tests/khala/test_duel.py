@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import games
-from khala.hosting import hosted
+from khala.playing import games
+from khala.playing.hosting import hosted
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_orchestrator.config import MatchConfig, change, load_task
-from khala_orchestrator.resume import unfinished
-from khala_orchestrator.transcript import StepSelection, transcript
+from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.transcript import StepSelection, transcript
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Message, Observation, Report, Result
@@ -24,7 +24,7 @@ from khala_protocol.recording import Recorder, Recording
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala_orchestrator.resume import Unfinished
+    from khala_orchestrator.past.resume import Unfinished
     from khala_protocol.messages import Briefing
     from khala_protocol.recording import Recorded
 

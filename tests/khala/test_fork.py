@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 import psutil
 import pytest
 
-from khala import one_process
 from khala.cli import main
-from khala.exit_codes import NOT_VALID, SIGNALLED
+from khala.commands.exit_codes import NOT_VALID, SIGNALLED
 from khala.experiment.job import Done
 from khala.experiment.worker import played
 from khala.fork.figures import are_alike, figures, of_side, rate
@@ -24,10 +23,11 @@ from khala.fork.futures import Future, Plan, Purse, play_all
 from khala.fork.players import players_of
 from khala.fork.recorded import repeated
 from khala.fork.scan import ranked, steps_of
-from khala.minds import Minds
+from khala.playing import one_process
+from khala.playing.minds import Minds
 from khala.testing import replay_host
 from khala_orchestrator.config import MatchConfig, change, load_task
-from khala_orchestrator.fork import Trunk, trunk_of
+from khala_orchestrator.past.fork import Trunk, trunk_of
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import Casualties, ModelCall, Observation, Reply, Result

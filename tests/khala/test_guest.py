@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala import games
-from khala.hosting import game_of, hosted
+from khala.playing import games
+from khala.playing.hosting import game_of, hosted
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker

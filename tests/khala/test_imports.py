@@ -32,7 +32,7 @@ def test_help_imports_options_and_nothing_that_is_needed_to_play(arguments: list
 
 def test_help_leaves_markdown_and_tracebacks_of_rich_usable() -> None:
     script = """
-from khala.help import _import_rich_utils
+from khala.commands.help import _import_rich_utils
 _import_rich_utils()
 import sys
 assert "rich.markdown" not in sys.modules
@@ -52,4 +52,4 @@ def test_an_agent_imports_no_game_and_no_language_of_replies_before_its_first_ob
 
 def test_a_host_imports_no_client_of_models_and_nothing_that_draws_or_meets_guests() -> None:
     heavy = {"aiohttp", "cryptography", "httpx", "khala_bridge.game.guest", "pysc2.lib.video_writer", "scipy"}
-    assert imported(f"import khala.local, khala.matches\n{SHOW}") & heavy == set()
+    assert imported(f"import khala.playing.local, khala.playing.matches\n{SHOW}") & heavy == set()

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import portpicker
 import pytest
 
-from khala import games
-from khala.hosting import game_of
+from khala.playing import games
+from khala.playing.hosting import game_of
 from khala_bridge.errors import GameError
 from khala_orchestrator.config import MatchConfig, change, load_task
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.local_bus import LOOPBACK, local_endpoint
+from khala.playing.local_bus import LOOPBACK, local_endpoint
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus, probe
 

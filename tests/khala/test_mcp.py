@@ -23,8 +23,8 @@ from khala.mcp.serve import over_http
 from khala.mcp.server import server_of
 from khala.mcp.table import Look, Table, with_messages
 from khala.mcp.words import page
-from khala.minds import Minds
-from khala.seats import Seat, unhurried
+from khala.playing.minds import Minds
+from khala.playing.seats import Seat, unhurried
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol import speech

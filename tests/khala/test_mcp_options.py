@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.mcp.commands import Wanted, run_mcp, table_of
-from khala.seats import Seat
+from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:

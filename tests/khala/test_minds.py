@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.commands import reasons_not_valid, until_interrupted, without_orders
-from khala.local import _shares_of, spent_before
-from khala.minds import Minds, minds_of, named_sides
-from khala.spending import spent_usd
+from khala.commands.host import reasons_not_valid, until_interrupted, without_orders
+from khala.playing.local import _shares_of, spent_before
+from khala.playing.minds import Minds, minds_of, named_sides
+from khala.playing.spending import spent_usd
 from khala_agents.llm.money import Ledger
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Seat

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import one_process
-from khala.minds import Minds
+from khala.playing import one_process
+from khala.playing.minds import Minds
 from khala_bridge.game.processes import IdleGames
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import Observation

@@ -11,10 +11,10 @@ import pytest
 from khala_agents.policy import Policy
 from khala_agents.replay import replay_agent
 from khala_agents.worker import run_worker
-from khala_orchestrator.record import RecordingBus
+from khala_orchestrator.match.turn import Question, Turn
+from khala_orchestrator.past.transcript import StepSelection, save_pictures, summary, transcript
+from khala_orchestrator.publish.record import RecordingBus
 from khala_orchestrator.roster import Roster, Seat
-from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
-from khala_orchestrator.turn import Question, Turn
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.memory import MemoryBroker

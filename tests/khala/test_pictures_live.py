@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from khala.hosting import game_of
+from khala.playing.hosting import game_of
 from khala_agents.policy import Policy
 from khala_agents.worker import run_worker
 from khala_bridge.task.images import ImageSpec
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
-from khala_orchestrator.replay import replay
+from khala_orchestrator.past.replay import replay
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.messages import Observation
 from khala_protocol.recording import Recording

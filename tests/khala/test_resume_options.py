@@ -1,16 +1,18 @@
-"""A match that is gone on with stays as it was begun: which options --resume takes, and which it refuses."""
+"""A resumed match keeps its options: which options --resume takes, and which it refuses."""
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import pytest
 import typer
 
 from khala.cli import app
-from khala.matches import RECORDED, new, new_or_resumed
+from khala.commands.options import MatchOptions
+from khala.playing.matches import new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, run_key
@@ -19,10 +21,11 @@ from khala_protocol.recording import Recorder
 if TYPE_CHECKING:
     from pathlib import Path
 
-UNSAID: dict[str, Any] = dict.fromkeys(RECORDED.keys() - {"task", "run"})
+RECORDED = [field.name for field in fields(MatchOptions) if field.name != "assemble_s"]
+UNSAID: dict[str, Any] = dict.fromkeys(RECORDED)
 TAKEN = {
-    *("resume", "out", "as_json", "game", "assemble", "connect", "listen", "tls", "insecure", "trust"),
-    *("model", "model_name", "base_url", "policy", "fallback", "blue", "red", "side_model", "budget_usd", "latency"),
+    *("resume", "out", "as_json", "game", "assemble_s", "connect", "listen", "tls", "insecure", "trust"),
+    *("model", "model_name", "base_url", "policy", "fallback", "blue", "red", "side_model", "budget_usd", "latency_s"),
 }
 
 
@@ -65,7 +68,7 @@ def test_options_that_say_the_same_as_the_recording_are_taken(out: Path, given: 
 def test_options_that_say_something_else_are_refused_by_name(out: Path, given: dict[str, Any], named: str) -> None:
     with pytest.raises(ConfigError) as caught:
         resume(out, **given)
-    words = f"--resume goes on with a match as it was begun: leave out {named}, or begin a new one"
+    words = f"a resumed match keeps its options: leave out {named}, or begin a new one"
     assert str(caught.value) == words
 
 
@@ -77,8 +80,7 @@ def test_a_service_goes_on_with_a_match_as_it_was_begun(monkeypatch: pytest.Monk
 
 def test_of_every_option_it_is_decided_whether_a_resumed_match_takes_it() -> None:
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]  # it is a group
-    flags = {name: flag for name, flag in RECORDED.items() if name != "task"}
-    for name in ("run", "host"):
-        options = {param.opts[0]: param.name for param in commands[name].params if param.name != "task"}
-        assert set(flags.values()) <= set(options)
-        assert {param for flag, param in options.items() if flag not in flags.values()} <= TAKEN | {"help"}
+    for name in ("run", "host", "submit"):
+        options = {param.name for param in commands[name].params} - {"task", "run"}
+        assert options >= set(RECORDED)
+        assert options - set(RECORDED) <= TAKEN | {"help"}

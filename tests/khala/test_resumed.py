@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.matches import new, new_or_resumed
+from khala.playing.matches import new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.keys import Topic, run_key

@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 import typer
 
-from khala.exit_codes import SIGNALLED
-from khala.run import Wanted, _game_for, run
+from khala.commands.exit_codes import SIGNALLED
+from khala.commands.options import MindOptions
+from khala.commands.run import Wanted, _game_for, run
 
 
 def wanted(task: str | None, **match: Any) -> Wanted:
     given = {"images": None, "opponent": None} | match
-    return Wanted(task, None, None, Path("runs"), "nowhere", given, {}, (), {})
+    return Wanted(task, None, None, Path("runs"), "nowhere", given, MindOptions())
 
 
 def test_a_signal_before_the_match_is_known_ends_it_in_order(
@@ -27,7 +28,7 @@ def test_a_signal_before_the_match_is_known_ends_it_in_order(
         os.kill(os.getpid(), signal.SIGTERM)
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("khala.run._played", imports)
+    monkeypatch.setattr("khala.commands.run._played", imports)
     with pytest.raises(typer.Exit) as ended:
         run(wanted("2s3z"), as_json=False)
     assert ended.value.exit_code == SIGNALLED + signal.SIGTERM

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import one_process
-from khala.minds import Minds
-from khala.seats import NotAsked, Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.playing import one_process
+from khala.playing.minds import Minds
+from khala.playing.seats import NotAsked, Seat, SeatedMatch, Turn, seats_of, unhurried
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.spending import ledger_of, paid_usd
+from khala.playing.spending import ledger_of, paid_usd
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:

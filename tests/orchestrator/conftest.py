@@ -20,8 +20,8 @@ from khala_bridge.knowledge import knowledge
 from khala_bridge.state import read_info, read_snapshot
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
+from khala_orchestrator.match.turn import Question, Turn
 from khala_orchestrator.roster import Roster, Seat
-from khala_orchestrator.turn import Question, Turn
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.codec import decode_as, encode

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_orchestrator.announce import Announcer
+from khala_orchestrator.publish.announce import Announcer
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode

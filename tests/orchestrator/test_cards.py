@@ -12,8 +12,8 @@ import pytest
 from khala_bridge.catalogue.catalogue import catalogue_sha256
 from khala_bridge.game.game import GameIdentity
 from khala_bridge.task.config import TaskConfig
-from khala_orchestrator.cards import briefing, run_card
 from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_orchestrator.match.cards import briefing, run_card
 from khala_protocol.messages import AgentCard, Clock, Contact, Frames, TeamSpec
 from khala_protocol.speech import parse
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_orchestrator.fork import advice_of, trunk_of, write_beginning, write_whole
 from khala_orchestrator.host import host
-from khala_orchestrator.replay import replay
-from khala_orchestrator.resume import FORKED, unfinished
+from khala_orchestrator.past.fork import advice_of, trunk_of, write_beginning, write_whole
+from khala_orchestrator.past.replay import replay
+from khala_orchestrator.past.resume import FORKED, unfinished
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, KhalaError, RecordingError
 from khala_protocol.keys import Topic

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.hosting import MAX_RESTARTS, hosted
+from khala.playing.hosting import MAX_RESTARTS, hosted
 from khala_bridge.errors import GameError, GameMissing
-from khala_orchestrator.resume import RESUMED
+from khala_orchestrator.past.resume import RESUMED
 from khala_protocol.messages import Observation, Report
 from khala_protocol.recording import Recording
 
@@ -101,7 +101,7 @@ def stable(
     async def make(*calls: int, **how: Any) -> Stable:
         games = [await start(Mortal(still_game(), number, **how)) for number in calls]
         stable = Stable(hall, games)
-        monkeypatch.setattr("khala.hosting.game_of", stable.next_game)
+        monkeypatch.setattr("khala.playing.hosting.game_of", stable.next_game)
         return stable
 
     return make

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from khala_orchestrator.mailbox import MAX_CHARACTERS, Mailbox
 from khala_orchestrator.roster import Seat
+from khala_orchestrator.words.mailbox import MAX_CHARACTERS, Mailbox
 from khala_protocol.messages import Message
 
 A, B, C, FOE = Seat("p1", "A"), Seat("p1", "B"), Seat("p1", "C"), Seat("p2", "B")

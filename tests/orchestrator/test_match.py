@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_orchestrator.match import Match, SilentObserver, Stopwatch
+from khala_orchestrator.match.match import Match, SilentObserver, Stopwatch
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.turn import Answer, Answers
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.side import sides_of
-from khala_orchestrator.turn import Answer, Answers
 from khala_protocol.messages import Briefing, Message, Received, Reply, Report, Result, Timings, Usage
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
-    from khala_orchestrator.match import MatchObserver
-    from khala_orchestrator.turn import Question
+    from khala_orchestrator.match.match import MatchObserver
+    from khala_orchestrator.match.turn import Question
     from khala_protocol.messages import Observation
     from tests.orchestrator.conftest import StillGame
 
@@ -293,7 +293,7 @@ async def test_a_report_says_how_long_each_phase_took(play: Play) -> None:
 
 def test_a_phase_that_is_entered_twice_or_fails_is_counted_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter((0.0, 1.0, 10.0, 12.0, 20.0, 23.0))
-    monkeypatch.setattr("khala_orchestrator.match.time.perf_counter", lambda: next(times))
+    monkeypatch.setattr("khala_orchestrator.match.match.time.perf_counter", lambda: next(times))
     watch = Stopwatch()
     with watch.phase("observe"):
         pass

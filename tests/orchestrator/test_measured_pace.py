@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from khala.cli import app
-from khala_orchestrator.measured_pace import least_squares, measured_paces, yaml
+from khala_orchestrator.past.measured_pace import least_squares, measured_paces, yaml
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key
 from khala_protocol.messages import ModelCall, Pace, Usage

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from khala_orchestrator.pacing import AtOnce, WallClock, pacing_of
+from khala_orchestrator.match.pacing import AtOnce, WallClock, pacing_of
 from khala_protocol.messages import LOOPS_PER_S, Clock
 
 CLOCK = "jumps"

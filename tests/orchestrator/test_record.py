@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_orchestrator.allowance import STEP_BYTES
-from khala_orchestrator.record import LAST_EXCHANGES_S, BestEffort, Listener, RecordingBus
+from khala_orchestrator.publish.allowance import STEP_BYTES
+from khala_orchestrator.publish.record import LAST_EXCHANGES_S, BestEffort, Listener, RecordingBus
 from khala_orchestrator.roster import Seat
 from khala_protocol.access import EXCHANGE_BYTES
 from khala_protocol.bus import Delivery, Sample

@@ -10,9 +10,9 @@ import pytest
 
 from khala_bridge.observe.text import SECTIONS
 from khala_orchestrator.config import change, load_task
-from khala_orchestrator.replay import RecordedTurn, recorded_config, replay
-from khala_orchestrator.resume import unfinished
-from khala_orchestrator.turn import Question
+from khala_orchestrator.match.turn import Question
+from khala_orchestrator.past.replay import RecordedTurn, recorded_config, replay
+from khala_orchestrator.past.resume import unfinished
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic

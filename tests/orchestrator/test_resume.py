@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_orchestrator.host import host
-from khala_orchestrator.replay import replay
-from khala_orchestrator.resume import RESUMED, ResumeError, unfinished
+from khala_orchestrator.past.replay import replay
+from khala_orchestrator.past.resume import RESUMED, ResumeError, unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic

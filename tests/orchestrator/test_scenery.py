@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.errors import GameError
-from khala_orchestrator.scenery import Scenery
-from khala_orchestrator.schedule import StepId
+from khala_orchestrator.match.scenery import Scenery
+from khala_orchestrator.match.schedule import StepId
 from khala_protocol.bus import Delivery
 from khala_protocol.messages import Scene, Terrain
 from khala_protocol.recording import Recording

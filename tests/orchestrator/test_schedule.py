@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala_orchestrator.match.schedule import Cadence, Schedule, StepId, loops_to_think
+from khala_orchestrator.match.turn import Answer
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.schedule import Cadence, Schedule, StepId, loops_to_think
-from khala_orchestrator.turn import Answer
 from khala_protocol.messages import Clock, Pace, Reply, Usage
 
 if TYPE_CHECKING:

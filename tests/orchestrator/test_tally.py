@@ -8,7 +8,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.state import Snapshot, read_info, read_snapshot
-from khala_orchestrator.tally import Tally, valid_together
+from khala_orchestrator.match.tally import Tally, valid_together
 from khala_protocol.messages import AgentReport, Rejection, Report, Usage
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_orchestrator.past.transcript import StepSelection, save_pictures, summary, transcript
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.transcript import StepSelection, save_pictures, summary, transcript
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.keys import RUN_TOPICS, Topic, agent_key, image_key, run_key

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala_orchestrator.match.turn import Question, Turn
 from khala_orchestrator.roster import Roster, Seat
-from khala_orchestrator.turn import Question, Turn
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBus
 from khala_protocol.codec import encode

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
 from khala_orchestrator.roster import Seat
-from khala_orchestrator.validity import AWAY, Deeds, why_not_valid
 from khala_protocol.messages import AgentReport, AgentStatus
 
 

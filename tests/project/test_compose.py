@@ -17,7 +17,7 @@ from check_jsonschema import main as check_jsonschema  # type: ignore[import-unt
 from click.testing import CliRunner
 
 from khala.cli import app
-from khala.doctor import KEYS
+from khala.commands.doctor import KEYS
 from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:

@@ -4,10 +4,12 @@ A client makes one try and no more: `khala_agents.llm.retry` repeats, `khala_age
 `khala_agents.llm_policy.LLMPolicy` joins the three. The type of an error says whose fault it is:
 
     LLMError                    .status as recorded in a `ModelCall`, .retryable
-    ├── Refused                 ours: the request is wrong, and stays wrong (400, 404, 413, 422, …)
+    ├── RequestRefused          ours: the request is wrong, and stays wrong (400, 404, 413, 422, …)
     │   └── Unauthorized        the user's: the key (401, 403)
     ├── OutOfMoney              the account is empty or its quota used up (402, some 429)
-    ├── Unavailable             the provider's, for now (408, 409, 429, 5xx); may say when to come back
+    ├── EndpointUnavailable     the provider's, for now (408, 409, 429, 5xx); may say when to come back
+    ├── EndpointAway            it failed so often that it is not asked now (`khala_agents.llm.breaker`)
+    ├── NotRecorded             a recording that answers has no such request (`khala_agents.llm.replay`)
     ├── Unreachable             the link's: refused, reset, broken in the middle
     ├── TryTimeout              the time of this one try is over
     ├── MalformedCompletion     the provider's: "200 OK" without a completion in it

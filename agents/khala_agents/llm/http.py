@@ -1,4 +1,4 @@
-"""HTTP to one model endpoint: with `khala_agents.llm.transport` below it, the only module that knows httpx.
+"""HTTP to one model endpoint: with `khala_agents.llm.transport` below it, which sends what httpx asks over aiohttp.
 
 Each agent has its own client, and so its own connections: a cancelled call disturbs no other agent. The number of
 connections is not limited, `khala_agents.llm.limits` holds requests back. `refresh` discards the client between

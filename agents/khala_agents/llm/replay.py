@@ -102,7 +102,8 @@ class ReplayClient:
 
 def _failure(exchange: ModelCall) -> LLMError:
     """Return the failure that was recorded; of a request that was cancelled, that its time was over."""
-    text, status = exchange.reason or f"recorded: {exchange.status}", exchange.status
+    text = exchange.reason or f"recorded: {exchange.status}"
+    status = exchange.status
     match status:
         case "timeout" | "cancelled":
             return TryTimeout(text)

@@ -129,7 +129,8 @@ def _middle(team: TextTeam) -> tuple[float, float]:
 
 def _pools(action: TextAction, team: TextTeam, situation: Situation) -> list[list[str]]:
     """Return, for each tag that an action takes, those that the text calls valid."""
-    count, will = action.args.count("tag"), team.will.get(action.name, ANY)
+    count = action.args.count("tag")
+    will = team.will.get(action.name, ANY)
     own = [unit.tag for unit in team.own]
     targets = list(will.tags)
     if not targets:

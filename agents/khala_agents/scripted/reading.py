@@ -333,7 +333,9 @@ def _unit(line: str) -> TextUnit | None:
     for part in parts:
         key, _, value = part.partition(" ")
         fields.setdefault(key, value)
-    tag, at, health = _TAG.search(line), _AT.search(fields.get("screen", "")), _PART.match(fields.get("health", ""))
+    tag = _TAG.search(line)
+    at = _AT.search(fields.get("screen", ""))
+    health = _PART.match(fields.get("health", ""))
     if tag is None or at is None or health is None:
         return None
     shield = _PART.match(fields.get("shield", ""))

@@ -192,7 +192,8 @@ class Actor:
             CallRejected: it cannot stand.
         """
         words = self._words[saw.agent.name]
-        meant, until = recognise(item.call, words, Addressees(saw, words)), read_until(item.until)
+        meant = recognise(item.call, words, Addressees(saw, words))
+        until = read_until(item.until)
         if isinstance(meant, Rejection):
             raise CallRejected(meant.reason, meant.message)
         for said in meant:

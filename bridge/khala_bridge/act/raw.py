@@ -41,7 +41,8 @@ def _action(command: Command) -> GameAction:
 
 def _words(command: Command) -> str:
     """Return a command as a raw function of PySC2, `Attack_unit(now, [0x1], 0x2)`."""
-    stem, units = command.function.stem, listed(command.units)
+    stem = command.function.stem
+    units = listed(command.units)
     if command.function.kind == "autocast":
         return written(f"{stem}_autocast", units)
     when = "queued" if command.queued else "now"

@@ -174,7 +174,8 @@ class _Tour:
         raise Missed("the target is beyond the reach of the camera")
 
     def _hit(self, command: Command) -> Pixel:
-        screen, place = RealScreen(self.now), self._place(command)
+        screen = RealScreen(self.now)
+        place = self._place(command)
         if isinstance(command.target, int):
             pixel = screen.hit(self._unit(command.target))
         elif "unit" in raw_forms(command.function.ability_id):

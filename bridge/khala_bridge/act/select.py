@@ -68,7 +68,8 @@ class Hand:
             if self._is_right(command):
                 return
         yield from self._click_all(command)
-        wanted, selected = self._alive(command), self._selected
+        wanted = self._alive(command)
+        selected = self._selected
         if not wanted & selected:
             raise Missed("its units could not be selected, something stands over them")
         if selected - wanted:
@@ -99,7 +100,8 @@ class Hand:
         return {self._tour.now.units[tag].name for tag in self._alive(command)}
 
     def _is_right(self, command: Command) -> bool:
-        wanted, selected = self._alive(command), self._selected
+        wanted = self._alive(command)
+        selected = self._selected
         if self._one_will_do(command):
             same = {self._tour.now.units[tag].name for tag in selected}
             return wanted <= selected and same == self._types(command)
@@ -115,7 +117,8 @@ class Hand:
 
     def _short_ways(self, command: Command) -> Iterator[Way]:
         """Yield the ways of one or two functions that may lead to the right selection."""
-        tour, wanted = self._tour, self._alive(command)
+        tour = self._tour
+        wanted = self._alive(command)
         player = tour.now.player
         group = self._group(command)
         if group is not None and wanted <= self._groups.get(group, frozenset()):
@@ -148,7 +151,8 @@ class Hand:
         tries: Counter[int] = Counter()
         fresh = bool(self._selected - self._alive(command))
         while True:
-            wanted, selected = self._alive(command), self._selected
+            wanted = self._alive(command)
+            selected = self._selected
             missing = [t for t in command.units if t in wanted and (fresh or t not in selected) and tries[t] < TRIES]
             strange = [] if fresh else [t for t in sorted(selected - wanted) if tries[t] < TRIES]
             if not missing and not strange:

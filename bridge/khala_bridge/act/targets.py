@@ -87,7 +87,8 @@ class Targets:
         Raises:
             CallRejected: the unit does not exist, is dead or out of sight, or does not fit the action.
         """
-        tag, anywhere = said.tags[-1], said.action.rule is not None or said.team.camera is None
+        tag = said.tags[-1]
+        anywhere = said.action.rule is not None or said.team.camera is None
         unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
         if unit is None:
             raise self._nowhere(said, tag)
@@ -121,7 +122,8 @@ class Targets:
 
     def _camera_now(self, said: Recognised) -> Camera | None:
         """Return the present camera of a call's team; None if the team has no screen, or no unit any more."""
-        then, teams = said.team.camera, self._observation.teams[said.team.team.agent]
+        then = said.team.camera
+        teams = self._observation.teams[said.team.team.agent]
         team = next((team for team in teams if team.name == said.team.team.name), None)
         if then is None or team is None:
             return None
@@ -195,7 +197,8 @@ class Targets:
         return CallRejected("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
 
     def _not_of_team(self, said: Recognised, tag: int) -> CallRejected:
-        name, own = said.team.view.name, [tag for tag in said.team.team.tags if tag in self._units]
+        name = said.team.view.name
+        own = [tag for tag in said.team.team.tags if tag in self._units]
         if self.end_of(tag):
             return self._gone(tag)
         units = f"units of team {name} are {', '.join(map(hex, own))}"

@@ -214,7 +214,7 @@ class Translator:
             return able[:1]
         if self._snapshot.abilities is None:
             return able
-        return able[: self.ledger.payable(FREE if one is None else price_of(one) for one in facts)]
+        return able[: self.ledger.payable(FREE if fact is None else price_of(fact) for fact in facts)]
 
     @staticmethod
     def _cannot(said: Recognised, reasons: list[str]) -> CallRejected:

@@ -79,7 +79,8 @@ def read_until(words: str) -> Until:
     if upgrade := _named(words, upgrades()):
         return Until(upgrade, "upgrade", name=upgrade)
     if amount := _AMOUNT.fullmatch(words):
-        number, what = int(amount["a"] or amount["b"]), amount["what"] or amount["name"]
+        number = int(amount["a"] or amount["b"])
+        what = amount["what"] or amount["name"]
         plain = squashed(what)
         if plain in ("minerals", "vespene", "gas"):
             kind: Literal["minerals", "vespene"] = "minerals" if plain == "minerals" else "vespene"
@@ -91,7 +92,8 @@ def read_until(words: str) -> Until:
 
 def _named(words: str, known: Iterable[str]) -> str | None:
     """Return the known name that some words mean, in any spelling and also in the plural."""
-    names, plain = {squashed(name): name for name in known}, squashed(words)
+    names = {squashed(name): name for name in known}
+    plain = squashed(words)
     return names.get(plain) or names.get(plain.removesuffix("s"))
 
 

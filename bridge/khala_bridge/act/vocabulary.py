@@ -53,7 +53,8 @@ class Vocabulary:
 
     def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
         """Return the actions that some teams have instead of a wrong name, as the end of a sentence."""
-        wanted, words = squashed(name), _words(name)
+        wanted = squashed(name)
+        words = _words(name)
         known = list(self._sayable(list(teams)))
         likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
         ranked = sorted(known, key=lambda action: -likeness[action.name])[:NEAREST]

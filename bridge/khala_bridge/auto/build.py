@@ -55,7 +55,8 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
     """
     unit = _named(ask)
     ask.able()
-    land, structure = land_of(ask.snapshot), structure_of(ask)
+    land = land_of(ask.snapshot)
+    structure = structure_of(ask)
     if is_gas(ask):
         free = free_geysers(ask)
         found = min(free, key=lambda u: (math.dist(place(u), place(unit)), u.tag), default=None)
@@ -91,7 +92,8 @@ def build_auto(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: there is no place, or as `build_at`.
     """
     ask.able()
-    land, structure = land_of(ask.snapshot), structure_of(ask)
+    land = land_of(ask.snapshot)
+    structure = structure_of(ask)
     if is_gas(ask):
         orders = _on_geyser(ask, free_geyser(ask, free_geysers(ask)))
     elif sites()[structure].clear:
@@ -110,7 +112,8 @@ def any_place(ask: RuleRequest) -> None:
     Raises:
         NotAvailable: there is no place.
     """
-    land, structure = land_of(ask.snapshot), structure_of(ask)
+    land = land_of(ask.snapshot)
+    structure = structure_of(ask)
     if is_gas(ask):
         free_geyser(ask, free_geysers(ask))
     elif sites()[structure].clear:
@@ -193,7 +196,8 @@ def _check_site(ask: RuleRequest, land: Land, middle: WorldPoint) -> None:
 
 def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
     """Return why a structure cannot stand on a cell and those around it, as half a sentence."""
-    site, footprint = sites()[structure_of(ask)], footprint_need(structure_of(ask))
+    site = sites()[structure_of(ask)]
+    footprint = footprint_need(structure_of(ask))
     cells = [(cell[0] + dx, cell[1] + dy) for dx, dy in footprint.cells]
     if not all(land.ground.holds(x, y) and land.ground.buildable[x, y] for x, y in cells):
         return "a cliff, a ramp or the edge of the map is in its way."

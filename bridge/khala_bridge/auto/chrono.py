@@ -118,7 +118,7 @@ def makes_something(unit_type: str) -> bool:
     if known is None or not known.structure:
         return False
     facts = (abilities()[number] for number in known.ability_ids if number in abilities())
-    return any(one.does in MAKING or one.researches is not None for one in facts)
+    return any(fact.does in MAKING or fact.researches is not None for fact in facts)
 
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:

@@ -88,12 +88,14 @@ def _own_units(ask: RuleRequest) -> list[Unit]:
 
 def _near_which(ask: RuleRequest) -> list[Unit]:
     """Return what a structure can be built near: free geysers, resources of free base places, or own structures."""
-    land, structure = land_of(ask.snapshot), structure_of(ask)
+    land = land_of(ask.snapshot)
+    structure = structure_of(ask)
     if is_gas(ask):
         return _nearest_first(land, free_geysers(ask))
     if sites()[structure].clear:
         return _of_bases(ask, land)
-    allowed, corner = legal_now(land, structure), on_corner(structure)
+    allowed = legal_now(land, structure)
+    corner = on_corner(structure)
     return [unit for unit in own_structures(ask.snapshot) if _has_cell(allowed, unit, NEAR, corner=corner)]
 
 
@@ -101,7 +103,8 @@ def _of_bases(ask: RuleRequest, land: Land | None = None) -> list[Unit]:
     """Return a mineral field for each base place where the structure can stand: the nearest to its middle."""
     land = land or land_of(ask.snapshot)
     structure = structure_of(ask)
-    footprint, allowed = footprint_need(structure), legal_now(land, structure)
+    footprint = footprint_need(structure)
+    allowed = legal_now(land, structure)
     free = [base for base in land.bases if allowed[footprint.cell(*base.place)] and not is_held(land, base.place)]
     fields = {(round(unit.pos.x, 3), round(unit.pos.y, 3)): unit for unit in land.standing("mineral_field")}
     nearest = (min(base.fields, key=lambda at: (math.dist(at, base.place), at)) for base in free if base.fields)
@@ -159,7 +162,8 @@ def openings(action: Action, snapshot: Snapshot, camera: Camera, world: MapFrame
     structure = structure_of(ask)
     if is_gas(ask):
         return [at for at in map(place, free_geysers(ask)) if _shows(camera, world, at)][:most]
-    site, footprint = sites()[structure], footprint_need(structure)
+    site = sites()[structure]
+    footprint = footprint_need(structure)
     if site.clear:
         allowed = legal_now(land, structure)
         free = [base.place for base in land.bases if allowed[footprint.cell(*base.place)]]

@@ -46,7 +46,8 @@ AMONG_WORKERS: Final = frozenset({"MissileTurret", "SporeCrawler"})
 
 def for_structure(land: Land, ledger: Ledger, structure: str) -> tuple[int, int] | None:
     """Return the best cell at the own bases for a structure, if any; not for town halls and gas structures."""
-    grid, corner = good(land, ledger, structure), on_corner(structure)
+    grid = good(land, ledger, structure)
+    corner = on_corner(structure)
     halls = [place(unit) for unit in land.own_halls]
     if structure == "Pylon":
         found = best(grid, _for_pylon(land, ledger, halls))

@@ -92,7 +92,8 @@ def _no_room(ask: RuleRequest, who: str) -> NotAvailable:
 
 
 def _has_room(ask: RuleRequest, land: Land, unit: UnitState) -> bool:
-    footprint, place = footprint_of(unit.type), ask.snapshot.units[unit.tag].pos
+    footprint = footprint_of(unit.type)
+    place = ask.snapshot.units[unit.tag].pos
     if footprint is None:
         return True
     x, y = footprint.cell(place.x, place.y)

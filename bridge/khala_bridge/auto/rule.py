@@ -62,7 +62,8 @@ class RuleRequest:
         """
         use = asked_by(self.action, of_side=not self.units)
         assert use is not None, f"{self.action.name} has a rule and no function"
-        side, types = self.side, self.action.units or self._users()
+        side = self.side
+        types = self.action.units or self._users()
         units = [side.units[tag] for tag in self.units if tag in side.units] if self.units else side.of_types(types)
         judged = [(unit, why_not(use, unit, side, self.ledger)) for unit in units]
         able = [unit for unit, why in judged if why is None]
@@ -102,7 +103,7 @@ class RuleOrder:
 
 
 class NotAvailable(Exception):
-    """The rule finds no order; the message is a sentence for the model."""
+    """The rule finds no order; the message tells the model why."""
 
     def __init__(
         self,

@@ -85,7 +85,8 @@ def unseen_places(snapshot: Snapshot, home: WorldPoint) -> list[WorldPoint]:
     def order(points: list[WorldPoint]) -> list[WorldPoint]:
         return sorted(points, key=lambda point: (round(math.dist(point, home), 3), point))
 
-    starts, bases = list(land.ground.starts), [base.place for base in land.bases]
+    starts = list(land.ground.starts)
+    bases = [base.place for base in land.bases]
     squares = _never(land, _squares(land, home))
     never_seen = [*order(_never(land, starts)), *order(_never(land, bases)), *order(squares)]
     if never_seen:

@@ -46,7 +46,8 @@ def legal(land: Land, ledger: Ledger, structure: str) -> Bools:
 
 def _fitting(land: Land, structure: str, ground: Bools) -> Bools:
     """Return the cells (w, h) where a structure may stand if its cells may be on this ground."""
-    site, footprint = sites()[structure], footprint_need(structure)
+    site = sites()[structure]
+    footprint = footprint_need(structure)
     result = everywhere(ground & land.clear if site.clear else ground, footprint.cells)
     return result & land.powered(corner=on_corner(structure)) if site.ground == "powered" else result
 
@@ -72,7 +73,8 @@ def promised(land: Land, ledger: Ledger) -> Bools:
 
 def any_good(land: Land, structure: str) -> bool:
     """Return True if `good` marks a cell at the beginning of a turn; structures of the same needs share the answer."""
-    site, footprint = sites()[structure], footprint_need(structure)
+    site = sites()[structure]
+    footprint = footprint_need(structure)
     key = site.ground, site.clear, site.seen, footprint.rows
     if key not in land.answers:
         land.answers[key] = _is_good(land, structure, _good_before.get(key)) or _find_good(land, structure, key)
@@ -95,7 +97,8 @@ def _find_good(land: Land, structure: str, key: object) -> bool:
 
 def _is_good(land: Land, structure: str, cell: tuple[int, int] | None) -> bool:
     """Return True if `good` marks a cell, by a look at the cells under the structure alone; not for town halls."""
-    site, footprint = sites()[structure], footprint_need(structure)
+    site = sites()[structure]
+    footprint = footprint_need(structure)
     if (
         cell is None
         or site.clear

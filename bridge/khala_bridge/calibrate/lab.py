@@ -158,7 +158,9 @@ class Lab:
     def _creation(self, put: Put) -> debug_pb2.DebugCommand:
         command = debug_pb2.DebugCommand()
         made = command.create_unit
-        made.unit_type, made.owner, made.quantity = self.types[put.kind].unit_id, put.owner, 1
+        made.unit_type = self.types[put.kind].unit_id
+        made.owner = put.owner
+        made.quantity = 1
         made.pos.x, made.pos.y = put.at
         return command
 

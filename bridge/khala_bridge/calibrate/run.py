@@ -61,7 +61,8 @@ class _Stage:
 
     def measure(self, probe: Probe) -> Measured:
         samples: dict[str, list[float]] = {}
-        failed, loops = "", 0
+        failed = ""
+        loops = 0
         begun = time.monotonic()
         try:
             lab = self._ready(probe)
@@ -73,7 +74,9 @@ class _Stage:
                 lab.clear()
         except Exception as error:  # a game that nobody has tried yet may do anything; the others go on
             log.warning("probe %s failed", probe.id, exc_info=True)
-            failed, samples, self._lab = f"{type(error).__name__}: {error}", {}, None
+            failed = f"{type(error).__name__}: {error}"
+            samples = {}
+            self._lab = None
         return Measured(
             unit=probe.unit,
             exact=probe.exact,

@@ -70,7 +70,8 @@ def catalogue() -> dict[str, Action]:
         CatalogueError: an entry contradicts another one or PySC2's functions.
     """
     written = curated()
-    found, spellings = dict(written), _Spellings()
+    found = dict(written)
+    spellings = _Spellings()
     for action in written.values():
         spellings.add(action)
     for action in generated(written):

@@ -148,7 +148,8 @@ class Patience:
         """Return it for a game whose opponent may take its time, too."""
         if not opponent.joins:
             return self
-        wait_s, hangs = opponent.wait_s, f"the game, or the {opponent.words}"
+        wait_s = opponent.wait_s
+        hangs = f"the game, or the {opponent.words}"
         return replace(self, unknown_s=self.unknown_s + wait_s, least_s=self.least_s + wait_s, hangs=hangs)
 
     def limit_s(self, slowest_s: float | None) -> float:
@@ -227,7 +228,8 @@ class GameThread:
         """Play one plan of each player to its end, or to the end of the episode."""
         play = functools.partial(self._playing.act, plans)
         loop = asyncio.get_running_loop()
-        began_s, remark_s = loop.time(), self._patience.remark_after_s(self._slowest_s)
+        began_s = loop.time()
+        remark_s = self._patience.remark_after_s(self._slowest_s)
         remark = loop.call_later(remark_s, log.warning, "%s has not answered for %g s", self._patience.hangs, remark_s)
         try:
             played = await self._run(play, self._patience.limit_s(self._slowest_s))

@@ -38,7 +38,8 @@ class LanGame:
         try:
             self.map_data, settings = _read(self._tcp)
             self.map_name, self.map_path = str(settings["map_name"]), str(settings["map_path"])
-            self.realtime, self.game_version = bool(settings["realtime"]), settings["game_version"]
+            self.realtime = bool(settings["realtime"])
+            self.game_version = settings["game_version"]
             ports = settings["ports"]
             server, client = ports["server"], ports["client"]
             self.ports = LanPorts(0, 0, server["game"], server["base"], client["game"], client["base"])

@@ -101,7 +101,8 @@ class Manners:
             request.observation.disable_fog = False
         elif request.HasField("join_game"):
             join = request.join_game
-            self.name, self.race = join.player_name, common_pb2.Race.Name(join.race).lower()
+            self.name = join.player_name
+            self.race = common_pb2.Race.Name(join.race).lower()
             self._ports.write(join)
         else:
             return data

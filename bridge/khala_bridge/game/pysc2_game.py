@@ -232,7 +232,8 @@ class _Player:
         try:
             self.step = next(self._plan) if snapshot is None else self._plan.send(snapshot)
         except StopIteration as done:
-            self.step, self.played = None, done.value
+            self.step = None
+            self.played = done.value
 
 
 def _map_data(config: GameConfig) -> bytes:

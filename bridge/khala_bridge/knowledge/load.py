@@ -160,7 +160,8 @@ def _beaten_by() -> dict[str, tuple[str, ...]]:
 
 
 def _described(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> UnitFacts:
-    words, filler = unit_words()[kind.name], _filler(version)
+    words = unit_words()[kind.name]
+    filler = _filler(version)
     traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
     told = {
         "allows": _allowed_by(version).get(kind.name, ()),

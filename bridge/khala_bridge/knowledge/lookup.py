@@ -46,7 +46,7 @@ def find(name: str, version: str = VERSION) -> list[Known]:
     if found:
         return found
     plain = {_plain(one.name): one.name for one in everything if one.melee}
-    near = [plain[one] for one in difflib.get_close_matches(wanted, plain, n=3)]
+    near = [plain[name] for name in difflib.get_close_matches(wanted, plain, n=3)]
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
     raise NotKnown(f"nothing in version {version} of the game is called '{name}'{hint}")
 
@@ -127,7 +127,9 @@ def _upgrade(upgrade: UpgradeFacts, version: str) -> list[str]:
         out.append(f"{INDENT}Researched at {listed(upgrade.at)} for {cost} in {n(upgrade.time_s)} s{needs}")
     for name, changes in upgrade.changes.items():
         out.append(f"{INDENT}{name}: " + ", ".join(f"{what} {more:+g}" for what, more in changes.items()))
-    allowed = [f"{abilities(version)[one].name} ({one})" for one in upgrade.enables if one in abilities(version)]
+    allowed = [
+        f"{abilities(version)[enable].name} ({enable})" for enable in upgrade.enables if enable in abilities(version)
+    ]
     return [*out, f"{INDENT}Allows {listed(tuple(allowed))}"] if allowed else out
 
 

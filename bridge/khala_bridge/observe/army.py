@@ -105,13 +105,13 @@ def _parts(scene: Scene, places: Places, units: Sequence[_Seen]) -> list[ArmyPar
 def _grouped(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen]]]:
     named: dict[str, list[_Seen]] = {}
     loose: list[tuple[str, list[_Seen]]] = []
-    for one in units:
-        if name := places.name_of((one.x, one.y)):
-            named.setdefault(name, []).append(one)
-        elif near := next((g for _, g in loose if math.dist((g[0].x, g[0].y), (one.x, one.y)) <= TOGETHER), None):
-            near.append(one)
+    for unit in units:
+        if name := places.name_of((unit.x, unit.y)):
+            named.setdefault(name, []).append(unit)
+        elif near := next((g for _, g in loose if math.dist((g[0].x, g[0].y), (unit.x, unit.y)) <= TOGETHER), None):
+            near.append(unit)
         else:
-            loose.append(("", [one]))
+            loose.append(("", [unit]))
     return [*named.items(), *loose]
 
 

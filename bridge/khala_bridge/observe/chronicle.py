@@ -119,7 +119,8 @@ class Chronicle:
         self.loop = snapshot.game_loop
         self._keep_account(snapshot)
         before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
-        new, killed = self._new_enemies(snapshot), self._killed(snapshot.dead)
+        new = self._new_enemies(snapshot)
+        killed = self._killed(snapshot.dead)
         made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if self._is_new(unit, before.get(tag))]
         events: tuple[Event, ...] = ()
         if self.number:

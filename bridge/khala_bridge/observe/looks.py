@@ -71,7 +71,8 @@ def looks(bodies: BodyArrays, cameras: Sequence[Camera], members: Sequence[Seque
         cameras: of each team, all of the same size.
         members: by team, the rows of its units; at least one.
     """
-    places, sizes = bodies.places, [len(rows) for rows in members]
+    places = bodies.places
+    sizes = [len(rows) for rows in members]
     ends = [0, *accumulate(sizes)]
     mine = np.array(list(chain.from_iterable(members)))
     owner = np.repeat(np.arange(len(sizes)), sizes)

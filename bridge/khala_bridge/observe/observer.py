@@ -74,7 +74,8 @@ class Observer:
             snapshot: the state of the game.
             feedback: by agent; an agent that is not in it gets none.
         """
-        episode, world = self._episode, snapshot.info.frame(self._task.frames)
+        episode = self._episode
+        world = snapshot.info.frame(self._task.frames)
         episode.roster.update(snapshot.own, snapshot.player)
         episode.chronicle.note(snapshot)
         if self._leads:
@@ -118,7 +119,8 @@ class Observer:
 
     def _view(self, moment: _Moment, agent: AgentConfig, changes: Changes, teams: Sequence[TeamObservation]) -> View:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
-        scene, parts = moment.scene, self._parts[agent.name]
+        scene = moment.scene
+        parts = self._parts[agent.name]
         heard = moment.feedback.get(agent.name, Feedback())
         view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=heard.standing)
         more: dict[str, object] = {}

@@ -107,7 +107,8 @@ class Possible:
             return None
         facts = facts_for(action.pysc2.ability_id, unit_type, self._side.upgrades)
         assert facts is not None, f"{action.name} is paid"
-        cost, made = price_of(facts), facts.produces
+        cost = price_of(facts)
+        made = facts.produces
         times = self._ledger.times(cost)
         known = knowledge().get(made) if made else None
         return ActionCost(
@@ -150,7 +151,8 @@ def _with_arguments(
     judged: Mapping[str, str | None], asker: Asker
 ) -> tuple[Mapping[str, str | None], list[ValidArguments]]:
     """Return the judgement after a look at the arguments, and the arguments where only some will do."""
-    result, arguments = dict(judged), []
+    result = dict(judged)
+    arguments = []
     for name, why in judged.items():
         found = None if why is not None else asker.arguments(catalogue()[name])
         if isinstance(found, Lack):

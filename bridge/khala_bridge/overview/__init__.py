@@ -4,7 +4,7 @@
     scene     the units of all sides, put together                      grids   creep, fog and ground, packed
 
 Pure functions of the snapshots of all sides and, if the game shows it, of one of the whole map. Nothing that makes
-observations may import this. Above: `khala_orchestrator.scenery`.
+observations may import this. Above: `khala_orchestrator.match.scenery`.
 """
 
 from khala_bridge.overview.scene import Watched, scene_of

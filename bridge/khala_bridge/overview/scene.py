@@ -114,7 +114,8 @@ def _fired(side: Watched) -> Iterator[int]:
     """Yield the side's units that have fired since the scene before."""
     if side.before is None:
         return
-    was, passed = side.before.known, side.now.game_loop - side.before.game_loop
+    was = side.before.known
+    passed = side.now.game_loop - side.before.game_loop
     for unit in side.now.own:
         if unit.weapon_cooldown and unit.tag in was:
             left = max(was[unit.tag].weapon_cooldown - passed, 0.0)
@@ -143,7 +144,8 @@ def _players(sides: Sequence[Watched], known: Mapping[int, Unit], units: Iterabl
             _add(counts[mark.player], mark, known[mark.tag])
     own = {side.now.player.player_id: side for side in sides}
     for number in sorted({*counts, *own}):
-        count, side = counts[number], own.get(number)
+        count = counts[number]
+        side = own.get(number)
         yield PlayerMark(
             player=number,
             race=count.race or ("" if side else sides[0].now.info.enemy_race),
@@ -185,7 +187,9 @@ def _means(side: Watched) -> dict[str, object]:
 def _effects(sides: Sequence[Watched], whole: Snapshot | None, pen: Pen) -> Iterator[EffectMark]:
     for snapshot in (*(side.now for side in sides), *((whole,) if whole else ())):
         for effect in snapshot.effects:
-            name, radius, player = effect_name(effect.effect_id), pen.length(effect.radius), _owner(effect, snapshot)
+            name = effect_name(effect.effect_id)
+            radius = pen.length(effect.radius)
+            player = _owner(effect, snapshot)
             yield from (EffectMark(name, player, *pen.place(place), radius) for place in effect.places)
 
 

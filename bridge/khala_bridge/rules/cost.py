@@ -51,7 +51,7 @@ def cases(ability: int, unit_type: str) -> tuple[AbilityFacts, ...]:
 @functools.cache
 def is_free(ability: int, unit_type: str) -> bool:
     """Return True if the use of an ability takes nothing: no minerals, vespene, supply or energy, and no research."""
-    return not any(any(price_of(one)) or one.energy or one.researches for one in cases(ability, unit_type))
+    return not any(any(price_of(case)) or case.energy or case.researches for case in cases(ability, unit_type))
 
 
 def facts_for(ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:

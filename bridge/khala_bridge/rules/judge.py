@@ -63,7 +63,8 @@ def use_of(function: Function, *, by_host: bool = False, at_unit: bool = False, 
 
 def asked_by(action: Action, *, of_side: bool) -> Use | None:
     """Return the question of an action; None for one that orders nothing."""
-    function, by_host = action.pysc2, action.rule is not None
+    function = action.pysc2
+    by_host = action.rule is not None
     if function is None:
         return None
     return use_of(function, by_host=by_host, at_unit=action.target_kind == "tag", of_side=of_side)

@@ -63,7 +63,8 @@ class Ledger:
 
     def payable(self, costs: Iterable[Cost]) -> int:
         """Return how many of the first prices the accounts can pay one after the other."""
-        rest, paid = Ledger(self.minerals, self.vespene, self.supply), 0
+        rest = Ledger(self.minerals, self.vespene, self.supply)
+        paid = 0
         for cost in costs:
             if rest.short_of(cost):
                 break

@@ -32,7 +32,7 @@ def question(snapshot: Snapshot) -> query_pb2.RequestQuery:
 
 def available(answer: query_pb2.ResponseQuery) -> Mapping[int, frozenset[int]]:
     """Return the ids of each unit's abilities by its tag, each as itself and in its general form."""
-    return {one.unit_tag: _both(tuple([a.ability_id for a in one.abilities])) for one in answer.abilities}
+    return {ability.unit_tag: _both(tuple([a.ability_id for a in ability.abilities])) for ability in answer.abilities}
 
 
 @functools.lru_cache(maxsize=4096)

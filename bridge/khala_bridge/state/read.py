@@ -103,7 +103,9 @@ def read_snapshot(
     known = _units(raw.units)
     units = {tag: unit for tag, unit in known.items() if unit.display_type is not _REMEMBERED}
     player = _player(observation.player_common)
-    camera, visibility, real = raw.player.camera, _grid(raw.map_state.visibility), _grid(raw.map_state.creep)
+    camera = raw.player.camera
+    visibility = _grid(raw.map_state.visibility)
+    real = _grid(raw.map_state.creep)
     return Snapshot(
         info=info,
         game_loop=observation.game_loop,
@@ -173,7 +175,8 @@ def read_unit(unit: raw_pb2.Unit) -> Unit | None:
     pos, buffs = unit.pos, unit.buff_ids
     name, facts = _type(unit.unit_type)
     alliance = _ALLIANCES[unit.alliance]
-    place, is_cloaked = WorldPoint(pos.x, pos.y), unit.cloak in _CLOAKED
+    place = WorldPoint(pos.x, pos.y)
+    is_cloaked = unit.cloak in _CLOAKED
     first = (name, facts, alliance, display, place, is_cloaked, tuple(buffs) if buffs else ())
     return Unit._make(first + _of_all(unit) + (_only_own(unit) if alliance is _OWN else _NOTHING_OWN))
 

@@ -107,7 +107,8 @@ class TeamRoster:
     def _keep(self, units: Mapping[int, Unit]) -> None:
         """Keep the units in the teams that are still there with their old type; release units of a new type."""
         for tag in self._grouped & units.keys():
-            home, unit_type = self._homes[tag], units[tag].unit_type
+            home = self._homes[tag]
+            unit_type = units[tag].unit_type
             if home.unit_type != unit_type:
                 if _lists(self._taken_by(unit_type), home.group):
                     home.unit_type = unit_type
@@ -119,7 +120,8 @@ class TeamRoster:
 
     def _place(self, arrival: _Arrival) -> None:
         tag, unit_type = arrival.unit.tag, arrival.unit.unit_type
-        home, takers = self._homes.get(tag), self._taken_by(unit_type)
+        home = self._homes.get(tag)
+        takers = self._taken_by(unit_type)
         if home is not None and _lists(takers, home.group):
             group: _Group | None = home.group
         else:

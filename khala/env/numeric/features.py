@@ -58,7 +58,8 @@ class Board(NamedTuple):
         """
         x0, y0, x1, y1 = ground.playable
         margin = math.ceil(2 * move_amount) + 1
-        walkable, height = ground.walkable.T, np.flip(ground.height.T, 1) / 255
+        walkable = ground.walkable.T
+        height = np.flip(ground.height.T, 1) / 255
         around = np.pad(walkable.astype(np.float64), margin, constant_values=1.0)
         heights = np.pad(height, margin, constant_values=1.0)
         return cls(ground.size, (x1 - x0, y1 - y0), margin, np.pad(walkable, margin), around, heights)
@@ -80,7 +81,9 @@ class Scene:
 
     def _masks(self) -> Bools:
         """Return [agents, actions] which actions each agent may take."""
-        own, board, agents = self._own, self._board, len(self._own)
+        own = self._own
+        board = self._board
+        agents = len(self._own)
         masks = np.zeros((agents, FIRST_TARGET + self._spec.enemies), dtype=np.bool_)
         masks[:, STOP] = True
         points = own.now.numbers[:2, :, None] + _MOVES * (self._options.move_amount / 2)
@@ -104,7 +107,8 @@ class Scene:
             last_action: [agents, actions] one-hot.
             progress: part of the episode that is over.
         """
-        own, agents = self._own, len(self._own)
+        own = self._own
+        agents = len(self._own)
         others = ~np.eye(agents, dtype=np.bool_)
         first = self.masks[:, FIRST_TARGET:]
         parts = [
@@ -189,7 +193,8 @@ class Scene:
         return self._state_of(own, (own.charge / own.most_cooldown)[:, None]), self._state_of(self._enemy)
 
     def _state_of(self, force: Force, *charge: Floats) -> Floats:
-        middle, extent = np.array(self._board.size)[:, None] / 2, np.array(self._board.extent)[:, None]
+        middle = np.array(self._board.size)[:, None] / 2
+        extent = np.array(self._board.extent)[:, None]
         places = (force.now.numbers[:2] - middle) / extent
         health = (force.life / force.now.life_max)[:, None]
         whole = np.concatenate((health, *charge, places.T, *self._shields(force), force.types), axis=1)

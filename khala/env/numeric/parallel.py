@@ -95,7 +95,8 @@ class NumericParallelEnv(ParallelEnv[str, Any, int]):  # type: ignore[misc]  # P
         self.battles.close()
 
     def _seen(self) -> dict[str, Seen]:
-        values, masks = self.battles.observations(), self.battles.masks().astype(np.int8)
+        values = self.battles.observations()
+        masks = self.battles.masks().astype(np.int8)
         return {
             agent: {"observation": values[number], "action_mask": masks[number]}
             for number, agent in enumerate(self.agents)

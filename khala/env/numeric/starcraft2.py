@@ -98,7 +98,8 @@ class StarCraft2Env:
         SMAC's package does so too, except before its first episode is over: then it starts another game from the seed.
         """
         if seed is not None:
-            self._seed, self._battle = seed, None
+            self._seed = seed
+            self._battle = None
         self._steps = 0
         if self._battle is None:
             self._launch()
@@ -121,7 +122,8 @@ class StarCraft2Env:
     def _arrivals(self) -> tuple[OwnForce, Force]:
         """Return both sides, once all units are there."""
         while True:
-            own, enemy = own_force(self.battle, self._spec), enemy_force(self.battle, self._spec)
+            own = own_force(self.battle, self._spec)
+            enemy = enemy_force(self.battle, self._spec)
             if (len(own), len(enemy)) == (self.n_agents, self.n_enemies):
                 return own, enemy
             self.battle.advance(1)
@@ -158,7 +160,8 @@ class StarCraft2Env:
                 raise ValueError(f"agent {agent} cannot perform action {action}: it can perform {can}")
 
     def _order(self, agent: int, action: int) -> None:
-        own, tag = self._own, int(self._own.now.tag[agent])
+        own = self._own
+        tag = int(self._own.now.tag[agent])
         if action == NO_OP:
             return
         if action == STOP:

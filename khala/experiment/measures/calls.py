@@ -36,7 +36,9 @@ class CallTally:
         """Take in a step."""
         for agent in step.report.agents:
             self._counts.update((agent.agent, _action(call), "accepted") for call in agent.accepted)
-            self._counts.update((agent.agent, _action(one.text), one.reason) for one in agent.rejections)
+            self._counts.update(
+                (agent.agent, _action(rejection.text), rejection.reason) for rejection in agent.rejections
+            )
 
     def total(self) -> list[CallCount]:
         """Return the counts, by agent and action."""

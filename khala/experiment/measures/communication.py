@@ -84,7 +84,8 @@ class CommunicationTally:
                 self._unfounded += not named <= tags(decision.question.whole.text)
 
     def _answer(self, decision: Decision, step: Step) -> None:
-        agent, given = decision.report.agent, frozenset(decision.report.accepted)
+        agent = decision.report.agent
+        given = frozenset(decision.report.accepted)
         new = given - self._orders.get(agent, frozenset())
         self._orders[agent] = given
         wrote_to = {message.recipient.casefold() for message in step.messages if message.sender == agent}
@@ -125,7 +126,8 @@ def is_acted_on(text: str, orders: Collection[str], seen: Observation | None) ->
         orders: as they were accepted, `Stalker-1 <Attack_Unit(0x1)>`.
         seen: the observation in which the reader found the message.
     """
-    named, points = tags(text), [*_points(text), *_places(text, seen)]
+    named = tags(text)
+    points = [*_points(text), *_places(text, seen)]
     types = {unit.tag.casefold(): unit.type for unit in _units(seen)}
     for name, arguments in (found.groups() for order in orders if (found := _ORDER.search(order))):
         targets = tags(arguments)

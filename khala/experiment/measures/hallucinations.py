@@ -143,6 +143,7 @@ def _has_shown_all(rejection: Rejection, seen: Observation) -> bool:
 
 def _has_offered(rejection: Rejection, seen: Observation) -> bool:
     """Return True if the action of a call was valid for its team, or for any if it names none."""
-    name, team = _NAME.search(rejection.text), (rejection.team or "").casefold()
+    name = _NAME.search(rejection.text)
+    team = (rejection.team or "").casefold()
     views = [view for view in seen.view.teams if team in ("", view.name.casefold())]
     return name is not None and name[1] in {action.name for view in views for action in view.actions}

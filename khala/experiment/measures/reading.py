@@ -62,8 +62,11 @@ class _Account:
     def __init__(self) -> None:
         self._asked: dict[str, Question] = {}
         """By agent, the last observation that it was sent."""
-        self._progress, self._faults, self._actions = Progress(), FaultTally(), ActionTally()
-        self._hallucinations, self._communication = HallucinationTally(), CommunicationTally()
+        self._progress = Progress()
+        self._faults = FaultTally()
+        self._actions = ActionTally()
+        self._hallucinations = HallucinationTally()
+        self._communication = CommunicationTally()
         self._economy = EconomyTally()
         self.spending = SpendingTally()
         self.calls = CallTally()

@@ -93,7 +93,7 @@ class SpendingTally:
         )
 
     def _paid(self) -> float | None:
-        """Return what was paid for all agents; the larger sum counts for each, as in `khala.spending.spent_usd`."""
+        """Return what was paid for all agents; the larger sum counts for each, as in `khala.playing.spending`."""
         paid = dict(self._paid_usd)
         for agent, usage in self._reported.items():
             if (most_usd := _most_usd(usage)) is not None:

@@ -62,10 +62,12 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
     Raises:
         ConfigError: no match was played, or there is no such factor.
     """
-    experiment, known = store.experiment(), store.played()
+    experiment = store.experiment()
+    known = store.played()
     if not known:
         raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
-    played, rows = list(known.values()), store.results()
+    played = list(known.values())
+    rows = store.results()
     done = {one.key for one in played if one.state == "done"}
     groups = cells(played, rows, by)
     summaries = sorted((summary(cell) for cell in groups), key=lambda one: _place(experiment, one))
@@ -77,7 +79,7 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
         Section("Not counted", tables=_some(not_counted(summaries))),
         Section("How it was played", tables=(conditions(store, played, rows),)),
     ]
-    sections = [one for one in sections if one.tables or one.figures]
+    sections = [section for section in sections if section.tables or section.figures]
     found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
     paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
     return Report(Document(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)

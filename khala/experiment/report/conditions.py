@@ -39,12 +39,12 @@ NAMED = 4
 def warnings(cells: Iterable[Cell], played: Sequence[Played]) -> list[str]:
     """Return in what matches differ that should be alike."""
     done = [match for match in played if match.state == "done"]
-    found = [str(one) for one in differences(done, done, EVERYWHERE)]
+    found = [str(difference) for difference in differences(done, done, EVERYWHERE)]
     by_key = {match.key: match for match in done}
     for cell in cells:
         matches = [by_key[row["match"]] for row in cell.rows]
         where = ", ".join(cell.where.values())
-        found += [f"{where}: {one}" for one in differences(matches, matches, IN_A_CELL)]
+        found += [f"{where}: {difference}" for difference in differences(matches, matches, IN_A_CELL)]
     return list(dict.fromkeys(found))
 
 

@@ -33,7 +33,8 @@ WIDTH, ROW, EDGE = 7.6, 0.27, 1.15
 """Inches: of the picture, of a row, and of what is above and below all rows."""
 LONGEST = 40
 """Characters of a name."""
-LEAST_KD, MOST_KD = 1 / 32, 32
+LEAST_KD = 1 / 32
+MOST_KD = 32
 """K/D outside of these stands at the edge, with an arrow."""
 WINS_CAPTION = "Games won, with Wilson intervals of 95 %."
 KD_CAPTION = (
@@ -68,7 +69,7 @@ class _Row:
 
 def figures(summaries: Sequence[Summary]) -> list[Figure]:
     """Return the pictures of cells that have games."""
-    played = [one for one in summaries if one.games]
+    played = [summary for summary in summaries if summary.games]
     killed = [one for one in played if one.kd.value is not None]
     wins = Figure("win_rate", WINS_CAPTION, partial(_drawn, played, _win_rate_axis, lambda one: one.won))
     kd = Figure("kd", KD_CAPTION, partial(_drawn, killed, _kd_axis, lambda one: one.kd))
@@ -89,7 +90,7 @@ def _drawn(
     with mpl.rc_context(STYLE):
         canvas = Canvas(figsize=(WIDTH, EDGE + ROW * (rows[-1].y + 1)), layout="constrained")
         axes = canvas.add_subplot()
-        low, high = axis(axes, [value(one) for one in summaries])
+        low, high = axis(axes, [value(summary) for summary in summaries])
         for row in rows:
             _draw(axes, row, value, low, high, len(colours))
         _finish(axes, rows)
@@ -100,7 +101,7 @@ def _drawn(
 def _colours(summaries: Sequence[Summary]) -> list[str]:
     """Return the values that have colours: those of the last factor, unless they are the tasks or too many."""
     *first, last = summaries[0].where
-    values = list(dict.fromkeys(one.where[last] for one in summaries))
+    values = list(dict.fromkeys(summary.where[last] for summary in summaries))
     return values if first and 1 < len(values) <= len(COLOURS) else []
 
 
@@ -109,10 +110,10 @@ def _rows(summaries: Sequence[Summary], colours: list[str]) -> list[_Row]:
     keys = list(summaries[0].where)[: -1 if colours else None]
     task = "task" if "task" in keys else keys[0]
     groups: dict[str, dict[str, list[tuple[int, Summary]]]] = {}
-    for one in summaries:
-        rest = ", ".join(one.where[name] for name in keys if name != task)
-        dot = (colours.index(list(one.where.values())[-1]) if colours else 0, one)
-        groups.setdefault(one.where[task], {}).setdefault(rest, []).append(dot)
+    for summary in summaries:
+        rest = ", ".join(summary.where[name] for name in keys if name != task)
+        dot = (colours.index(list(summary.where.values())[-1]) if colours else 0, summary)
+        groups.setdefault(summary.where[task], {}).setdefault(rest, []).append(dot)
     rows: list[_Row] = []
     y = 0.0
     for name, inner in groups.items():
@@ -130,7 +131,8 @@ def _draw(axes: Axes, row: _Row, value: Callable[[Summary], Interval], low: floa
     for number, one in row.dots:
         interval = value(one)
         y = row.y + (number - (colours - 1) / 2) * 0.42 if colours else row.y
-        left, right = max(low, interval.low), min(high, interval.high)
+        left = max(low, interval.low)
+        right = min(high, interval.high)
         colour = COLOURS[number]
         assert interval.value is not None
         known = math.isfinite(interval.high)
@@ -151,7 +153,12 @@ def _win_rate_axis(axes: Axes, intervals: Sequence[Interval]) -> tuple[float, fl
 
 def _kd_axis(axes: Axes, intervals: Sequence[Interval]) -> tuple[float, float]:
     """Set a scale on which twice as many and half as many are as far from 1."""
-    bounds = [bound for one in intervals for bound in (one.low, one.value, one.high) if bound and math.isfinite(bound)]
+    bounds = [
+        bound
+        for interval in intervals
+        for bound in (interval.low, interval.value, interval.high)
+        if bound and math.isfinite(bound)
+    ]
     most = max((abs(math.log2(bound)) for bound in bounds), default=1)
     powers = min(math.ceil(most + 1e-9), round(math.log2(MOST_KD)))
     low, high = 2.0**-powers, 2.0**powers

@@ -135,7 +135,8 @@ def _decided(rows: Sequence[Row]) -> float | None:
 
 def summary(cell: Cell) -> Summary:
     """Return the numbers of a cell."""
-    rows, games = cell.rows, len(cell.rows)
+    rows = cell.rows
+    games = len(cell.rows)
     wins = sum(row["outcome"] == "win" for row in rows)
     costs = [cost for row in rows if (cost := _usd(row)) is not None]
     expansions = _known(rows, "expansion_s")

@@ -117,7 +117,7 @@ def tables(summaries: Sequence[Summary]) -> list[Table]:
 
 
 def _table(kind: Kind, summaries: Sequence[Summary]) -> Table | None:
-    texts = {column: [column.value(one) for one in summaries] for column in kind.columns}
+    texts = {column: [column.value(summary) for summary in summaries] for column in kind.columns}
     shown = [column for column in kind.columns if column.always or any(text != NONE for text in texts[column])]
     if not shown or not summaries:
         return None
@@ -131,7 +131,7 @@ def overview(summaries: Sequence[Summary]) -> Table | None:
     if not summaries or len(summaries[0].where) < 2:
         return None
     *first, last = summaries[0].where
-    values = list(dict.fromkeys(one.where[last] for one in summaries))
+    values = list(dict.fromkeys(summary.where[last] for summary in summaries))
     rows: dict[tuple[str, ...], dict[str, Summary]] = {}
     for one in summaries:
         rows.setdefault(tuple(one.where[name] for name in first), {})[one.where[last]] = one
@@ -146,13 +146,13 @@ def overview(summaries: Sequence[Summary]) -> Table | None:
 
 def not_counted(summaries: Sequence[Summary]) -> Table | None:
     """Return which matches are in no number, and why; None if there are none."""
-    causes = list(dict.fromkeys(cause for one in summaries for cause in one.not_counted))
+    causes = list(dict.fromkeys(cause for summary in summaries for cause in summary.not_counted))
     if not causes:
         return None
     rows = [
-        (*one.where.values(), *(str(one.not_counted.get(cause, NONE)) for cause in causes))
-        for one in summaries
-        if one.not_counted
+        (*summary.where.values(), *(str(summary.not_counted.get(cause, NONE)) for cause in causes))
+        for summary in summaries
+        if summary.not_counted
     ]
     factors = tuple(summaries[0].where)
     note = (

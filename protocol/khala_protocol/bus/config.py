@@ -100,7 +100,9 @@ class BusConfig(BaseModel):
     def exposed(self) -> tuple[str, ...]:
         """Endpoints beyond this machine without encryption, that only `insecure` allows."""
         endpoints = (*self.connect_to, *self.listen_on)
-        return tuple(one for one in endpoints if transport_of(one) not in SECURE and not is_local(one))
+        return tuple(
+            endpoint for endpoint in endpoints if transport_of(endpoint) not in SECURE and not is_local(endpoint)
+        )
 
     @property
     def _default(self) -> str:

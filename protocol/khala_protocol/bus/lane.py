@@ -97,7 +97,8 @@ class Window:
             self._in_flight += size
             if self._asking or self._in_flight < WINDOW_BYTES // 4:
                 return
-            self._asking, asked = True, self._in_flight
+            self._asking = True
+            asked = self._in_flight
         self._ask(lambda answered: self._acknowledge(asked if answered else 0))
 
     def _acknowledge(self, size: int) -> None:

@@ -181,7 +181,8 @@ def record_at(file: BinaryIO, offset: int, size: int) -> tuple[int, bytes, int] 
 
 def _records(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
     """Yield kind, place and content of the records of an unpacked chunk."""
-    view, place = memoryview(data), 0
+    view = memoryview(data)
+    place = 0
     while place < len(data):
         kind, length = _HEAD.unpack_from(data, place)
         start = place + _HEAD.size

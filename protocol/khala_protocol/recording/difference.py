@@ -1,6 +1,6 @@
 """The first point where a replay differs from its recording: one value, with a text that names the place.
 
-The replays are above (`khala_orchestrator.replay`, `khala_agents.replay`); they compare bytes or words as sent.
+The replays are above (`khala_orchestrator.past.replay`, `khala_agents.replay`); they compare bytes or words as sent.
 """
 
 from __future__ import annotations

@@ -201,7 +201,8 @@ class Recording:
                 if place is None or begun > place:
                     if place is not None:
                         yield RecordedStep(*place, tuple(samples))
-                    place, samples = begun, []
+                    place = begun
+                    samples = []
             if place is not None:
                 samples.append(sample)
         if place is not None:

@@ -97,7 +97,8 @@ def _unpacked_size(chunk: Chunk) -> int:
 def _inner(stream: ReadDataStream) -> McapRecord | None:
     """Return the next record of a chunk; None for a kind that does not belong into one."""
     record: McapRecord | None = None
-    opcode, length = stream.read1(), stream.read8()
+    opcode = stream.read1()
+    length = stream.read8()
     match opcode:
         case Opcode.MESSAGE:
             record = Message.read(stream, length)

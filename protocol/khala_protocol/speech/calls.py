@@ -77,7 +77,8 @@ def opening_at(text: str, at: int) -> Opening | None:
     if match is None:
         return None
     name = match["name"].replace("\\", "")
-    capital, compound = name[0].isupper(), "_" in name
+    capital = name[0].isupper()
+    compound = "_" in name
     is_call_like = (capital and compound) if match["blank"] else (capital or compound)
     return Opening(name, match.end(), match["open"] is not None, is_call_like or is_talk(name))
 

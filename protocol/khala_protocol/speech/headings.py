@@ -163,7 +163,8 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
     if found["alone"] is not None and not line_start:
         return None
     name = next((found[group] for group in _NAMED_BY if found[group] is not None), None)
-    section, explains = _section(found["section"]), bool(found["explains"] or found["aside"])
+    section = _section(found["section"])
+    explains = bool(found["explains"] or found["aside"])
     return Heading(
         end=match.end(),
         section=section,

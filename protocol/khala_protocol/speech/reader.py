@@ -272,10 +272,12 @@ class _Walk:
 
     def _naked(self, at: int) -> int | None:
         """Read a call without angle brackets; return None if there is none."""
-        talk, naked = naked_talk_at(self._plain, at), naked_at(self._plain, at)
+        talk = naked_talk_at(self._plain, at)
+        naked = naked_at(self._plain, at)
         if (found := talk or naked) is None:
             return None
-        start, name = found.start("call"), found["name"]
+        start = found.start("call")
+        name = found["name"]
         try:
             if talk:
                 return self._words(name, start, talk.end(), naked=True)
@@ -321,7 +323,8 @@ class _Walk:
         return end
 
     def _without_parentheses(self, start: int, opening: Opening) -> int:
-        name, end = opening.name, close_bare(self._plain, opening.end)
+        name = opening.name
+        end = close_bare(self._plain, opening.end)
         if name.lower() in MESSAGE_NAMES:
             reader = self._messages
             if found := reader.attributes(opening.end) if end is None else reader.element(end):
@@ -344,7 +347,7 @@ class _Walk:
     def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
         """Return the arguments at this place, if all of them are tags and points; otherwise none."""
         args = read_arguments(self._plain[start:stop])
-        return args if all(not isinstance(one, str) or one.startswith("0x") for one in args) else ()
+        return args if all(not isinstance(arg, str) or arg.startswith("0x") for arg in args) else ()
 
     def _words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
         """Read a message, a note or a standing order, whose words begin at `at`."""

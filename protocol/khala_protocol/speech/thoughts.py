@@ -22,7 +22,8 @@ def thought_of(reply: str) -> str:
     """
     text = to_ascii(reply[:MAX_REPLY_CHARACTERS])
     reasoned = _REASONED.search(text)
-    begin, end = 0, len(text)
+    begin = 0
+    end = len(text)
     for line in _LINE.finditer(text, reasoned.end() if reasoned else 0):
         heading = heading_at(text, line.start(), line_start=True)
         if heading is None:

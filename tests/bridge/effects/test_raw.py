@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def kind(name: str) -> object:
     """Return the kind of an action: one of each function, subject and target, with and without rule, stands for all.
 
-    What each rule does is in `tests/bridge/macro`.
+    What each rule does is in `tests/bridge/auto`.
     """
     action = cases()[name].action
     return action.pysc2.kind if action.pysc2 else None, action.subject, action.rule is None, action.target_kind

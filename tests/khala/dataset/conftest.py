@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala import games
 from khala.dataset.card import Recipe
 from khala.dataset.export import export
-from khala.hosting import hosted
+from khala.playing import games
+from khala.playing.hosting import hosted
 from khala_agents.build import Workshop, load_policy
 from khala_agents.config import WorkerSpec
 from khala_agents.scripted.endpoint import Endpoint

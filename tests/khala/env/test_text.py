@@ -14,9 +14,9 @@ import psutil
 import pytest
 
 from khala import env as words
-from khala import one_process
-from khala.minds import Minds
-from khala.rewards import battle
+from khala.env.rewards import battle
+from khala.playing import one_process
+from khala.playing.minds import Minds
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError

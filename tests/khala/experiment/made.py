@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 from khala.experiment.job import Done
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage

@@ -14,7 +14,6 @@ import pytest
 from typer.testing import CliRunner
 
 from bench import experiments
-from khala import local, one_process
 from khala.cli import app
 from khala.experiment.engine import Local
 from khala.experiment.job import Job
@@ -22,6 +21,7 @@ from khala.experiment.plan import plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store
 from khala.experiment.worker import played
+from khala.playing import local, one_process
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.recording import Recording
 

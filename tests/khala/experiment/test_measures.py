@@ -15,7 +15,7 @@ import pytest_asyncio
 from khala.experiment.measures import GROUPS, Measures, measure
 from khala.experiment.measures.communication import is_acted_on
 from khala.experiment.measures.hallucinations import KINDS, Kind
-from khala.spending import spent_usd
+from khala.playing.spending import spent_usd
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.act.raw import RawExecutor

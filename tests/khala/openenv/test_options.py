@@ -15,14 +15,14 @@ import pytest
 from openenv.cli.commands.validate import validate
 from openenv.core.rubrics import Rubric
 
+from khala.env.rewards import battle
 from khala.openenv.commands import Wanted, rubric_of, run_openenv, settings_of
 from khala.openenv.environment import KhalaEnvironment
 from khala.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
 from khala.openenv.rubrics import Battle
 from khala.openenv.server import app_of
 from khala.openenv.settings import Settings
-from khala.rewards import battle
-from khala.seats import Seat
+from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Casualties, Report, Result
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from khala.matches import new
-from khala.minds import Minds
+from khala.playing.matches import new
+from khala.playing.minds import Minds
 from khala.service import client
 from khala_protocol.bus.config import BusConfig, TlsFiles
 from khala_protocol.bus.zenoh import open_bus

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Self
 
 import pytest
 
-from khala.matches import new
-from khala.minds import Minds
+from khala.playing.matches import new
+from khala.playing.minds import Minds
 from khala.service import client
 from khala.service.book import KEPT, Limits
 from khala.service.client import NoService, Refused
 from khala.service.daemon import STARTS, Service
 from khala.service.pool import Ending
 from khala_bridge.game.game import GameIdentity
-from khala_orchestrator.cards import run_card
 from khala_orchestrator.config import change, load_task
+from khala_orchestrator.match.cards import run_card
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.memory import MemoryBroker

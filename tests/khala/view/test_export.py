@@ -17,7 +17,7 @@ from khala.view.export import TooLarge, export
 from khala.view.guard import policy_of
 from khala.view.library import run_id
 from khala.view.sources import Sources
-from khala_orchestrator.transcript import StepSelection
+from khala_orchestrator.past.transcript import StepSelection
 from khala_protocol.errors import ConfigError
 from tests.khala.view.made import AGENT, HOSTILE, STEPS, make, opened
 

@@ -87,7 +87,8 @@ def best_target(plan: ReplyPlan, prey: str = "") -> TextUnit | None:
 
     A target that other teams reach as well is better.
     """
-    team, most = plan.team, max(1.0, *plan.support.values()) if plan.support else 1.0
+    team = plan.team
+    most = max(1.0, *plan.support.values()) if plan.support else 1.0
     shooters = [unit for unit in team.own if kind_of(unit).reach >= 0]
     if not shooters:
         return None

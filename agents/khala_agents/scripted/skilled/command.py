@@ -72,7 +72,8 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
     if not groups or situation.time_s % ORDERS_EVERY_S >= 2:  # a decision every two seconds
         return []
     army = _middle(group.at for group in groups)
-    target, home = _target(situation, army), _gathering(situation, army)
+    target = _target(situation, army)
+    home = _gathering(situation, army)
     out = math.dist(army, target or MAP_MIDDLE) < math.dist(army, home)
     names = list(dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents))
     if attacks(situation, out=out):
@@ -84,7 +85,8 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
         goals = [min(situation.alarms, key=lambda at: math.dist(at, home))] * len(names)
         form = "Defend {}."
     else:
-        goals, form = [home] * len(names), "Gather at {} and defend it."
+        goals = [home] * len(names)
+        form = "Gather at {} and defend it."
     due = [(name, goal) for name, goal in zip(names, goals, strict=True) if _is_due(situation, name, goal)]
     return [(name, form.format(point(goal))) for name, goal in due[:MOST_MESSAGES]]
 

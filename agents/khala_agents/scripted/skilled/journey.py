@@ -32,7 +32,8 @@ class MarchingOrder(NamedTuple):
 
 def passing(plan: ReplyPlan) -> bool:
     """Return whether the team is on a way on which it does not fight."""
-    team, named = plan.team, points(plan.team.task)
+    team = plan.team
+    named = points(plan.team.task)
     if not named or team.minimap is None or not _PASSING.search(team.task):
         return False
     return math.dist(named[-1], team.minimap) > ARRIVED
@@ -45,7 +46,8 @@ def follows(plan: ReplyPlan) -> bool:
 
 def travel(plan: ReplyPlan) -> bool:
     """Plan the way of a team; return whether it has one to go."""
-    team, told = plan.team, None if plan.prey else told_order(plan.situation)
+    team = plan.team
+    told = None if plan.prey else told_order(plan.situation)
     goal = told.goal if told else task_goal(team, plan.situation)
     if goal is None or team.minimap is None:
         return False

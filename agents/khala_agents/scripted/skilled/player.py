@@ -93,7 +93,8 @@ def shade(plan: ReplyPlan) -> None:
 
 def prism(plan: ReplyPlan) -> None:
     """Fly to the place that its task names and open a field of power there; flee when it is shot at."""
-    team, plan.prey = plan.team, "place"
+    team = plan.team
+    plan.prey = "place"
     foes = [foe for foe in combat.threats(team) if foe.distance < 9]
     phasing = any(unit.type == "WarpPrismPhasing" for unit in team.own)
     if phasing:

@@ -108,14 +108,16 @@ def shared(lab: Lab) -> Samples:
 def _deliveries(lab: Lab, count: int, *, vespene: bool = False) -> list[int]:
     """Return the loops between so many deliveries."""
     found: list[int] = []
-    last, bank = 0, _banked(lab, vespene=vespene)
+    last = 0
+    bank = _banked(lab, vespene=vespene)
     end = lab.loop + 300 * (count + 2)
     while len(found) < count and lab.loop < end:
         lab.step()
         if (now := _banked(lab, vespene=vespene)) > bank:
             if last:
                 found.append(lab.loop - last)
-            last, bank = lab.loop, now
+            last = lab.loop
+            bank = now
     return found
 
 

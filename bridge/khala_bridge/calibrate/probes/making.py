@@ -102,7 +102,8 @@ def mending(lab: Lab) -> Samples:
         lab.set(doctor, Energy=200.0)
         lab.order(ability, doctor, target=hurt)
         lab.step(24)
-        before, most = lab.life(hurt), 0.0
+        before = lab.life(hurt)
+        most = 0.0
         for _ in range(64):
             was = lab.life(hurt)
             lab.step()

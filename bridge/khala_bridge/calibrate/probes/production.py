@@ -190,7 +190,8 @@ def warp(lab: Lab) -> Samples:
         )  # fmt: skip
         lab.step(8)
         if lab.order(_WARP_ZEALOT, gate, point=(x + 7, y - 2)):
-            begun, seen = lab.loop, False
+            begun = lab.loop
+            seen = False
             for _ in range(600):
                 lab.step()
                 zealots = lab.of("Zealot")

@@ -205,7 +205,8 @@ def knockback(lab: Lab) -> Samples:
     reaper, marine = lab.make(Put("Reaper", (x + 4, y)), Put("Marine", (x, y), ENEMY))
     lab.order(HOLD, marine)
     lab.order(2588, reaper, point=(x + 0.6, y))
-    home, moved = lab.at(marine), 0
+    home = lab.at(marine)
+    moved = 0
     lab.step()
     lab.order(MOVE, reaper, point=(x + 11, y), queue=True)
     for _ in range(120):
@@ -259,7 +260,8 @@ def tumor(lab: Lab) -> Samples:
     lab.step(900)
     tumors = lab.make(Put("CreepTumorBurrowed", (x - 5.5, y - 4.5)), Put("CreepTumorBurrowed", (x - 5.5, y + 4.5)))
     lab.step(400)
-    begun, left = lab.loop, {}
+    begun = lab.loop
+    left = {}
     for distance, tag, side in ((4, tumors[0], -4.5), (9, tumors[1], 4.5)):
         if lab.order(1733, tag, point=(x - 5.5 + distance, y + side)):
             left[distance] = (x - 5.5 + distance, y + side)

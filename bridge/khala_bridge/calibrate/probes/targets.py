@@ -98,7 +98,8 @@ def look_up(lab: Lab) -> Samples:
         lab.step(1 + (5 * i) % 7)
         (enemy,) = lab.make(Put("Zealot", (x, y - 4), ENEMY))
         lab.hold([enemy])
-        begun, before = lab.loop, lab.life(enemy)
+        begun = lab.loop
+        before = lab.life(enemy)
         while lab.loop < begun + 80 and lab.life(enemy) > before - 0.4:
             lab.step()
         yield "Marine", lab.loop - begun
@@ -208,7 +209,8 @@ def turret(lab: Lab) -> Samples:
         )
         for side, victim in (("first", east), ("behind", west), ("back", east)):
             lab.order(ATTACK, unit, target=victim)
-            begun, before = lab.loop, lab.life(victim)
+            begun = lab.loop
+            before = lab.life(victim)
             while lab.loop < begun + 90 and lab.life(victim) > before - 0.4:
                 lab.step()
             if side != "first":

@@ -163,7 +163,8 @@ def moment(lab: Lab) -> Samples:
         (tag,) = lab.make(Put(kind, (x - 3, y)))
         lab.order(MOVE, tag, point=(x + 7, y))
         lab.step(8)
-        before, last = _layer(lab, "visibility"), 0
+        before = _layer(lab, "visibility")
+        last = 0
         for loop in range(1, 33):
             lab.step()
             now = _layer(lab, "visibility")
@@ -202,12 +203,14 @@ def _below_a_cliff(lab: Lab) -> tuple[Point, NDArray[np.int16]]:
     """Return a place of the level ground with much of a higher level near it, and the heights of the map."""
     height = lab.height.astype(np.int16)
     ys, xs = np.indices(height.shape)
-    best, place = -1, _middle(lab)
+    best = -1
+    place = _middle(lab)
     for x, y in lab.ground.places(3, 3):
         own = int(height[int(y), int(x)])
         above = (height >= own + 12) & ((xs - x) ** 2 + (ys - y) ** 2 <= 36)
         if (count := int(above.sum())) > best:
-            best, place = count, (int(x) + 0.5, int(y) + 0.5)
+            best = count
+            place = (int(x) + 0.5, int(y) + 0.5)
     return place, height
 
 

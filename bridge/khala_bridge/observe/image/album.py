@@ -115,12 +115,13 @@ def _minimap(
 def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
     """Return the agent's own units: those of its teams, or all, if it orders the whole side."""
     if any(team.team.kind == "side" for team in seen.teams):
-        return frozenset(one.tag for one in moment.subjects if one.side == "own")
+        return frozenset(subject.tag for subject in moment.subjects if subject.side == "own")
     return frozenset(tag for team in teams for tag in team.tags)
 
 
 def _layer(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:
-    layer, extent = LAYERS[spec.layer], team.camera.size
+    layer = LAYERS[spec.layer]
+    extent = team.camera.size
     values = _values(spec, moment, team.camera, layer, inner_px(spec.size_px, extent))
     if values is not None:
         image = _on_canvas(spec, layer, extent, values)
@@ -128,7 +129,8 @@ def _layer(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawing]:
 
 
 def _minimap_layer(spec: ImageSpec, moment: Moment, world: MapFrame) -> Iterator[Drawing]:
-    layer, extent = LAYERS[spec.layer], world.minimap_size
+    layer = LAYERS[spec.layer]
+    extent = world.minimap_size
     values = own.minimap_layer(moment.snapshot, layer.name, inner_px(spec.size_px, extent))
     if values is not None:
         image = _on_canvas(spec, layer, extent, values)

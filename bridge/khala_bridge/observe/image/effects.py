@@ -74,11 +74,11 @@ def draw_patches(image: Image, patches: Iterable[Patch], place: Place, scale: fl
 
 def draw_orders(image: Image, subjects: Iterable[Subject], place: Place) -> None:
     """Draw the goals and targets of units: a line with a dot at its end, red for attacks, green for the rest."""
-    for one in subjects:
-        if one.target is None:
+    for subject in subjects:
+        if subject.target is None:
             continue
-        colour = palette.ATTACKING if one.order in _ATTACKS else palette.MOVING
-        start, end = place(one.x, one.y), place(*one.target)
+        colour = palette.ATTACKING if subject.order in _ATTACKS else palette.MOVING
+        start, end = place(subject.x, subject.y), place(*subject.target)
         cv2.line(image, start, end, colour, 1, cv2.LINE_AA)
         cv2.circle(image, end, 2, colour, -1, cv2.LINE_AA)
 
@@ -93,7 +93,8 @@ def _disc(name: str, side: Side, radius_px: int) -> Stamp:
     colour = style.colour or LIVERIES[side].body
     size = 2 * radius_px + 5
     large = np.zeros((size * _FINER, size * _FINER), np.uint8)
-    middle, radius = (size * _FINER // 2, size * _FINER // 2), radius_px * _FINER
+    middle = (size * _FINER // 2, size * _FINER // 2)
+    radius = radius_px * _FINER
     cv2.circle(large, middle, radius, round(255 * style.fill), -1)
     cv2.circle(large, middle, radius, 215 if name != "Power" else 90, 2 * _FINER)
     if style.figure == "bolts":

@@ -81,7 +81,8 @@ def _of_units(value: Callable[[Subject], int]) -> Values:
     """Return the bodies of units filled with their values; 0 elsewhere and for units without a value."""
 
     def values(moment: Moment, camera: Camera, size_px: int) -> Mask:
-        image, scale = np.zeros((size_px, size_px), np.uint8), size_px / CAMERA_WIDTH
+        image = np.zeros((size_px, size_px), np.uint8)
+        scale = size_px / CAMERA_WIDTH
         for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
             _body(image, one, camera, scale, value(one))
         return image
@@ -90,7 +91,8 @@ def _of_units(value: Callable[[Subject], int]) -> Values:
 
 
 def _density(moment: Moment, camera: Camera, size_px: int) -> Mask:
-    image, scale = np.zeros((size_px, size_px), np.uint8), size_px / CAMERA_WIDTH
+    image = np.zeros((size_px, size_px), np.uint8)
+    scale = size_px / CAMERA_WIDTH
     for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
         alone = np.zeros_like(image)
         _body(alone, one, camera, scale, 1)
@@ -106,7 +108,8 @@ def _body(image: Mask, one: Subject, camera: Camera, scale: float, value: int) -
 
 
 def _effects(moment: Moment, camera: Camera, size_px: int) -> Mask:
-    image, scale = np.zeros((size_px, size_px), np.uint8), size_px / CAMERA_WIDTH
+    image = np.zeros((size_px, size_px), np.uint8)
+    scale = size_px / CAMERA_WIDTH
     unit = CAMERA_WIDTH / camera.size
     for number, patch in enumerate(moment.effects, 1):
         for x, y in patch.places:
@@ -247,7 +250,8 @@ def explain(image: Image, layer: FeatureLayer) -> None:
     if not entries:
         return
     stamps = [written(name, 7, palette.LABEL) for _, name in entries]
-    width, row = 22 + max(stamp.size[0] for stamp in stamps), 14
+    width = 22 + max(stamp.size[0] for stamp in stamps)
+    row = 14
     top = image.shape[0] - row * len(entries) - 8
     box = image[top - 4 : image.shape[0] - 4, 4 : 4 + width]
     cv2.multiply(box, np.full_like(box, 50), dst=box, scale=1 / 255)

@@ -167,7 +167,8 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
     bits, count = hidden.bits(width, height)
     marks, bodies, stride = hidden.taken, covered.taken, hidden.stride
     right_most, lowest = hidden.width - width, hidden.height - height
-    best, least = None, math.inf
+    best = None
+    least = math.inf
     for right, down, ring, cost in _tries(one.radius, width, height):
         if cost >= least:
             break  # all that follows costs more than the best, even if it hides nothing
@@ -187,7 +188,8 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
         if under:
             cost += _OVER_BODY * under.bit_count() / count  # noqa: PLW2901  # and this, too
         if cost < least:
-            best, least = _Spot(left, top, ring, (left + width // 2, top + height // 2)), cost
+            best = _Spot(left, top, ring, (left + width // 2, top + height // 2))
+            least = cost
     return best
 
 

@@ -85,11 +85,11 @@ def draw(
 
     scale = canvas.scale * world.minimap_size / max(world.width, world.height)
     sides: dict[Side, None] = {}
-    for one in moment.subjects:
-        side: Side = "team" if one.tag in own else one.side
+    for subject in moment.subjects:
+        side: Side = "team" if subject.tag in own else subject.side
         sides[side] = None
         if pixels is None or side == "team":
-            _dot(image, one, side, place_of(one.x, one.y), scale)
+            _dot(image, subject, side, place_of(subject.x, subject.y), scale)
     for alert in alerts:
         cv2.circle(image, canvas.pixel(*alert), 9, palette.INK, 4, cv2.LINE_AA)
         cv2.circle(image, canvas.pixel(*alert), 9, ALERT, 2, cv2.LINE_AA)
@@ -146,7 +146,8 @@ def _name_teams(
     canvas: Canvas, teams: Sequence[TeamMark], others: Sequence[tuple[str, Point]], world: MapFrame, scale: float
 ) -> None:
     """Draw frames of the teams' screens, crosses at their heads, and their names."""
-    image, half = canvas.inner, round(CAMERA_WIDTH / 2 * scale)
+    image = canvas.inner
+    half = round(CAMERA_WIDTH / 2 * scale)
     marked = []
     for number, team in enumerate(teams):
         x, y = canvas.pixel(*world.minimap(team.camera.x, team.camera.y))

@@ -120,7 +120,7 @@ class Moment:
     @cached_property
     def places(self) -> NDArray[np.float64]:
         """World positions and radii of the subjects, (n, 3)."""
-        return np.array([(one.x, one.y, one.radius) for one in self.subjects]).reshape(-1, 3)
+        return np.array([(subject.x, subject.y, subject.radius) for subject in self.subjects]).reshape(-1, 3)
 
     def around(self, x: float, y: float, reach: float) -> list[Subject]:
         """Return the subjects whose bodies come within `reach` of a point on both axes, in the order of drawing."""

@@ -77,7 +77,9 @@ class Painting:
             tint(part, _cut(veil.creep, left, top, _CELLS, 0))
         if veil.sight is not None:
             shade(part, _cut(veil.sight, left, top, _CELLS, 0))
-        column, row, wide = round(x * FINE), round(y * FINE), int(CAMERA_WIDTH * FINE)
+        column = round(x * FINE)
+        row = round(y * FINE)
+        wide = int(CAMERA_WIDTH * FINE)
         view = part[row : row + wide, column : column + wide]
         return np.asarray(cv2.resize(view, (size_px, size_px), interpolation=cv2.INTER_LINEAR), np.uint8)
 

@@ -72,7 +72,9 @@ def draw(
     canvas = Canvas.on(ground, size_px, camera.size)
     if grid:
         canvas.rule()
-    image, scale, place_of = canvas.inner, canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
+    image = canvas.inner
+    scale = canvas.inner.shape[0] / CAMERA_WIDTH
+    place_of = _placing(canvas, camera)
     draw_patches(image, moment.power, place_of, scale, names=False)
     seen = _seen(canvas, moment, camera, team)
     draw_orders(image, (one.subject for one in seen if one.side == "team"), place_of)
@@ -113,7 +115,8 @@ def _placing(canvas: Canvas, camera: Camera) -> Callable[[float, float], tuple[i
 
 def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) -> list[_Drawn]:
     """Return the subjects on the screen, in the order of drawing; a team's own units come last on their level."""
-    scale, place_of = canvas.inner.shape[0] / CAMERA_WIDTH, _placing(canvas, camera)
+    scale = canvas.inner.shape[0] / CAMERA_WIDTH
+    place_of = _placing(canvas, camera)
     seen = [
         _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
         for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)

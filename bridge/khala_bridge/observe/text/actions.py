@@ -37,11 +37,11 @@ def _calls(page: Page) -> Iterator[str]:
 def _will_do(team: TeamView) -> dict[str, list[str]]:
     """Return actions by the arguments that will do."""
     found: dict[str, list[str]] = {}
-    for one in team.arguments:
-        parts = [f"unit {' or '.join(one.units)}"] if one.units else []
-        parts += [f"tag {' or '.join(one.tags)}"] if one.tags else []
-        parts += [f"a place such as {' or '.join(map(point, one.points))}"] if one.points else []
-        found.setdefault("; ".join(parts), []).append(one.action)
+    for argument in team.arguments:
+        parts = [f"unit {' or '.join(argument.units)}"] if argument.units else []
+        parts += [f"tag {' or '.join(argument.tags)}"] if argument.tags else []
+        parts += [f"a place such as {' or '.join(map(point, argument.points))}"] if argument.points else []
+        found.setdefault("; ".join(parts), []).append(argument.action)
     return found
 
 

@@ -175,10 +175,12 @@ def _counts(race: str) -> Counts:
 
 def _economy(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     """Supply is nearly used up, the town hall is idle, and there are 210 minerals."""
-    race, team = task.map_spec.race, _side_team(agent)
+    race = task.map_spec.race
+    team = _side_team(agent)
     if race not in _RACES or team is None:
         return None
-    names, can = _RACES[race], _named(team.actions)
+    names = _RACES[race]
+    can = _named(team.actions)
     train = f"Train_{names.worker}"
     calls = [f"<{name}()>" for name in (names.supply, train) if name in can]
     if not calls:
@@ -200,7 +202,8 @@ def _economy(task: TaskConfig, agent: AgentConfig) -> _Made | None:
 
 def _army(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     """The own army is larger than what was seen of the enemy's."""
-    race, foe = task.map_spec.race, _foe(task)
+    race = task.map_spec.race
+    foe = _foe(task)
     if race not in _RACES:
         return None
     names, kind = _RACES[race], _FOES[race]
@@ -245,10 +248,8 @@ def _site(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     build = f"Build_{names.production}_Screen"
     if build not in can:
         return None
-    worker, hall = (
-        _unit(names.worker, _OWN_TAGS[0], (12, 12)),
-        _unit(names.hall, _HALL_TAG, (5, 10)).but(alliance="ally"),
-    )
+    worker = _unit(names.worker, _OWN_TAGS[0], (12, 12))
+    hall = _unit(names.hall, _HALL_TAG, (5, 10)).but(alliance="ally")
     powered = race == "protoss"
     pylon = _unit("Pylon", "0xe0022", (15, 9)).but(alliance="ally")
     field = Landmark(

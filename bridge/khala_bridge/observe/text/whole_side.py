@@ -155,7 +155,8 @@ def no_structures(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section tak
 @section("warp", parts=("power",))
 def warp(page: Page) -> Iterator[str]:
     """Show the WarpGates, and the places for warping in."""
-    gates, fields = page.view.warp_gates, _marks(page, "power field")
+    gates = page.view.warp_gates
+    fields = _marks(page, "power field")
     if gates is None and not fields:
         return
     yield "Warping in"

@@ -128,7 +128,7 @@ def _ramps(ground: MapGround) -> list[tuple[WorldPoint, int]]:
 
 
 def _patch(cells: Bools) -> Bools:
-    """Return the cells that hang together with the first one."""
+    """Return the cells that are connected to the first cell."""
     patch = np.zeros_like(cells)
     patch[np.unravel_index(int(cells.argmax()), cells.shape)] = True
     while True:

@@ -117,7 +117,8 @@ class Land:
             else:
                 point = order.target_world_space_pos or WorldPoint(0.0, 0.0)
                 cell = footprint.cell(point.x, point.y)
-                middle, begun = footprint.middle(cell), self._is_begun(footprint, cell)
+                middle = footprint.middle(cell)
+                begun = self._is_begun(footprint, cell)
             if not begun:
                 yield structure, middle
 

@@ -79,9 +79,11 @@ def _clusters(ground: MapGround, places: NDArray[np.float64]) -> list[list[int]]
     level = np.array([ground.level(x, y) for x, y in places.tolist()])
     apart = np.hypot(*(places[:, None, :] - places[None, :, :]).transpose(2, 0, 1))
     joined = (apart <= SPREAD) & (np.abs(level[:, None] - level[None, :]) < SAME_LEVEL)
-    clusters, left = [], set(range(len(places)))
+    clusters = []
+    left = set(range(len(places)))
     while left:
-        members, border = set(), {min(left)}
+        members = set()
+        border = {min(left)}
         while border:
             members |= border
             border = {int(i) for i in np.flatnonzero(joined[sorted(border)].any(axis=0))} - members

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 Bools: TypeAlias = NDArray[np.bool_]
 Bytes: TypeAlias = NDArray[np.uint8]
 Floats: TypeAlias = NDArray[np.float32]
-HEIGHT_LOW, HEIGHT_STEP = -16.0, 32.0 / 255.0
+HEIGHT_LOW = -16.0
+HEIGHT_STEP = 32.0 / 255.0
 """World height of a byte of the terrain, z = -16 + 32 byte / 255, as the game's API has it."""
 SEED_REACH = 4
 """Cells around a point from which ways begin: there may be a structure on the point itself."""

@@ -1,0 +1,1 @@
+"""What agents write to each other and to themselves: who gets it, what was answered, what is kept."""
