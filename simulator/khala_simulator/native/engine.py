@@ -84,11 +84,13 @@ def compiled_rules() -> tuple[str, ...]:
 
 
 def _sources() -> Iterator[Path]:
-    """Yield every rule that has a ``.pxd``, and that."""
+    """Yield what is compiled: each rule that has a ``.pxd`` or, where there is one, the ``.pyx``, and the ``.pxd``."""
     for types in ROOT.glob("*/*.pxd"):
-        if (rule := types.with_suffix(".py")).exists():
+        kernel = types.with_suffix(".pyx")
+        source = kernel if kernel.exists() else types.with_suffix(".py")
+        if source.exists():
             yield types
-            yield rule
+            yield source
 
 
 class _Interpreted:
