@@ -1,4 +1,4 @@
-"""The compiled engine against pure Python and numpy, in one run: how many times as many game loops it plays.
+"""The compiled engine against the interpreted one, in one run: how many times as many game loops it plays.
 
     python -m bench.engines                     a table
     python -m bench.engines --rounds 5          each engine plays five times, in turns
@@ -29,7 +29,7 @@ BATTLES: Final[Mapping[str, float]] = {"llm_smac/2s3z": 6.0, "armies of 100": 3.
 """What is played, by the name of its row in `bench.simulator_engine`: the least ratio that is good enough."""
 PLAYED: Final = ("--maps", "llm_smac/2s3z", "--sizes", "200")
 WHICH: Final = "from khala_simulator.native.engine import check, engine; check(); print(engine())"
-MISSING: Final = "was not built"
+MISSING: Final = "were not compiled"
 """What the simulator says where there is no compiled engine; all else is an error of it."""
 
 
