@@ -26,7 +26,7 @@ help: ## List the targets
 	.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
 
 # A C compiler, where there is one, builds the simulator's compiled systems; see docs/design/engine.md.
-ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(wildcard simulator/khala_simulator/*/*.p*)
+ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(filter-out %/columns.pxd %/columns.pyx,$(wildcard simulator/khala_simulator/*/*.p*))
 
 .venv/.ready: pyproject.toml uv.lock $(ENGINE) $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
