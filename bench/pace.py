@@ -32,6 +32,7 @@ from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import LOOPS_PER_S, Report
 from khala_protocol.recording import Recording
+from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -44,6 +45,7 @@ GAME_S = 80.0
 STEP_LOOPS = 8
 MOST_MS = 1.0
 """Highest cost of slow agents for the others, at the median."""
+SLEEPER = "bench.pace:sleeper"
 SLEEPS_VARIABLE = "KHALA_BENCH_SLEEPS"
 """In the environment of the agents: seconds by name, as JSON."""
 
@@ -90,8 +92,9 @@ async def measure(sleeps_s: Sequence[float], game_s: float, directory: Path, *, 
     )  # fmt: skip
     sleeps = dict(zip((agent.name for agent in task.agents), sleeps_s, strict=True))
     os.environ[SLEEPS_VARIABLE] = json.dumps(sleeps)
+    trust_named(SLEEPER)
     config = MatchConfig(task=task, run="pace", record=directory / "pace.mcap")
-    (result,) = await play(config, {config.task.side: Minds(policy="bench.pace:sleeper")}, directory, game="simulator")
+    (result,) = await play(config, {config.task.side: Minds(policy=SLEEPER)}, directory, game="simulator")
     recording = Recording.open(directory / "pace.mcap")
     reports = list(recording.of(Report))
     agents = tuple(_figures(name, sleep_s, reports) for name, sleep_s in sleeps.items())

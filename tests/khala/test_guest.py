@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import Run
 from khala_protocol.recording import Recording
+from khala_protocol.trust import trust
 
 if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
@@ -36,7 +38,9 @@ BOT = Path(__file__).with_name("ladder_bot.py")
 
 
 def match(kind: str, record: Path, *, episodes: int = 1, wait_s: float = 60.0, **changes: Any) -> MatchConfig:
-    guest = {"kind": "guest", "command": [sys.executable, str(BOT), kind], "wait_s": wait_s}
+    command = [sys.executable, str(BOT), kind]
+    trust(shlex.join(command))
+    guest = {"kind": "guest", "command": command, "wait_s": wait_s}
     task = change(load_task("simple64_eceb_terran"), opponent=guest, **changes)
     return MatchConfig(task=task, run="guest", record=record, episodes=episodes)
 
