@@ -25,6 +25,15 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 BEHIND: Final = 1e-9
+ALLIES: Final = 1
+NEUTRAL: Final = 2
+STRUCTURES: Final = 4
+OTHERS: Final = 8
+SOURCE: Final = 16
+TARGET: Final = 32
+ON_GROUND: Final = 64
+IN_AIR: Final = 128
+ANYWHERE: Final = ON_GROUND | IN_AIR
 DAMAGE_MIN: Final = MECHANICS.damage_min
 ALL_ROUND_DEG: Final = 360.0
 
@@ -85,7 +94,11 @@ def _against(damage: Damage, attributes: int) -> float:
     """Return the damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
     if not damage.bonus:
         return damage.amount
-    return damage.amount + max([value for bit, value in damage.bonus if attributes & bit], default=0.0)
+    most = 0.0
+    for bit, value in damage.bonus:
+        if attributes & bit:
+            most = max(most, value)
+    return damage.amount + most
 
 
 def apply_damage(
@@ -164,7 +177,7 @@ def _splash(world: World, shot: Shot, damage: Damage) -> None:
     c = columns.columns_of(world)
     live = world.live
     slots = memory.ints(live)
-    affects = damage.hit.area_affects
+    affects = bits_of(damage.hit.area_affects)
     rings = [(ring.radius, ring.fraction, ring.arc_deg) for ring in damage.hit.area]
     widest = max([radius for radius, _, _ in rings])
     forward_x = shot.goal_x - shot.start_x
@@ -204,6 +217,7 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
     c = columns.columns_of(world)
     live = world.live
     slots = memory.ints(live)
+    affects = bits_of(search.affects)
     from_source = search.origin == "source"
     origin_x = shot.start_x if from_source else shot.goal_x
     origin_y = shot.start_y if from_source else shot.goal_y
@@ -213,7 +227,7 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
     found = []
     for i in range(len(live)):
         slot = slots[i]
-        if slot == shot.prior or not touches(c, search.affects, shot, slot):
+        if slot == shot.prior or not touches(c, affects, shot, slot):
             continue
         x = c.pos[slot].x - origin_x
         y = c.pos[slot].y - origin_y
@@ -224,15 +238,27 @@ def found_by(world: World, search: Search, shot: Shot) -> list[int]:
     return nearest[: search.max_count] if search.max_count else nearest
 
 
-def touches(c: Columns, affects: Affects, shot: Shot, slot: int) -> bool:
+def bits_of(affects: Affects) -> int:
+    """Return which units a splash, a search or a sweep may touch, as the bits that ``touches`` reads."""
+    bits = (ALLIES if affects.allies else 0) | (NEUTRAL if affects.neutral else 0)
+    bits |= 0 if affects.only == "structure" else OTHERS
+    bits |= 0 if affects.excluding == "structure" else STRUCTURES
+    bits |= (0 if affects.not_self else SOURCE) | (0 if affects.not_target else TARGET)
+    bits |= 0 if affects.plane == "air" else ON_GROUND
+    bits |= 0 if affects.plane == "ground" else IN_AIR
+    return bits
+
+
+def touches(c: Columns, affects: int, shot: Shot, slot: int) -> bool:
     """Return whether a splash, a search or a sweep may touch a living unit."""
     if not c.targetable[slot] or not c.life[slot] > 0.0:
         return False
-    if (not affects.allies and c.owner[slot] == shot.owner) or (not affects.neutral and c.owner[slot] == 0):
+    if (not affects & ALLIES and c.owner[slot] == shot.owner) or (not affects & NEUTRAL and c.owner[slot] == 0):
         return False
-    if (affects.only == "structure" and not c.walled[slot]) or (affects.excluding == "structure" and c.walled[slot]):
+    if not affects & (STRUCTURES if c.walled[slot] else OTHERS):
         return False
-    if (affects.not_self and slot == shot.source) or (affects.not_target and slot == shot.target):
+    if (not affects & SOURCE and slot == shot.source) or (not affects & TARGET and slot == shot.target):
         return False
-    plane = affects.plane
-    return plane == "any" or c.plane_bits[slot] & (GROUND_PLANE if plane == "ground" else AIR_PLANE) != 0
+    if affects & ANYWHERE == ANYWHERE:
+        return True
+    return c.plane_bits[slot] & (GROUND_PLANE if affects & ON_GROUND else AIR_PLANE) != 0

@@ -1,4 +1,5 @@
 cimport cython
+from libc cimport math
 from libc.stdint cimport int64_t
 
 from khala_simulator.native cimport columns, memory
@@ -7,9 +8,9 @@ from khala_simulator.native.columns cimport Columns
 cdef int64_t NOBODY
 cdef int64_t GROUND_PLANE
 
-@cython.locals(planes=int64_t, ground=int64_t, air=int64_t, row=int64_t)
+@cython.locals(planes=int64_t, ground=int64_t, air=int64_t, row=int64_t, is_excluded=bint)
 cpdef int64_t weapon_for(object world, int64_t slot, int64_t target) except -2
-@cython.locals(row=int64_t, fixed=bint)
+@cython.locals(row=int64_t, least=double, is_fixed=bint)
 cpdef bint engage(object world, int64_t slot, int64_t target) except -1
 cpdef take_other_weapon(object world, int64_t slot)
 @cython.locals(plain=double, touch=double, target=int64_t)

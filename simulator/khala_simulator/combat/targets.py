@@ -7,7 +7,6 @@ fires.
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import TYPE_CHECKING
 
 from khala_simulator.native import columns, memory
@@ -17,8 +16,6 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
     from khala_simulator.world.world import World
-
-WIDEST_AIM_DEG = 180.0
 
 
 def weapon_for(world: World, slot: int, target: int) -> int:
@@ -33,10 +30,13 @@ def weapon_for(world: World, slot: int, target: int) -> int:
     row = max(ground, air)
     if row < 0:
         return -1
-    weapons, victim = world.catalog.weapons, world.catalog.units[c.type[target]]
     if ground >= 0 and air >= 0 and ground != air:
+        weapons = world.catalog.weapons
+        victim = world.catalog.units[c.type[target]]
         row = ground if weapons[ground].rate_against(victim) >= weapons[air].rate_against(victim) else air
-    return -1 if weapons[row].excluding in victim.attributes else row
+    stats = world.stats
+    is_excluded = memory.ints(stats.excluding)[row] & memory.ints(stats.attribute_bits)[c.type[target]] != 0
+    return -1 if is_excluded else row
 
 
 def engage(world: World, slot: int, target: int) -> bool:
@@ -47,24 +47,19 @@ def engage(world: World, slot: int, target: int) -> bool:
     c = columns.columns_of(world)
     if c.target[slot] != target:
         drop_attack(world, slot)
-    weapon = world.catalog.weapons[row]
     c.target[slot] = target
     c.weapon[slot] = row
     measure_reach(world, slot)
-    c.reach_min[slot] = -math.inf if c.close_weapon[slot] >= 0 or not weapon.min_range else weapon.min_range
-    c.slop[slot] = weapon.slop
-    c.rolling[slot] = weapon.moves == "moving"
-    c.turreted[slot] = weapon.turret_deg_n is not None
-    fixed = not c.turreted[slot] and world.catalog.units[c.type[slot]].unturnable
-    c.aim_cos[slot] = -1.0 if fixed else aim_cosine(weapon.arc_deg, weapon.arc_slop_deg)
+    stats = world.stats
+    least = memory.floats(stats.least_range)[row]
+    c.reach_min[slot] = -math.inf if c.close_weapon[slot] >= 0 or least == 0.0 else least
+    c.slop[slot] = memory.floats(stats.slop)[row]
+    c.rolling[slot] = memory.bools(stats.rolling)[row]
+    c.turreted[slot] = memory.bools(stats.turreted)[row]
+    is_fixed = not c.turreted[slot] and memory.bools(stats.unturnable)[c.type[slot]]
+    c.aim_cos[slot] = -1.0 if is_fixed else memory.floats(stats.aim_cos)[row]
     c.nav_loop[slot] = 0
     return True
-
-
-@cache
-def aim_cosine(arc_deg: float, slop_deg: float) -> float:
-    """Return the cosine of how far off its target a weapon with this arc may point when it fires."""
-    return math.cos(math.radians(min(arc_deg / 2.0 + slop_deg, WIDEST_AIM_DEG)))
 
 
 def take_other_weapon(world: World, slot: int) -> None:
@@ -81,7 +76,8 @@ def measure_reach(world: World, slot: int) -> None:
     touches one reaches it.
     """
     c = columns.columns_of(world)
-    plain = memory.floats(world.stats.range)[c.owner[slot] * len(world.catalog.weapons) + c.weapon[slot]]
+    stats = world.stats
+    plain = memory.floats(stats.range)[c.owner[slot] * stats.weapons + c.weapon[slot]]
     touch = 0.0
     target = c.target[slot]
     if target != NOBODY:

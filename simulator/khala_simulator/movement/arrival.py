@@ -98,4 +98,4 @@ def _area(c: Columns, crowd: Gathering, slot: int, squared: float) -> float:
         other = crowd.slots[i]
         is_inside = slot == NOBODY or _is_inside(c, slot, other, squared)
         cells[i] = c.separation[other] * c.separation[other] if is_inside else 0.0
-    return float(areas.sum())
+    return memory.pairwise_sum(cells, crowd.units)

@@ -9,6 +9,7 @@ from khala_simulator.native.memory cimport Point
 cdef int64_t FINE
 cdef double MARGIN
 cdef int64_t NOWHERE
+cdef int64_t TAKEN
 cdef int64_t HOPS
 cdef int64_t AROUND
 cdef double NEARER
@@ -35,29 +36,32 @@ cdef class Flow:
     cdef int64_t width
     cdef int64_t height
     cdef tuple arrays
-    cdef uint8_t* free
+    cdef uint8_t* left
     cdef uint8_t* wanted
     cdef uint8_t* awaited
-    cdef uint8_t* left
+    cdef int64_t* goals
     cdef int64_t* reached
+    cdef int64_t goal_count
     cdef int64_t end
 
-    @cython.locals(walker=Walker)
+    @cython.locals(first=Walker, walker=Walker, low=Point, high=Point, x0=int64_t, y0=int64_t, x1=int64_t,
+                   y1=int64_t, size=int64_t)
     cdef cover(self, Grid grid, list walkers)
+    @cython.locals(x=int64_t, y=int64_t, row=int64_t, line=int64_t)
+    cdef void lay_ground(self, Grid grid, int64_t x0, int64_t y0) noexcept
     cdef void stand(self, Point at, double apart) noexcept
     cdef void reach(self, Point at, double within) noexcept
     @cython.locals(middle_x=double, middle_y=double, half=int64_t, column=int64_t, row=int64_t, i=int64_t, j=int64_t,
-                   x=double, y=double)
-    cdef void paint(self, uint8_t* cells, Point at, double radius, uint8_t value) noexcept
+                   x=double, y=double, cell=int64_t)
+    cdef void paint(self, Point at, double radius, bint wanted) noexcept
     @cython.locals(walker=Walker, settled=int64_t, before=bint)
     cdef find(self, list walkers, double width)
     @cython.locals(x=int64_t, y=int64_t)
     cdef int64_t cell(self, Point at) noexcept
-    @cython.locals(walker=Walker, missing=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t, place=int64_t,
-                   old=int64_t, older=int64_t, stop=int64_t, step=int64_t, i=int64_t)
+    @cython.locals(walker=Walker, missing=int64_t, cell=int64_t, old=int64_t, older=int64_t, stop=int64_t, step=int64_t, i=int64_t)
     cdef bint spread(self, list walkers) except -1
-    @cython.locals(new=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t)
-    cdef int64_t expect(self, Walker walker) noexcept
+    @cython.locals(changed=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t)
+    cdef int64_t await_around(self, Walker walker, bint awaited) noexcept
     cdef int64_t arrive(self, int64_t cell, int64_t step) noexcept
     @cython.locals(cell=int64_t, x=int64_t, y=int64_t, best_x=int64_t, best_y=int64_t, dx=int64_t, dy=int64_t,
                    goal_x=double, goal_y=double, beside_x=double, beside_y=double, cost=double, best=double, hop=int64_t)

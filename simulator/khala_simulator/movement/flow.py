@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from khala_simulator.native import memory
 
 if TYPE_CHECKING:
@@ -23,6 +21,7 @@ if TYPE_CHECKING:
 FINE: Final = 4  # cells of the grid in a cell of the ground, on each axis
 MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
 NOWHERE: Final = 63  # more steps than are looked at
+TAKEN: Final = NOWHERE + 1  # a cell that is not free
 HOPS: Final = 2  # of up to two cells, from the nearest cell with a way to the point that a walker heads for
 AROUND: Final = 2  # cells to each side in a hop
 NEARER: Final = 1e-5  # what a square cell of distance to the goal weighs, where a step weighs 1
@@ -71,40 +70,64 @@ class Flow:
 
     def cover(self, grid: Grid, walkers: list[Walker]) -> None:
         """Lay the grid around walkers, with nothing on it yet."""
-        margin = grid.shift - MARGIN
-        far = grid.shift + MARGIN
-        x0 = int(math.floor(min([walker.at.x for walker in walkers]) + margin))
-        y0 = int(math.floor(min([walker.at.y for walker in walkers]) + margin))
-        x1 = int(math.ceil(max([walker.at.x for walker in walkers]) + far))
-        y1 = int(math.ceil(max([walker.at.y for walker in walkers]) + far))
-        inside = grid.surface.free[max(y0, 0) : max(y1, 0), max(x0, 0) : max(x1, 0)]
-        ground = np.zeros((y1 - y0, x1 - x0), dtype=np.uint8)
-        ground[max(-y0, 0) :, max(-x0, 0) :][: inside.shape[0], : inside.shape[1]] = inside
-        fine = ground.repeat(FINE, axis=0).repeat(FINE, axis=1)
-        fine[[0, -1]] = 0  # so that no step leads round the edge
-        fine[:, [0, -1]] = 0
+        first: Walker = walkers[0]
+        low = first.at
+        high = first.at
+        for walker in walkers:
+            low = memory.point(min(low.x, walker.at.x), min(low.y, walker.at.y))
+            high = memory.point(max(high.x, walker.at.x), max(high.y, walker.at.y))
+        x0 = int(math.floor(low.x + (grid.shift - MARGIN)))
+        y0 = int(math.floor(low.y + (grid.shift - MARGIN)))
+        x1 = int(math.ceil(high.x + (grid.shift + MARGIN)))
+        y1 = int(math.ceil(high.y + (grid.shift + MARGIN)))
         self.low = memory.point(x0 - grid.shift, y0 - grid.shift)
-        self.height, self.width = fine.shape
+        self.width = (x1 - x0) * FINE
+        self.height = (y1 - y0) * FINE
+        size = self.width * self.height
         self.arrays: tuple[NDArray[Any], ...] = (
-            fine, np.zeros_like(fine), np.zeros_like(fine), np.zeros_like(fine), memory.new_ints(fine.size)
+            memory.new_uint8s(size), memory.new_uint8s(size), memory.new_uint8s(size),
+            memory.new_ints(size), memory.new_ints(size),
         )  # fmt: skip
-        self.free = memory.uint8s(self.arrays[0])
+        self.left = memory.uint8s(self.arrays[0])  # steps to a place to go to; ``NOWHERE`` or ``TAKEN``
         self.wanted = memory.uint8s(self.arrays[1])
         self.awaited = memory.uint8s(self.arrays[2])  # the cells around walkers
-        self.left = memory.uint8s(self.arrays[3])  # steps to a place to go to, more than ``NOWHERE`` if it is not free
-        self.reached = memory.ints(self.arrays[4])  # cells in the order of these
+        self.goals = memory.ints(self.arrays[3])  # the wanted cells
+        self.reached = memory.ints(self.arrays[4])  # cells in the order of their steps
+        self.goal_count = 0
         self.end = 0  # of the cells that were reached
+        self.lay_ground(grid, x0, y0)
+
+    def lay_ground(self, grid: Grid, x0: int, y0: int) -> None:
+        """Free the cells on free ground, but none at the edge, so that no step leads round it.
+
+        Args:
+            grid: The ground.
+            x0: The column of the ground at which the grid begins.
+            y0: The row of the ground at which it does.
+        """
+        memory.fill(self.left, 0, self.width * self.height, TAKEN)
+        for y in range(max(-y0, 0), min(self.height // FINE, grid.height - y0)):
+            row = y * FINE * self.width
+            for x in range(max(-x0, 0), min(self.width // FINE, grid.width - x0)):
+                if grid.flat[(y0 + y) * grid.width + x0 + x]:
+                    memory.fill(self.left, row + x * FINE, FINE, NOWHERE)
+            self.left[row] = TAKEN
+            self.left[row + self.width - 1] = TAKEN
+            for line in range(1, FINE):
+                memory.repeat(self.left, row, self.width, row + line * self.width)
+        memory.fill(self.left, 0, self.width, TAKEN)
+        memory.fill(self.left, (self.height - 1) * self.width, self.width, TAKEN)
 
     def stand(self, at: memory.Point, apart: float) -> None:
         """Take the cells nearer than ``apart`` to a body."""
-        self.paint(self.free, at, apart, 0)
+        self.paint(at, apart, False)
 
     def reach(self, at: memory.Point, within: float) -> None:
         """Mark the cells within a distance of a target as places to go to."""
-        self.paint(self.wanted, at, within, 1)
+        self.paint(at, within, True)
 
-    def paint(self, cells: Cells, at: memory.Point, radius: float, value: int) -> None:
-        """Write a value to the cells around a point."""
+    def paint(self, at: memory.Point, radius: float, wanted: bool) -> None:
+        """Take the cells around a point, or mark them as wanted."""
         middle_x = (at.x - self.low.x) * FINE
         middle_y = (at.y - self.low.y) * FINE
         radius = radius * FINE
@@ -115,8 +138,15 @@ class Flow:
             y = i + 0.5 - middle_y
             for j in range(max(column - half, 0), min(column + half + 1, self.width)):
                 x = j + 0.5 - middle_x
-                if x * x + y * y < radius * radius:
-                    cells[i * self.width + j] = value
+                if x * x + y * y >= radius * radius:
+                    continue
+                cell = i * self.width + j
+                if not wanted:
+                    self.left[cell] = TAKEN
+                elif not self.wanted[cell]:
+                    self.wanted[cell] = 1
+                    self.goals[self.goal_count] = cell
+                    self.goal_count += 1
 
     def find(self, walkers: list[Walker], width: float) -> None:
         """Write the points ``ahead`` that walkers head for, and which of them have a way.
@@ -155,17 +185,18 @@ class Flow:
 
         Returns whether there is such a place.
         """
-        free = self.arrays[0]
-        wanted = self.arrays[1]
-        self.arrays[2].fill(0)
-        np.subtract(NOWHERE + 1, free, out=self.arrays[3], casting="unsafe")
+        for i in range(self.end):  # what an earlier count has left
+            if self.left[self.reached[i]] != TAKEN:
+                self.left[self.reached[i]] = NOWHERE
         self.end = 0
+        for walker in walkers:
+            self.await_around(walker, False)
         missing = 0
         for walker in walkers:
             if not walker.settled:
-                missing += self.expect(walker)
-        for place in np.flatnonzero(free & wanted).tolist():
-            missing -= self.arrive(place, 0)
+                missing += self.await_around(walker, True)
+        for i in range(self.goal_count):
+            missing -= self.arrive(self.goals[i], 0)
         old = 0
         older = 0
         for step in range(1, NOWHERE):
@@ -188,17 +219,17 @@ class Flow:
             old = stop
         return self.end > 0
 
-    def expect(self, walker: Walker) -> int:
-        """Await the cells around a walker; return how many were not awaited before."""
-        new = 0
+    def await_around(self, walker: Walker, awaited: bool) -> int:
+        """Await the free cells around a walker, or no longer; return how many that changes."""
+        changed = 0
         middle = self.cell(walker.at)
         for y in range(-1, 2):
             for x in range(-1, 2):
                 cell = middle + y * self.width + x
-                if self.free[cell] and not self.awaited[cell]:
-                    self.awaited[cell] = 1
-                    new += 1
-        return new
+                if self.awaited[cell] != awaited and (not awaited or self.left[cell] != TAKEN):
+                    self.awaited[cell] = awaited
+                    changed += 1
+        return changed
 
     def arrive(self, cell: int, step: int) -> int:
         """Note that a cell is reached now, if it is free and was not before; return how many awaited ones that are."""

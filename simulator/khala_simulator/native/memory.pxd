@@ -2,7 +2,7 @@
 cimport numpy as cnp
 from libc.math cimport sqrt
 from libc.stdint cimport int16_t, int32_t, int64_t, uint8_t, uint16_t
-from libc.string cimport memcpy
+from libc.string cimport memcpy, memset
 
 ctypedef uint8_t boolean
 
@@ -50,9 +50,17 @@ cdef cnp.ndarray new_points(Py_ssize_t n)
 cdef inline double length(double x, double y) noexcept nogil:
     return sqrt(x * x + y * y)
 
+cdef double pairwise_sum(double* numbers, Py_ssize_t n) noexcept nogil
+
 cdef inline void put_float32(uint8_t* to, Py_ssize_t at, double number) noexcept nogil:
     cdef float single = <float>number
     memcpy(to + at, &single, sizeof(float))
+
+cdef inline void fill(uint8_t* cells, Py_ssize_t start, Py_ssize_t n, uint8_t value) noexcept nogil:
+    memset(cells + start, value, n)
+
+cdef inline void repeat(uint8_t* cells, Py_ssize_t start, Py_ssize_t n, Py_ssize_t at) noexcept nogil:
+    memcpy(cells + at, cells + start, n)
 
 cdef inline void put_bytes(uint8_t* to, Py_ssize_t at, uint8_t* cells, Py_ssize_t n) noexcept nogil:
     memcpy(to + at, cells, n)

@@ -123,9 +123,24 @@ def length(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)
 
 
+def pairwise_sum(numbers: Cells, n: int) -> float:
+    """Return the sum of the first numbers, added in pairs and rounded as numpy does."""
+    return float(np.asarray(numbers[:n]).sum())
+
+
 def put_float32(to: Cells, at: int, number: float) -> None:
     """Write a number into the four bytes from an index on, as a float of 32 bits."""
     struct.pack_into("<f", to, at, number)
+
+
+def fill(cells: Cells, start: int, n: int, value: int) -> None:
+    """Write a value to some bytes."""
+    cells[start : start + n] = bytes([value]) * n
+
+
+def repeat(cells: Cells, start: int, n: int, at: int) -> None:
+    """Write some bytes again from another index on."""
+    cells[at : at + n] = cells[start : start + n]
 
 
 def put_bytes(to: Cells, at: int, cells: Cells, n: int) -> None:

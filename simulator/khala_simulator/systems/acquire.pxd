@@ -4,6 +4,8 @@ from libc.stdint cimport int64_t
 from khala_simulator.combat cimport targets
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
+from khala_simulator.world cimport census
 
 cdef int64_t NOBODY
 cdef int64_t AIR_PLANE
@@ -29,6 +31,9 @@ cdef double SWITCH_GAIN
 cdef class _Foes:
     cdef tuple arrays
     cdef int64_t* slot
+    cdef Point* place
+    cdef double* radius
+    cdef int64_t* planes
     cdef double* rank
     cdef int64_t* threatens
     cdef Py_ssize_t count
@@ -57,7 +62,7 @@ cdef int64_t _threatened_planes(Columns c, int64_t foe) noexcept
 cdef _seek(object world, Columns c, int64_t player, list seekers)
 cdef bint _is_better(Columns c, _Foes foes, int64_t slot, int64_t foe, double gap, double rise) noexcept
 @cython.locals(planes=int64_t, on_ground=double, in_air=double, longest=double, best=int64_t, best_gap=double,
-               best_worth=double, farthest=double, i=Py_ssize_t, foe=int64_t, x=double, y=double, gap=double,
+               best_worth=double, place=Point, radius=double, farthest=double, i=Py_ssize_t, foe=int64_t, x=double, y=double, gap=double,
                sight=double, worth=double)
 cdef (int64_t, double, double) _find_best(Columns c, _Foes foes, int64_t slot) noexcept
 cdef bint _may_aim(Columns c, int64_t slot, int64_t foe, double gap) noexcept

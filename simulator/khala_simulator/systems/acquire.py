@@ -18,7 +18,7 @@ from khala_simulator.combat import targets
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
-from khala_simulator.world.census import census
+from khala_simulator.world import census
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
@@ -122,23 +122,36 @@ class _Foes:
         c = columns.columns_of(world)
         live = world.live
         slots = memory.ints(live)
-        self.arrays = (memory.new_ints(len(live)), memory.new_floats(len(live)), memory.new_ints(len(live)))
+        self.arrays = (
+            memory.new_ints(len(live)),
+            memory.new_points(len(live)),
+            memory.new_floats(len(live)),
+            memory.new_ints(len(live)),
+            memory.new_floats(len(live)),
+            memory.new_ints(len(live)),
+        )
         self.slot = memory.ints(self.arrays[0])
-        self.rank = memory.floats(self.arrays[1])
-        self.threatens = memory.ints(self.arrays[2])
+        self.place = memory.points(self.arrays[1])
+        self.radius = memory.floats(self.arrays[2])
+        self.planes = memory.ints(self.arrays[3])
+        self.rank = memory.floats(self.arrays[4])
+        self.threatens = memory.ints(self.arrays[5])
         self.count = 0
         self.widest = 0.0
         for i in range(len(live)):
             slot = slots[i]
             if is_foe(c, player, slot):
                 self.slot[self.count] = slot
+                self.place[self.count] = c.pos[slot]
+                self.radius[self.count] = c.radius[slot]
+                self.planes[self.count] = c.plane_bits[slot]
                 self.rank[self.count] = c.priority[slot] * PRIORITY_WEIGHT
                 self.threatens[self.count] = _threatened_planes(c, slot)
                 self.widest = max(self.widest, c.radius[slot])
                 self.count += 1
-        self.weapons = len(world.catalog.weapons)
+        self.weapons = world.stats.weapons
         self.ranges = memory.floats(world.stats.range[player])
-        self.filters = census(world).weapons_with_filters
+        self.filters = census.census(world).weapons_with_filters
         self.zones = bool(world.area_effects)
 
 
@@ -205,22 +218,24 @@ def _find_best(c: Columns, foes: _Foes, slot: int) -> tuple[int, float, float]:
     best = NOBODY
     best_gap = 0.0
     best_worth = OUT_OF_SIGHT
-    farthest = max(on_ground, in_air) + c.radius[slot] + foes.widest + ROUNDING
+    place = c.pos[slot]
+    radius = c.radius[slot]
+    farthest = max(on_ground, in_air) + radius + foes.widest + ROUNDING
     if farthest < 0.0:
         return best, best_gap, best_worth
     for i in range(foes.count):
-        foe = foes.slot[i]
-        x = c.pos[slot].x - c.pos[foe].x
-        y = c.pos[slot].y - c.pos[foe].y
+        x = place.x - foes.place[i].x
+        y = place.y - foes.place[i].y
         if x * x + y * y > farthest * farthest:
             continue
-        gap = memory.length(x, y) - c.radius[slot] - c.radius[foe]
+        gap = memory.length(x, y) - radius - foes.radius[i]
         sight = max(
-            on_ground if c.plane_bits[foe] & GROUND_PLANE else -1.0, in_air if c.plane_bits[foe] & AIR_PLANE else -1.0
+            on_ground if foes.planes[i] & GROUND_PLANE else -1.0, in_air if foes.planes[i] & AIR_PLANE else -1.0
         )
         worth = ((THREAT_WEIGHT if foes.threatens[i] & planes else 0.0) + foes.rank[i]) - gap
         if gap > sight or worth <= best_worth:
             continue
+        foe = foes.slot[i]
         if foes.filters and not _may_aim(c, slot, foe, gap):
             continue
         if foes.zones and not targets.inside_zone(c, slot, foe):

@@ -27,12 +27,8 @@ cdef int64_t NOBODY
 @cython.locals(loop=int64_t, slot=int64_t)
 cpdef find_headings(object world)
 cdef bint _flows(Columns c, int64_t slot) noexcept
-@cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double)
+@cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double, standing=_Standing)
 cpdef begin(object world, object slots, object shift)
-@cython.locals(i=Py_ssize_t, slot=int64_t, bodies=Py_ssize_t)
-cdef object _standing(object world, Columns c)
-@cython.locals(i=Py_ssize_t, x=double, y=double, is_ahead=bint)
-cdef double _to_the_left(Point at, Point way, object standing) except? -1.0
 @cython.locals(slot=int64_t, x=double, y=double, size=double, grid=Grid, turn=int64_t)
 cdef _look(object world, Columns c, list turning)
 @cython.locals(turn=int64_t)
@@ -44,17 +40,30 @@ cdef bint _is_body(Columns c, int64_t slot) noexcept
 
 
 @cython.final
+cdef class _Standing:
+    cdef tuple _arrays
+    cdef Point* _places
+    cdef double* _terms
+    cdef Py_ssize_t _many
+    @cython.locals(i=Py_ssize_t, x=double, y=double, is_ahead=bint)
+    cdef double to_the_left(self, Point at, Point way) noexcept
+
+
+@cython.final
 cdef class _Crowd:
     cdef tuple _arrays
-    cdef int64_t* _slot
     cdef int64_t* _begin
-    cdef double* _x
-    cdef double* _y
+    cdef int64_t* _slot
+    cdef int64_t* _bits
+    cdef Point* _place
+    cdef Point* _step
+    cdef double* _separation
+    cdef Point* _offset
     cdef double* _apart
     cdef Py_ssize_t _many
     cdef double _widest
-    @cython.locals(separation=double, farthest=double, first=int64_t, end=int64_t, i=int64_t, body=int64_t, x=double,
-                   y=double, apart=double, seen=double)
+    @cython.locals(separation=double, bits=int64_t, farthest=double, many=Py_ssize_t, i=int64_t, x=double, y=double,
+                   apart=double, seen=double)
     cdef void look_around(self, Columns c, int64_t slot, Point way) noexcept
     @cython.locals(i=Py_ssize_t, along=double, across=double, reach=double)
     cdef bint lets_pass(self, Point heading) noexcept

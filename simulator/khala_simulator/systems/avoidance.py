@@ -92,46 +92,45 @@ def begin(world: World, slots: Ints, shift: Floats) -> None:
     walkers = memory.ints(slots)
     shifts = memory.points(shift)
     end = world.loop + DETOUR_LOOPS
-    places = None
+    standing = None
     for i in range(len(slots)):
         slot = walkers[i]
         c.detour_end[slot] = end
         if c.detour[slot] != 0:
             continue
-        if places is None:
-            places = _standing(world, c)
+        if standing is None:
+            standing = _Standing(world)
         way = c.intended[slot]
-        beside = _to_the_left(c.pos[slot], way, places)
+        beside = standing.to_the_left(c.pos[slot], way)
         turn = way.x * shifts[i].y - way.y * shifts[i].x if beside == 0.0 else -beside
         c.detour[slot] = 1 if turn >= 0.0 else -1
 
 
-def _standing(world: World, c: Columns) -> Floats:
-    """Return (k, 2) where the bodies are that do not walk."""
-    live = world.live
-    slots = memory.ints(live)
-    room = memory.new_points(len(live))
-    places = memory.points(room)
-    bodies = 0
-    for i in range(len(live)):
-        slot = slots[i]
-        if not c.wants[slot] and c.layer[slot] != AIR:
-            places[bodies] = c.pos[slot]
-            bodies += 1
-    return room[:bodies]
+class _Standing:
+    """Where the bodies are that do not walk."""
 
+    def __init__(self, world: World) -> None:
+        c = columns.columns_of(world)
+        live = world.live
+        slots = memory.ints(live)
+        self._arrays = (memory.new_points(len(live)), memory.new_floats(len(live)))
+        self._places = memory.points(self._arrays[0])
+        self._terms = memory.floats(self._arrays[1])  # what each adds to a sum
+        self._many = 0
+        for i in range(len(live)):
+            slot = slots[i]
+            if not c.wants[slot] and c.layer[slot] != AIR:
+                self._places[self._many] = c.pos[slot]
+                self._many += 1
 
-def _to_the_left(at: memory.Point, way: memory.Point, standing: Floats) -> float:
-    """Return how far to the left of a way the bodies stand that are near and ahead, summed up in pairs."""
-    places = memory.points(standing)
-    terms = memory.new_floats(len(standing))
-    beside = memory.floats(terms)
-    for i in range(len(standing)):
-        x = places[i].x - at.x
-        y = places[i].y - at.y
-        is_ahead = x * x + y * y < DETOUR_LOOK * DETOUR_LOOK and x * way.x + y * way.y > 0.0
-        beside[i] = y * way.x - x * way.y if is_ahead else 0.0
-    return float(terms.sum())
+    def to_the_left(self, at: memory.Point, way: memory.Point) -> float:
+        """Return how far to the left of a way those stand that are near and ahead, summed up in pairs."""
+        for i in range(self._many):
+            x = self._places[i].x - at.x
+            y = self._places[i].y - at.y
+            is_ahead = x * x + y * y < DETOUR_LOOK * DETOUR_LOOK and x * way.x + y * way.y > 0.0
+            self._terms[i] = y * way.x - x * way.y if is_ahead else 0.0
+        return memory.pairwise_sum(self._terms, self._many)
 
 
 # the heading ----------------------------------------------------------------------------------------------------------
@@ -191,19 +190,27 @@ class _Crowd:
         live = world.live
         slots = memory.ints(live)
         self._arrays = (
+            memory.new_ints(STRIPES + 1),
             memory.new_ints(len(live)),
-            np.zeros(STRIPES + 1, dtype=np.int64),
+            memory.new_ints(len(live)),
+            memory.new_points(len(live)),
+            memory.new_points(len(live)),
             memory.new_floats(len(live)),
-            memory.new_floats(len(live)),
+            memory.new_points(len(live)),
             memory.new_floats(len(live)),
         )
-        self._slot = memory.ints(self._arrays[0])
-        self._begin = memory.ints(self._arrays[1])  # of each stripe
-        self._x = memory.floats(self._arrays[2])  # from the walker
-        self._y = memory.floats(self._arrays[3])
-        self._apart = memory.floats(self._arrays[4])  # distance to keep
+        self._begin = memory.ints(self._arrays[0])  # of each stripe
+        self._slot = memory.ints(self._arrays[1])
+        self._bits = memory.ints(self._arrays[2])
+        self._place = memory.points(self._arrays[3])
+        self._step = memory.points(self._arrays[4])
+        self._separation = memory.floats(self._arrays[5])
+        self._offset = memory.points(self._arrays[6])  # from the walker
+        self._apart = memory.floats(self._arrays[7])  # distance to keep
         self._many = 0  # near the walker
         self._widest = 0.0
+        for i in range(STRIPES + 1):
+            self._begin[i] = 0
         for i in range(len(live)):
             if _is_body(c, slots[i]):
                 self._begin[_stripe(c.pos[slots[i]].x)] += 1
@@ -214,40 +221,43 @@ class _Crowd:
             if _is_body(c, slot):
                 stripe = _stripe(c.pos[slot].x)
                 self._begin[stripe] -= 1
-                self._slot[self._begin[stripe]] = slot
+                place = self._begin[stripe]
+                self._slot[place] = slot
+                self._bits[place] = c.layer_bits[slot]
+                self._place[place] = c.pos[slot]
+                self._step[place] = c.intended[slot]
+                self._separation[place] = c.separation[slot]
                 self._widest = max(self._widest, c.separation[slot])
 
     def look_around(self, c: Columns, slot: int, way: memory.Point) -> None:
         """Find the bodies that stand near a walker or come towards it."""
         separation = c.separation[slot]
+        bits = c.layer_bits[slot]
         farthest = separation + self._widest + SEEN_AHEAD
         start = c.pos[slot]
-        self._many = 0
-        first = self._begin[_stripe(start.x - farthest)]
-        end = self._begin[_stripe(start.x + farthest) + 1]
-        for i in range(first, end):
-            body = self._slot[i]
-            x = c.pos[body].x - start.x
-            y = c.pos[body].y - start.y
-            apart = separation + c.separation[body] - TOLERANCE
+        many = 0
+        for i in range(self._begin[_stripe(start.x - farthest)], self._begin[_stripe(start.x + farthest) + 1]):
+            x = self._place[i].x - start.x
+            y = self._place[i].y - start.y
+            apart = separation + self._separation[i] - TOLERANCE
             seen = apart + SEEN_AHEAD
             if (
                 x * x + y * y < seen * seen
-                and c.layer_bits[slot] & c.layer_bits[body] != 0
-                and body != slot
-                and body != c.target[slot]
-                and way.x * c.intended[body].x + way.y * c.intended[body].y <= 0.0
+                and bits & self._bits[i] != 0
+                and self._slot[i] != slot
+                and self._slot[i] != c.target[slot]
+                and way.x * self._step[i].x + way.y * self._step[i].y <= 0.0
             ):
-                self._x[self._many] = x
-                self._y[self._many] = y
-                self._apart[self._many] = apart
-                self._many += 1
+                self._offset[many] = memory.point(x, y)
+                self._apart[many] = apart
+                many += 1
+        self._many = many
 
     def lets_pass(self, heading: memory.Point) -> bool:
         """Return whether a heading leads into none of these within ``SEEN_AHEAD``."""
         for i in range(self._many):
-            along = heading.x * self._x[i] + heading.y * self._y[i]
-            across = heading.x * self._y[i] - heading.y * self._x[i]
+            along = heading.x * self._offset[i].x + heading.y * self._offset[i].y
+            across = heading.x * self._offset[i].y - heading.y * self._offset[i].x
             reach = max(along - SEEN_AHEAD, 0.0)
             if along > 0.0 and across * across + reach * reach < self._apart[i] * self._apart[i]:
                 return False

@@ -2,10 +2,9 @@ cimport cython
 from libc cimport math
 from libc.stdint cimport int64_t
 
-from khala_simulator.movement cimport grids
-from khala_simulator.movement.grids cimport Grid
-from khala_simulator.movement cimport contacts, pushing
+from khala_simulator.movement cimport contacts, grids, pushing
 from khala_simulator.movement.contacts cimport Crowd
+from khala_simulator.movement.grids cimport Grid
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point

@@ -5,6 +5,8 @@ from khala_simulator.combat cimport targets
 from khala_simulator.economy cimport touching
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.world cimport census
+from khala_simulator.world.census cimport Census
 
 cdef int64_t NOBODY
 cdef double EDGE_TOLERANCE
@@ -26,7 +28,7 @@ cpdef measure(object world)
 cdef void _note_fighters(Columns c, Py_ssize_t n, int64_t* fighters) noexcept
 @cython.locals(beams=bint, rolling_guns=bint, guns_walking=bint, hides=bint, zones=bint, i=Py_ssize_t, slot=int64_t,
                target=int64_t, gap=double, reach=double, swings=bint, is_beyond=bint, is_near=bint)
-cdef _close_in(object world, Columns c, object kinds, int64_t* slots, Py_ssize_t fighting)
+cdef _close_in(object world, Columns c, Census kinds, int64_t* slots, Py_ssize_t fighting)
 @cython.locals(gap=double)
 cdef double _measure_gap(Columns c, int64_t slot, int64_t target) noexcept
 cdef double _distance_to_walls(Columns c, int64_t slot, int64_t target) noexcept

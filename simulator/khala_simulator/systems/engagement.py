@@ -15,7 +15,7 @@ from khala_simulator.economy.harvesting import Phase
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.casts import Cast
-from khala_simulator.world.census import census
+from khala_simulator.world import census
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
@@ -69,7 +69,7 @@ def measure(world: World) -> None:
         _haul(world, c, n)
     if goes_back:
         _go_back(c, n)
-    kinds = census(world)
+    kinds = census.census(world)
     if fighting:
         _close_in(world, c, kinds, memory.ints(fighters), fighting)
     rolls = kinds.rolling_guns

@@ -6,6 +6,7 @@ from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point, boolean
+from khala_simulator.world cimport census
 
 cdef double TURNING_CIRCLES
 cdef double NO_DISTANCE
@@ -33,6 +34,6 @@ cdef _walk(object world, Columns c, Py_ssize_t walking, bint brakers)
 @cython.locals(column=int64_t, row=int64_t)
 cdef int64_t _cell(Point at, int64_t width, int64_t height) noexcept
 @cython.locals(slot=int64_t, speed=double, left=double)
-cdef _choose(Columns c, _Walks walks, Py_ssize_t i, double top_speed, bint brakers, list queue)
+cdef bint _choose(Columns c, _Walks walks, Py_ssize_t i, double top_speed, bint brakers, list queue) except -1
 @cython.locals(slot=int64_t, standing=bint, late=bint, cos_step=double, sin_step=double, swings=bint)
 cdef void _turn(Columns c, _Walks walks, Py_ssize_t i) noexcept

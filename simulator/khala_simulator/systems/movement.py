@@ -15,7 +15,7 @@ import numpy as np
 
 from khala_simulator.movement import turning
 from khala_simulator.native import columns, memory
-from khala_simulator.world.census import census
+from khala_simulator.world import census
 
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
@@ -29,7 +29,7 @@ def move(world: World) -> None:
     """Choose this loop's steps and turn; writes ``intended``, ``speed`` and ``heading``."""
     c = columns.columns_of(world)
     n = world.top
-    kinds = census(world)
+    kinds = census.census(world)
     drifts = kinds.drifting_flyers
     walking = 0
     anyone = False

@@ -17,10 +17,10 @@ cpdef run(object world)
 @cython.locals(s=Sweep)
 cdef _drop_ended(object world)
 cdef object _line(object world, Shot shot)
-@cython.locals(shot=Shot, first=Py_ssize_t, drawn=Py_ssize_t, i=Py_ssize_t, slot=int64_t, reached=Py_ssize_t, radius=double)
+@cython.locals(shot=Shot, points=tuple, lag=double, loop=int64_t, first=Py_ssize_t, drawn=Py_ssize_t, i=Py_ssize_t,
+               slot=int64_t, reached=Py_ssize_t, radius=double, affects=int64_t)
 cdef _draw(object world, Sweep sweep)
-cdef double _delay(object line, Py_ssize_t point) except? -1.0
-@cython.locals(from_source=bint, reach=double, drawn=Py_ssize_t, i=Py_ssize_t, across=double, along=double)
+@cython.locals(from_source=bint, reach=double, points=tuple, drawn=Py_ssize_t, i=Py_ssize_t, across=double, along=double)
 cdef Py_ssize_t _place(object world, Shot shot, object line, Py_ssize_t first, Py_ssize_t end, Point* places) except -1
 cdef Py_ssize_t _first_within(Columns c, Point* places, Py_ssize_t drawn, int64_t slot, double reach) noexcept
-cdef _touch(object world, Sweep sweep, int64_t slot, object line, double moment)
+cdef _touch(object world, Sweep sweep, int64_t slot, double lag, double moment)

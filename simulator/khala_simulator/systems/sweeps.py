@@ -56,8 +56,11 @@ def _draw(world: World, sweep: Sweep) -> None:
     if shot.source == NOBODY:
         return
     line = _line(world, shot)
+    points = line.points
+    lag = line.lag_loops
+    loop = world.loop
     first = sweep.ahead
-    while sweep.ahead < len(line.points) and sweep.begun + _delay(line, sweep.ahead) <= world.loop:
+    while sweep.ahead < len(points) and sweep.begun + (points[sweep.ahead][0] - lag) <= loop:
         sweep.ahead += 1
     if sweep.ahead == first:
         return
@@ -68,19 +71,15 @@ def _draw(world: World, sweep: Sweep) -> None:
     live = world.live
     slots = memory.ints(live)
     radius = line.radius
+    affects = damage.bits_of(line.affects)
     for i in range(len(live)):
         slot = slots[i]
-        if not damage.touches(c, line.affects, shot, slot):
+        if not damage.touches(c, affects, shot, slot):
             continue
         reached = _first_within(c, places, drawn, slot, radius + c.radius[slot])
         if reached < drawn and slot not in sweep.touched:
             sweep.touched.append(slot)
-            _touch(world, sweep, slot, line, sweep.begun + _delay(line, first + reached))
-
-
-def _delay(line: SweepRecord, point: int) -> float:
-    """Return the loops from the damage point until a point of the line touches."""
-    return line.points[point][0] - line.lag_loops
+            _touch(world, sweep, slot, lag, sweep.begun + (points[first + reached][0] - lag))
 
 
 def _place(world: World, shot: Shot, line: SweepRecord, first: int, end: int, places: Points) -> int:
@@ -97,10 +96,11 @@ def _place(world: World, shot: Shot, line: SweepRecord, first: int, end: int, pl
     else:
         forward_x = 0.0
         forward_y = -1.0
-    reach = world.stats.range[shot.owner, shot.weapon] + line.past_range
+    reach = memory.floats(world.stats.range[shot.owner])[shot.weapon] + line.past_range
+    points = line.points
     drawn = 0
     for i in range(first, end):
-        _, across, along = line.points[i]
+        _, across, along = points[i]
         if from_source and not -along <= reach:
             continue
         at_x = x + (across * forward_y - along * forward_x)
@@ -118,11 +118,13 @@ def _first_within(c: Columns, places: Points, drawn: int, slot: int, reach: floa
     return drawn
 
 
-def _touch(world: World, sweep: Sweep, slot: int, line: SweepRecord, moment: float) -> None:
+def _touch(world: World, sweep: Sweep, slot: int, lag: float, moment: float) -> None:
     """Hit a unit now, or when the lag has passed."""
     shot = sweep.shot.at(slot)
-    if line.lag_loops <= 0.0:
+    if lag <= 0.0:
         damage.hit_target(world, shot)
         return
-    shot.goal_x, shot.goal_y = world.pos[slot].tolist()
-    world.pending.append(PendingHit(shot, moment + line.lag_loops, single=True))
+    c = columns.columns_of(world)
+    shot.goal_x = c.pos[slot].x
+    shot.goal_y = c.pos[slot].y
+    world.pending.append(PendingHit(shot, moment + lag, single=True))

@@ -4,8 +4,8 @@ from libc.stdint cimport int64_t
 from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
-from khala_simulator.native.memory cimport boolean
-from khala_simulator.world.shots cimport PendingHit, Shot
+from khala_simulator.world cimport census, shots
+from khala_simulator.world.shots cimport PendingHit
 
 cdef double NOT_STARTED
 cdef int64_t NOBODY
@@ -13,12 +13,14 @@ cdef int64_t NOBODY
 @cython.locals(n=Py_ssize_t, slot=Py_ssize_t, lost=bint)
 cpdef fire(object world)
 cdef void _count_down(Columns c, int64_t slot) noexcept
+cdef bint _is_under_way(Columns c, int64_t slot) noexcept
 cdef bint _takes_effect(Columns c, int64_t slot) noexcept
-@cython.locals(i=Py_ssize_t, slot=int64_t, row=int64_t, turrets=bint, delay=double, low=double, high=double)
-cdef _start_attacks(object world, Columns c, boolean* in_windup)
+@cython.locals(i=Py_ssize_t, slot=int64_t, row=int64_t, weapons=int64_t, turrets=bint, delay=double)
+cdef _start_attacks(object world, Columns c)
 cdef bint _is_aimed(Columns c, int64_t slot) noexcept
 cdef int64_t _choose_weapon(Columns c, int64_t slot) noexcept
-@cython.locals(slot=int64_t, is_beam=bint)
+@cython.locals(slot=int64_t, is_beam=bint, backswing=double, slots=list)
 cdef _take_effect(object world, list attackers)
-@cython.locals(slot=int64_t, target=int64_t, at=int64_t, delay=double, moment=double, is_kamikaze=bint)
-cdef _lay(object world, object weapon, Py_ssize_t index, list attacks)
+@cython.locals(row=int64_t, slot=int64_t, target=int64_t, at=int64_t, delay=double, is_kamikaze=bint, pending=list,
+               loop=int64_t)
+cdef _lay(object world, object weapon, Py_ssize_t index, list attackers)

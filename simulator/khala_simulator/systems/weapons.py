@@ -16,15 +16,14 @@ from khala_simulator.combat.launchers import LAUNCHERS
 from khala_simulator.movement import turning
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.stats import GROUND_PLANE
-from khala_simulator.world.census import census
+from khala_simulator.world import census, shots
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import PendingHit, Shot
+from khala_simulator.world.shots import PendingHit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_simulator.native.columns import Columns
-    from khala_simulator.native.memory import Cells
     from khala_simulator.tables.records import Hit, Weapon
     from khala_simulator.world.columns import Bools, Ints
     from khala_simulator.world.world import World
@@ -37,21 +36,21 @@ def fire(world: World) -> None:
     """Start attacks, carry out those whose damage point has come, and count down."""
     c = columns.columns_of(world)
     n = world.top
-    started = memory.new_bools(n)
-    in_windup = memory.bools(started)
     lost = False
     for slot in range(n):
-        in_windup[slot] = c.windup[slot] >= 0.0
         _count_down(c, slot)
-        if in_windup[slot] and not c.in_reach[slot]:  # the target got away before the damage point
+        if _is_under_way(c, slot) and not c.in_reach[slot]:  # the target got away before the damage point
             c.windup[slot] = NOT_STARTED
             c.cooldown[slot] = 0.0
             lost = True
     if lost:
         world.scan_now = True
     if len(world.fighters):
-        _start_attacks(world, c, in_windup)
-        attackers = [slot for slot in range(n) if _takes_effect(c, slot)]
+        _start_attacks(world, c)
+        attackers = []
+        for slot in range(n):
+            if _takes_effect(c, slot):
+                attackers.append(slot)
         if attackers:
             _take_effect(world, attackers)
             c = columns.columns_of(world)
@@ -69,34 +68,41 @@ def _count_down(c: Columns, slot: int) -> None:
         c.windup[slot] -= 1.0
 
 
+def _is_under_way(c: Columns, slot: int) -> bool:
+    """Return whether an attack has started whose damage point has not been carried out."""
+    return c.windup[slot] > NOT_STARTED
+
+
 def _takes_effect(c: Columns, slot: int) -> bool:
     """Return whether the damage point of an attack has come."""
     return c.windup[slot] <= 0.0 and c.windup[slot] > NOT_STARTED
 
 
-def _start_attacks(world: World, c: Columns, in_windup: Cells) -> None:
+def _start_attacks(world: World, c: Columns) -> None:
     """Turn turrets, and begin the attacks of units that are ready and aim at what they reach."""
     fighters = world.fighters
     slots = memory.ints(fighters)
-    turrets = census(world).turrets
-    weapons = world.catalog.weapons
-    period = memory.floats(world.stats.period)
+    turrets = census.census(world).turrets
+    stats = world.stats
+    beam = memory.bools(stats.beam)
+    period = memory.floats(stats.period)
+    damage_point = memory.floats(stats.damage_point)
+    jitter = memory.points(stats.jitter)
+    weapons = stats.weapons
     for i in range(len(fighters)):
         slot = slots[i]
         if turrets and c.turreted[slot]:
             c.turret[slot] = turning.turned(c.turret[slot], c.toward[slot], c.turret_cos[slot], c.turret_sin[slot])
-        if not c.in_reach[slot] or c.cooldown[slot] > 0.0 or in_windup[slot] or not _is_aimed(c, slot):
+        if not c.in_reach[slot] or c.cooldown[slot] > 0.0 or _is_under_way(c, slot) or not _is_aimed(c, slot):
             continue
         row = _choose_weapon(c, slot)
         if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
-            row += len(weapons)
-        weapon = weapons[row]
+            row += weapons
         delay = 0.0
-        if not weapon.is_beam:
-            low, high = weapon.jitter_loops
-            delay = low + (high - low) * world.rng.random()
-        c.cooldown[slot] += period[c.owner[slot] * len(weapons) + row] / c.attack_rate[slot] + delay
-        c.windup[slot] = weapon.damage_point_loops / c.attack_rate[slot]
+        if not beam[row]:
+            delay = jitter[row].x + (jitter[row].y - jitter[row].x) * float(world.rng.random())
+        c.cooldown[slot] += period[c.owner[slot] * weapons + row] / c.attack_rate[slot] + delay
+        c.windup[slot] = damage_point[row] / c.attack_rate[slot]
 
 
 def _is_aimed(c: Columns, slot: int) -> bool:
@@ -118,45 +124,50 @@ def _choose_weapon(c: Columns, slot: int) -> int:
 def _take_effect(world: World, attackers: list[int]) -> None:
     """Put the hits of finished attacks into ``pending``, weapon by weapon in the order of their first user."""
     c = columns.columns_of(world)
-    users: dict[int, list[tuple[int, float]]] = {}
+    users: dict[int, list[int]] = {}
     for slot in attackers:
-        users.setdefault(c.weapon[slot], []).append((slot, world.loop + c.windup[slot]))
-    for row, attacks in users.items():
+        row = c.weapon[slot]
+        if row in users:
+            users[row].append(slot)
+        else:
+            users[row] = [slot]
+    for row, slots in users.items():
         weapon = world.catalog.weapons[row]
-        is_beam = weapon.is_beam
+        is_beam = bool(world.stats.beam[row])
+        backswing = float(weapon.backswing_loops)
         for index in range(len(weapon.hits)):
-            _lay(world, weapon, index, attacks)
-        for slot, _ in attacks:
-            c.backswing[slot] = weapon.backswing_loops
+            _lay(world, weapon, index, slots)
+        for slot in slots:
+            c.backswing[slot] = backswing
             c.beaming[slot] = is_beam
         launcher = LAUNCHERS.get(weapon.id)
         if launcher is not None:
-            for slot, _ in attacks:
+            for slot in slots:
                 launcher(world, slot, columns.columns_of(world).target[slot])
             c = columns.columns_of(world)
     for slot in attackers:
         c.windup[slot] = NOT_STARTED
 
 
-def _lay(world: World, weapon: Weapon, index: int, attacks: list[tuple[int, float]]) -> None:
-    """Put one hit of the attacks, each with its attacker and its damage point, into ``pending``."""
+def _lay(world: World, weapon: Weapon, index: int, attackers: list[int]) -> None:
+    """Put one hit of the attacks of some units with one weapon into ``pending``."""
     hit = weapon.hits[index]
     if hit.bounce:  # these follow from the hit before
         return
     if hit.when:
-        sources = np.array([slot for slot, _ in attacks])
-        taken = branch(world, hit, weapon, sources, world.target[sources])
-        attacks = [attack for attack, is_taken in zip(attacks, taken.tolist(), strict=True) if is_taken]
+        sources = np.array(attackers)
+        attackers = sources[branch(world, hit, weapon, sources, world.target[sources])].tolist()
     c = columns.columns_of(world)
+    row = weapon.row
     delay = 0.0 if hit.sweep is not None else hit.delay_loops
-    is_kamikaze = weapon.is_kamikaze
-    for slot, moment in attacks:
+    is_kamikaze = bool(world.stats.kamikaze[row])
+    pending = world.pending
+    loop = world.loop
+    for slot in attackers:
         target = c.target[slot]
         at = slot if is_kamikaze or target == NOBODY else target  # a suicide attacker is the middle of it
-        start = (c.pos[slot].x, c.pos[slot].y)
-        goal = (c.pos[at].x, c.pos[at].y)
-        shot = Shot(slot, c.owner[slot], target, NOBODY, weapon.row, index, start, goal)
-        world.pending.append(PendingHit(shot, moment + delay))
+        shot = shots.shot_of(slot, c.owner[slot], target, row, index, c.pos[slot], c.pos[at])
+        pending.append(PendingHit(shot, (loop + c.windup[slot]) + delay))
 
 
 # branches of the game's own switches ----------------------------------------------------------------------------------

@@ -38,6 +38,7 @@ LAYERS: Final = (
 GROUND_PLANE: Final = 1
 AIR_PLANE: Final = 2
 INSTANT_ACCELERATION_N: Final = 1000.0
+WIDEST_AIM_DEG: Final = 180.0
 
 
 MORPH_TIME: Final = (
@@ -89,7 +90,9 @@ class Stats:
 
     def __init__(self, catalog: Catalog, players: int) -> None:
         self.catalog = catalog
-        shape_u, shape_w = (players, len(catalog.units)), (players, len(catalog.weapons))
+        self.weapons = len(catalog.weapons)
+        shape_u = (players, len(catalog.units))
+        shape_w = (players, self.weapons)
         self.life_max: Floats = np.zeros(shape_u)
         self.shields_max: Floats = np.zeros(shape_u)
         self.energy_max: Floats = np.zeros(shape_u)
@@ -112,6 +115,24 @@ class Stats:
         self.plane_bits: NDArray[np.int64] = np.array([_plane_bits(u) for u in catalog.units])
         self.beam: NDArray[np.bool_] = np.array([w.is_beam for w in catalog.weapons])
         self.kamikaze: NDArray[np.bool_] = np.array([w.is_kamikaze for w in catalog.weapons])
+        self.damage_point: Floats = np.array([w.damage_point_loops for w in catalog.weapons], dtype=np.float64)
+        self.least_range: Floats = np.array([w.min_range for w in catalog.weapons], dtype=np.float64)
+        self.slop: Floats = np.array([w.slop for w in catalog.weapons], dtype=np.float64)
+        self.rolling: NDArray[np.bool_] = np.array([w.moves == "moving" for w in catalog.weapons])
+        self.turreted: NDArray[np.bool_] = np.array([w.turret_deg_n is not None for w in catalog.weapons])
+        self.aim_cos: Floats = np.array([_aim_cosine(w) for w in catalog.weapons], dtype=np.float64)
+        self.excluding: NDArray[np.int64] = np.array(
+            [bit_set(_named(w.excluding), ATTRIBUTES) for w in catalog.weapons]
+        )
+        self.has_turret: NDArray[np.bool_] = np.array(
+            [any(self.turreted[w.row] for w in u.weapons) for u in catalog.units]
+        )
+        self.has_beam: NDArray[np.bool_] = np.array([any(self.beam[w.row] for w in u.weapons) for u in catalog.units])
+        self.has_rolling_gun: NDArray[np.bool_] = np.array(
+            [any(self.rolling[w.row] for w in u.weapons) for u in catalog.units]
+        )
+        self.unturnable: NDArray[np.bool_] = np.array([u.unturnable for u in catalog.units])
+        self.jitter: Floats = np.array([w.jitter_loops for w in catalog.weapons], dtype=np.float64)  # (weapons, 2)
         self._changes: list[_Changes] = [_Changes(catalog, ()) for _ in range(players)]
         self._abilities: list[dict[int, Ability]] = [{} for _ in range(players)]
         for player in range(players):
@@ -245,6 +266,15 @@ def _damage(hit: Hit, changes: _Changes) -> Damage:
         for name, amount in sorted(bonus.items())
     )
     return Damage(hit, changes.value("effect", hit.effect, "Amount", hit.damage), upgraded)
+
+
+def _aim_cosine(weapon: Weapon) -> float:
+    """Return the cosine of how far off its target a weapon may point when it fires."""
+    return math.cos(math.radians(min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)))
+
+
+def _named(name: str) -> tuple[str, ...]:
+    return (name,) if name else ()
 
 
 def _plane_bits(unit: UnitType) -> int:

@@ -24,8 +24,7 @@ class WorldCaches:
         self.population = 0  # counts births and deaths, for what is worth remembering between them
         self.looked_at = -1  # the population for which ``visible`` was written
         self.resting_version = -1  # the population among which no body touched another when all last stood still
-        self.changes = 0  # counts those and changes of traits
-        self.bodies: object | None = None  # after these changes, for ``contacts``
+        self.bodies: object | None = None  # room for what is measured between them, for ``contacts``
         self.census: object | None = None  # of this population, for ``census``
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``requirements``
         self.tallied = -1  # the loop in which that was counted

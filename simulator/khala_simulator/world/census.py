@@ -5,63 +5,63 @@ Taken again when a unit comes, dies or changes; nothing here decides anything.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from khala_simulator.numeric.arrays import some
+from khala_simulator.native import columns, memory
 
 if TYPE_CHECKING:
-    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.world import World
 
 
-@dataclass(frozen=True, slots=True)
 class Census:
-    """Whether any living unit has what each field says."""
+    """Whether any living unit has what an attribute says.
 
-    turrets: bool
-    beams: bool
-    rolling_guns: bool  # weapons that fire while the body goes where it wants
-    guns_walking: bool  # and at what the unit passes
-    drifting_flyers: bool  # flyers that need time to stop
-    brakers: bool  # units that do
-    low_priority_bodies: bool  # units of less push priority than the ordinary
-    weapons_with_filters: bool  # units that can't aim at what is near, or do not aim at structures
+    Attributes:
+        turrets: A turret.
+        beams: A weapon that goes on by itself.
+        rolling_guns: A weapon that fires while the body goes where it wants.
+        guns_walking: One that fires at what the unit passes, too.
+        drifting_flyers: Wings, and needs time to stop.
+        brakers: Needs time to stop.
+        weapons_with_filters: Can't aim at what is near, or does not aim at structures.
+    """
 
-    @classmethod
-    def of(cls, world: World) -> Census:
-        """Look at all living units."""
-        slots = world.live
-        turrets, beams, rolling_guns = _arms(world.catalog, frozenset(world.type.take(slots).tolist()))
-        return cls(
-            turrets=turrets,
-            beams=beams,
-            rolling_guns=rolling_guns,
-            guns_walking=some(world.guns_walking.take(slots)),
-            drifting_flyers=some(world.glides.take(slots)),
-            brakers=some(np.isfinite(world.step_loss.take(slots))),
-            low_priority_bodies=some(world.lightness.take(slots) != 1.0),
-            weapons_with_filters=some(world.spares_structures.take(slots) | (world.least_range.take(slots) > 0.0)),
-        )
+    def __init__(self, world: World) -> None:
+        c = columns.columns_of(world)
+        stats = world.stats
+        turrets = memory.bools(stats.has_turret)
+        beams = memory.bools(stats.has_beam)
+        rolling = memory.bools(stats.has_rolling_gun)
+        self.turrets = False
+        self.beams = False
+        self.rolling_guns = False
+        self.guns_walking = False
+        self.drifting_flyers = False
+        self.brakers = False
+        self.weapons_with_filters = False
+        live = world.live
+        slots = memory.ints(live)
+        for i in range(len(live)):
+            slot = slots[i]
+            self.turrets = self.turrets or turrets[c.type[slot]]
+            self.beams = self.beams or beams[c.type[slot]]
+            self.rolling_guns = self.rolling_guns or rolling[c.type[slot]]
+            self.guns_walking = self.guns_walking or c.guns_walking[slot]
+            self.drifting_flyers = self.drifting_flyers or c.glides[slot]
+            self.brakers = self.brakers or math.isfinite(c.step_loss[slot])
+            self.weapons_with_filters = (
+                self.weapons_with_filters or c.spares_structures[slot] or c.least_range[slot] > 0.0
+            )
 
-
-@lru_cache(maxsize=256)
-def _arms(catalog: Catalog, rows: frozenset[int]) -> tuple[bool, bool, bool]:
-    """Return whether the types in these rows have turrets, beams, and weapons that fire while they move."""
-    weapons = [weapon for row in rows for weapon in catalog.units[row].weapons]
-    return (
-        any(w.turret_deg_n is not None for w in weapons),
-        any(w.is_beam for w in weapons),
-        any(w.moves == "moving" for w in weapons),
-    )
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world takes its own."""
+        return type(None), ()
 
 
 def census(world: World) -> Census:
     """Return the census of a world, taken now if something has changed."""
-    known = world.census
-    if not isinstance(known, Census):
-        known = world.census = Census.of(world)
+    if world.census is None:
+        world.census = Census(world)
+    known: Census = world.census  # type: ignore[assignment]  # a world does not know its census
     return known

@@ -9,6 +9,8 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Any, Final
 
+from khala_simulator.native import memory
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -73,8 +75,18 @@ class Shot:
 
     def at(self, target: int) -> Shot:
         """Return the shot at another target."""
-        source, owner, _, *others = self.fields()
-        return Shot(source, owner, target, *others)
+        shot = Shot.__new__(Shot)
+        shot.source = self.source
+        shot.owner = self.owner
+        shot.target = target
+        shot.prior = self.prior
+        shot.weapon = self.weapon
+        shot.hit = self.hit
+        shot.start_x = self.start_x
+        shot.start_y = self.start_y
+        shot.goal_x = self.goal_x
+        shot.goal_y = self.goal_y
+        return shot
 
     def forget(self, slot: int) -> None:
         """Drop references to the unit in ``slot``, which is gone."""
@@ -84,6 +96,24 @@ class Shot:
             self.target = NOBODY
         if self.prior == slot:
             self.prior = NOBODY
+
+
+def shot_of(
+    source: int, owner: int, target: int, weapon: int, hit: int, start: memory.Point, goal: memory.Point
+) -> Shot:
+    """Return a shot that did not bounce."""
+    shot = Shot.__new__(Shot)
+    shot.source = source
+    shot.owner = owner
+    shot.target = target
+    shot.prior = NOBODY
+    shot.weapon = weapon
+    shot.hit = hit
+    shot.start_x = start.x
+    shot.start_y = start.y
+    shot.goal_x = goal.x
+    shot.goal_y = goal.y
+    return shot
 
 
 class Missile:

@@ -362,7 +362,6 @@ class World(UnitColumns, WorldCaches):
         """Note that a unit came, went or changed its type."""
         self.live = which(self.alive & (self.carrier == NOBODY))
         self.population += 1
-        self.changes += 1
         self.census = self.tally = None
         self.scan_now = self.orders_changed = True
         shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
@@ -379,7 +378,6 @@ class World(UnitColumns, WorldCaches):
             energy or bool(self.energy_regen[slot]),
         )
         self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
-        self.changes += 1
         self.census = self.tally = None
         self.looked_at = -1
         self.scan_now = True
