@@ -60,6 +60,8 @@ cdef class Flow:
     cdef int64_t cell(self, Point at) noexcept
     @cython.locals(walker=Walker, missing=int64_t, cell=int64_t, old=int64_t, older=int64_t, stop=int64_t, step=int64_t, i=int64_t)
     cdef bint spread(self, list walkers) except -1
+    @cython.locals(walker=Walker, i=int64_t)
+    cdef forget_count(self, list walkers)
     @cython.locals(changed=int64_t, middle=int64_t, x=int64_t, y=int64_t, cell=int64_t)
     cdef int64_t await_around(self, Walker walker, bint awaited) noexcept
     cdef int64_t arrive(self, int64_t cell, int64_t step) noexcept

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.movement.grids import Grid
-    from khala_simulator.native.memory import Cells
 
 FINE: Final = 4  # cells of the grid in a cell of the ground, on each axis
 MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
@@ -185,12 +184,7 @@ class Flow:
 
         Returns whether there is such a place.
         """
-        for i in range(self.end):  # what an earlier count has left
-            if self.left[self.reached[i]] != TAKEN:
-                self.left[self.reached[i]] = NOWHERE
-        self.end = 0
-        for walker in walkers:
-            self.await_around(walker, False)
+        self.forget_count(walkers)
         missing = 0
         for walker in walkers:
             if not walker.settled:
@@ -218,6 +212,15 @@ class Flow:
             older = old
             old = stop
         return self.end > 0
+
+    def forget_count(self, walkers: list[Walker]) -> None:
+        """Undo what an earlier count has written."""
+        for i in range(self.end):
+            if self.left[self.reached[i]] != TAKEN:
+                self.left[self.reached[i]] = NOWHERE
+        self.end = 0
+        for walker in walkers:
+            self.await_around(walker, False)
 
     def await_around(self, walker: Walker, awaited: bool) -> int:
         """Await the free cells around a walker, or no longer; return how many that changes."""

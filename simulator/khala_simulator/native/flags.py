@@ -8,7 +8,7 @@ from typing import Final
 COMPILER: Final[tuple[str, ...]] = (
     ("/O2", "/fp:precise")
     if sys.platform == "win32"
-    else ("-O2", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined", "-w")
+    else ("-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined", "-w")
 )
 """Products and sums are rounded one by one, as in the interpreter, and square roots set no errno."""
 DECISIVE: Final = COMPILER[:2] if sys.platform == "win32" else (COMPILER[0], COMPILER[2])

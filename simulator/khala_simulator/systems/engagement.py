@@ -14,8 +14,8 @@ from khala_simulator.economy import touching
 from khala_simulator.economy.harvesting import Phase
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
-from khala_simulator.world.casts import Cast
 from khala_simulator.world import census
+from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 

@@ -50,7 +50,7 @@ def fire(world: World) -> None:
         attackers = []
         for slot in range(n):
             if _takes_effect(c, slot):
-                attackers.append(slot)
+                attackers.append(slot)  # noqa: PERF401  # a comprehension would not know the types of C
         if attackers:
             _take_effect(world, attackers)
             c = columns.columns_of(world)

@@ -121,16 +121,10 @@ class Stats:
         self.rolling: NDArray[np.bool_] = np.array([w.moves == "moving" for w in catalog.weapons])
         self.turreted: NDArray[np.bool_] = np.array([w.turret_deg_n is not None for w in catalog.weapons])
         self.aim_cos: Floats = np.array([_aim_cosine(w) for w in catalog.weapons], dtype=np.float64)
-        self.excluding: NDArray[np.int64] = np.array(
-            [bit_set(_named(w.excluding), ATTRIBUTES) for w in catalog.weapons]
-        )
-        self.has_turret: NDArray[np.bool_] = np.array(
-            [any(self.turreted[w.row] for w in u.weapons) for u in catalog.units]
-        )
-        self.has_beam: NDArray[np.bool_] = np.array([any(self.beam[w.row] for w in u.weapons) for u in catalog.units])
-        self.has_rolling_gun: NDArray[np.bool_] = np.array(
-            [any(self.rolling[w.row] for w in u.weapons) for u in catalog.units]
-        )
+        self.excluding: NDArray[np.int64] = np.array([_excluded_bits(w) for w in catalog.weapons])
+        self.has_turret: NDArray[np.bool_] = _have(catalog, self.turreted)
+        self.has_beam: NDArray[np.bool_] = _have(catalog, self.beam)
+        self.has_rolling_gun: NDArray[np.bool_] = _have(catalog, self.rolling)
         self.unturnable: NDArray[np.bool_] = np.array([u.unturnable for u in catalog.units])
         self.jitter: Floats = np.array([w.jitter_loops for w in catalog.weapons], dtype=np.float64)  # (weapons, 2)
         self._changes: list[_Changes] = [_Changes(catalog, ()) for _ in range(players)]
@@ -273,8 +267,14 @@ def _aim_cosine(weapon: Weapon) -> float:
     return math.cos(math.radians(min(weapon.arc_deg / 2.0 + weapon.arc_slop_deg, WIDEST_AIM_DEG)))
 
 
-def _named(name: str) -> tuple[str, ...]:
-    return (name,) if name else ()
+def _excluded_bits(weapon: Weapon) -> int:
+    """Return the attribute that a weapon can't be aimed at, as a bit."""
+    return bit_set([weapon.excluding] if weapon.excluding else [], ATTRIBUTES)
+
+
+def _have(catalog: Catalog, are: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which types of units have a weapon of a kind, of which it is said which weapons ``are``."""
+    return np.array([any(are[weapon.row] for weapon in unit.weapons) for unit in catalog.units])
 
 
 def _plane_bits(unit: UnitType) -> int:

@@ -9,10 +9,10 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Any, Final
 
-from khala_simulator.native import memory
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from khala_simulator.native import memory
 
 NOBODY: Final = -1
 _SHOT: Final = "<6q4d"
