@@ -32,11 +32,10 @@ OUT = DOCS / "images" / "seen"
 PAGE = DOCS / "design" / "four-observations.md"
 PREFACE = """# Four observations, with their pictures
 
-What one agent of each kind is sent at one moment of a game, word for word, with the pictures that the paper gives to
-the kind. `python -m docs.seen` makes this page from two games on the simulator, which the scripted player `skilled`
-plays from these texts alone. [What an agent sees](observation.md) explains how texts are composed,
-[images](../how-to/images.md) how pictures are switched on and what they show. Sizes are of the bytes that go over the
-bus; tokens are estimates, for Anthropic's and for OpenAI's models.
+This page shows the observation of one agent of each kind, word for word, with the pictures that the paper gives to the
+kind. `python -m docs.seen` makes it from two games on the simulator, which the scripted player `skilled` plays from
+these texts alone. [What an agent sees](observation.md) explains the texts, and [images](../how-to/images.md) the
+pictures. Sizes are those of the bytes on the bus. Token counts are estimates for Anthropic's and OpenAI's models.
 """
 
 
@@ -63,19 +62,19 @@ SCENES = {
         "simple64_eceb",
         "Commander",
         "Commander",
-        "A full game after four minutes. It orders the army as a whole.",
+        "A full game after four minutes. The Commander gives orders to the army as a whole.",
     ),
     "developer": Scene(
         "simple64_eceb",
         "Developer",
         "Developer",
-        "The same moment. It trains, researches and builds, and the host finds producers and places.",
+        "The same moment. The Developer trains, researches and builds; the host chooses producers and places.",
     ),
     "builder": Scene(
         "simple64_eceb",
         "Builder",
         "Builder",
-        "The same moment, seen by the Builder of `simple64_ecsb`: one Probe that places structures by hand.",
+        "The same moment, seen by the Builder of `simple64_ecsb`, whose single Probe places structures at chosen points.",
     ),
 }
 """By kind of agent."""
