@@ -74,7 +74,7 @@ SCENES = {
         "simple64_eceb",
         "Builder",
         "Builder",
-        "The same moment, seen by the Builder of `simple64_ecsb`, whose single Probe places structures at chosen points.",
+        "The same moment. The Builder of `simple64_ecsb` has one Probe that places structures at chosen points.",
     ),
 }
 """By kind of agent."""
