@@ -129,7 +129,7 @@ def _grown(world: World, seat: Seat, at_s: int, had: list[float]) -> Growth:
         workers=sum(unit.worker for unit in units),
         bases=sum("DropOff" in unit.placement for unit in units),
         army_supply=sum(unit.supply for unit in units if unit.army),
-        supply=supply.used(world, 1),
+        supply=supply.in_use(world, 1),
         upgrades=len(owner.upgrades),
         minerals=2.0 * (collected[0] - had[0]),
         vespene=2.0 * (collected[1] - had[1]),

@@ -143,7 +143,7 @@ def _engine() -> Iterator[Finding]:
     except (ImportError, ValueError) as error:
         yield Finding("engine", "wrong", str(error), f"unset {engine.VARIABLE}, or say make install")
         return
-    if engine.engine() == "compiled" or engine.wanted() == "python":
+    if engine.engine() == "compiled" or engine.request() == "python":
         yield Finding("engine", "ok", engine.describe())
         return
     advice = "the interpreter plays the rules, a hundred times slower: `make install` with a network compiles them"

@@ -41,7 +41,7 @@ ENEMY: Final = 2
 _SLOT = 0x3FFF
 
 
-class Ground(NamedTuple):
+class BattleGround(NamedTuple):
     """The map, as the game's information on it has it."""
 
     size: tuple[int, int]
@@ -152,11 +152,11 @@ class Battle:
         """Return the SHA-256 of everything that decides the future."""
         return self._world.digest()
 
-    def ground(self) -> Ground:
+    def ground(self) -> BattleGround:
         """Return the map as it is now."""
         terrain = self._world.map.terrain
         structures = known_structures(PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions()))
-        return Ground(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
+        return BattleGround(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
 
     # acting -------------------------------------------------------------------------------------------------------
 
@@ -196,7 +196,8 @@ class Battle:
 
     def look(self, tags: Ints) -> tuple[Bools, Units]:
         """Return which of these units are in the world, and all of them; of the others, the numbers mean nothing."""
-        world, slots = self._world, tags >> INDEX_SHIFT & _SLOT
+        world = self._world
+        slots = tags >> INDEX_SHIFT & _SLOT
         there: Bools = (world.tag[slots] == tags) & (world.carrier[slots] == NOBODY)
         owner, row = world.owner[slots], world.type[slots]
         types, stats = self._game.types, world.stats

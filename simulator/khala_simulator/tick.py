@@ -95,7 +95,7 @@ def new_game(
     """Return a world at loop 0 in which the map's script has run its start.
 
     Args:
-        game_map: Terrain and scenario.
+        game_map: MapTerrain and scenario.
         players: The players in the slots; by default as the scenario says.
         seed: The seed of every random draw of the game.
         catalog: The tables of a game version; 4.10 by default.

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from khala_simulator.process.parent_watch import PATIENCE_LOOKS, orphaned
+from khala_simulator.process.parent_watch import PATIENCE_LOOKS, wait_until_orphaned
 
 ALONE = PATIENCE_LOOKS
 
@@ -27,7 +27,7 @@ async def looks_until_over(parents: Iterable[int], clients: Iterable[bool]) -> i
 
     has_client: Callable[[], bool] = lambda: next(connected)  # noqa: E731
     try:
-        await orphaned(has_client, parent=parent, look_s=0)
+        await wait_until_orphaned(has_client, parent=parent, look_s=0)
     except asyncio.CancelledError:
         assert forever.done()
         return None

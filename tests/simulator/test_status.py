@@ -88,14 +88,14 @@ def test_the_sentence_that_clients_take_for_the_end_of_a_game_is_exact() -> None
 )  # fmt: skip
 def test_a_request_that_succeeds_moves_on(kind: str, status: Status) -> None:
     machine = Machine()
-    machine.succeeded(kind)
+    machine.move_on(kind)
     assert machine.status is status
 
 
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - set(AFTER)))
 def test_other_requests_stay(kind: str) -> None:
     machine = in_state(Status.in_game)
-    machine.succeeded(kind)
+    machine.move_on(kind)
     assert machine.status is Status.in_game
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from khala.env.numeric.forces import Force, OwnForce
     from khala.env.numeric.maps import SmacMap
     from khala.env.numeric.options import Options
-    from khala_simulator.battle import Ground
+    from khala_simulator.battle import BattleGround
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Board(NamedTuple):
     """0 to 1; 1 off the map."""
 
     @classmethod
-    def of(cls, ground: Ground, move_amount: float) -> Self:
+    def of(cls, ground: BattleGround, move_amount: float) -> Self:
         """Return the board of a map.
 
         SMAC reads heights from the north where the game writes them from the south; its observations are so.

@@ -276,7 +276,9 @@ def smart(
     world: World, slots: Iterable[int], *, point: Point | None = None, target: int = NO_TAG, queue: bool = False
 ) -> list[int]:
     """Right-click: do what the skills make of it, else what ``commands`` does; return the slots that took it."""
-    rest, taken, victim = list(slots), list[int](), world.slot_of(target)
+    rest = list(slots)
+    taken = list[int]()
+    victim = world.slot_of(target)
     for rule in SMARTS:
         some = rule(world, rest, victim, point, queue)
         taken += some

@@ -317,7 +317,8 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     and again interrupts nothing.
     """
     order = order or Order(OrderKind.IDLE, 0)
-    target, opponent = world.slot_of(order.target), int(world.target[slot])
+    target = world.slot_of(order.target)
+    opponent = int(world.target[slot])
     fights_on = order.kind in SEEKS_FIGHTS and int(world.order_kind[slot]) in LOOKS_AROUND
     if world.harvest[slot]:
         _end_harvest(world, slot)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def _joined(*tables: dict[str, Callable[[World, T], None]]) -> dict[str, Callable[[World, T], None]]:
+def _join(*tables: dict[str, Callable[[World, T], None]]) -> dict[str, Callable[[World, T], None]]:
     """Return the joined rules of several tables; a type in more than one of them runs all its rules in turn."""
     rules: dict[str, list[Callable[[World, T], None]]] = {}
     for table in tables:
@@ -104,7 +104,7 @@ ENDS: Final[dict[str, BuffRule]] = {
     **zerg_tables.ENDS,
 }
 FINALS: Final[dict[str, BuffRule]] = {**zerg_tables.FINALS}
-PASSIVES: Final[dict[str, UnitRule]] = _joined(
+PASSIVES: Final[dict[str, UnitRule]] = _join(
     sentry.PASSIVES,
     gateway.PASSIVES,
     robotics.PASSIVES,
@@ -123,6 +123,6 @@ SMARTS: Final[tuple[SmartRule, ...]] = (
     *production.SMARTS,
     *terran_tables.SMARTS,
 )
-DEATHS: Final[dict[str, Callable[[World, int], None]]] = _joined(
+DEATHS: Final[dict[str, Callable[[World, int], None]]] = _join(
     harvest.DEATHS, transports.DEATHS, carrier.DEATHS, zerg_tables.DEATHS, terran_tables.DEATHS
 )

@@ -19,7 +19,7 @@ from s2clientprotocol import error_pb2
 
 from khala_simulator.abilities import casting, commands
 from khala_simulator.economy import requirements
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.world import NO_TAG, NOBODY
@@ -46,11 +46,11 @@ class UnitCommand:
     clicked: Point | None = None  # where on the screen the target was clicked, world units
 
     @property
-    def aim(self) -> Aim:
+    def aim(self) -> AbilityAim:
         """The kind of its target."""
         if self.target != NO_TAG:
-            return Aim.UNIT
-        return Aim.NONE if self.point is None else Aim.POINT
+            return AbilityAim.UNIT
+        return AbilityAim.NONE if self.point is None else AbilityAim.POINT
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -158,22 +158,22 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
     all_obey = "control_enemy" in world.players[player].cheats
     own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
     if not own:
-        return _refused(command, ActionResult.YOU_CANT_CONTROL_THAT_UNIT if slots else ActionResult.ERROR)
+        return _refuse(command, ActionResult.YOU_CANT_CONTROL_THAT_UNIT if slots else ActionResult.ERROR)
     aimed = _without_snapshot(world, player, command)
     if aimed.point is not None and not all(map(math.isfinite, aimed.point)):
-        return _refused(command, ActionResult.MUST_TARGET_VISIBLE_LOCATION)
+        return _refuse(command, ActionResult.MUST_TARGET_VISIBLE_LOCATION)
     aimed = _on_the_map(world, aimed)
     groups = _groups(world, own, command.ability)
     if not groups:
-        return _refused(command, ActionResult.NOT_SUPPORTED)
+        return _refuse(command, ActionResult.NOT_SUPPORTED)
     parts: list[tuple[Ability, tuple[Cast, ...]]] = []
     why = ActionResult.ERROR
-    target = world.slot_of(aimed.target) if aimed.aim is Aim.UNIT else NOBODY
+    target = world.slot_of(aimed.target) if aimed.aim is AbilityAim.UNIT else NOBODY
     for ability, some in groups:
         result = _aim_result(world, player, ability, aimed, target)
         casts: list[Cast] = []
         if result is ActionResult.SUCCESS:
-            results = [_judged(world, slot, ability, aimed, target, known) for slot, known in some]
+            results = [_judge_cast(world, slot, ability, aimed, target, known) for slot, known in some]
             casts = [judged for judged in results if isinstance(judged, Cast)]
             result = results[0] if isinstance(results[0], ActionResult) else result
         if casts:
@@ -181,11 +181,11 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
         elif not parts:
             why = result
     if not parts:
-        return _refused(command, why)
-    return OrderPlan(command, error_pb2.Success, _name_of(parts), aimed.target, aimed.point, tuple(parts))
+        return _refuse(command, why)
+    return OrderPlan(command, error_pb2.Success, _reported_id(parts), aimed.target, aimed.point, tuple(parts))
 
 
-def _refused(command: UnitCommand, why: ActionResult) -> OrderPlan:
+def _refuse(command: UnitCommand, why: ActionResult) -> OrderPlan:
     return OrderPlan(command, result_of(why))
 
 
@@ -208,7 +208,7 @@ def _on_the_map(world: World, command: UnitCommand) -> UnitCommand:
     return command if point == command.point else dataclasses.replace(command, point=point)
 
 
-def _name_of(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
+def _reported_id(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
     """Return the id that reports a command of several kinds: a fight's before a walk's."""
     return max(parts, key=lambda part: (part[0].effect == "attack", -part[0].id))[0].id
 
@@ -231,18 +231,18 @@ def _groups(
 def _aim_result(world: World, player: int, ability: Ability, command: UnitCommand, target: int) -> ActionResult:
     """Return why an ability can't be aimed like this by any unit, or success; ``target`` is the slot of the target."""
     if not command.aim & ability.aim:
-        aimless = Aim.POINT not in ability.aim
-        return ActionResult.MUST_TARGET_UNIT if aimless and Aim.UNIT in ability.aim else (
+        aimless = AbilityAim.POINT not in ability.aim
+        return ActionResult.MUST_TARGET_UNIT if aimless and AbilityAim.UNIT in ability.aim else (
             ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
         )  # fmt: skip
-    if command.aim is Aim.UNIT:
+    if command.aim is AbilityAim.UNIT:
         remembered = target != NOBODY and command.target in world.memories[player].of_unit
         if target == NOBODY or not (remembered or world.visible[player, target]):
             return ActionResult.MUST_TARGET_VISIBLE_UNIT
     return ActionResult.SUCCESS
 
 
-def _judged(
+def _judge_cast(
     world: World, slot: int, ability: Ability, command: UnitCommand, target: int, known: ActionResult | None
 ) -> Cast | ActionResult:
     """Return what a unit is to do with its ability, or why it can't; ``known`` is the reason if already known."""

@@ -19,9 +19,9 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.abilities import casting
 from khala_simulator.api import abilities, clicks, pixels
 from khala_simulator.api.abilities import OrderPlan, UnitCommand
-from khala_simulator.api.giving import Outcome, carry_out
+from khala_simulator.api.giving import CommandOutcome, carry_out
 from khala_simulator.api.selection import at_point, panel_order
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -38,21 +38,21 @@ ON_MINIMAP = casting.ORDINARY | {"rally"}
 """Commands that a click on the minimap can give, to any unit; PySC2 has no such function for most others."""
 
 
-class Judgement(NamedTuple):
+class ActionJudgement(NamedTuple):
     """The result code for an action at present, and the plan of its first command, None without one."""
 
     result: Result
     plan: OrderPlan | None = None
 
 
-def judge(seat: PlayerSeat, action: sc.Action) -> Judgement:
+def judge(seat: PlayerSeat, action: sc.Action) -> ActionJudgement:
     """Judge how an action would go at present; an empty one succeeds."""
     plans = list[OrderPlan]()
     for plan in _plans(seat, action):
         plans.append(plan)
         if plan.result != error_pb2.Success:
-            return Judgement(plan.result, plans[0])
-    return Judgement(_beside_commands(seat, action), plans[0] if plans else None)
+            return ActionJudgement(plan.result, plans[0])
+    return ActionJudgement(_beside_commands(seat, action), plans[0] if plans else None)
 
 
 def _beside_commands(seat: PlayerSeat, action: sc.Action) -> Result:
@@ -115,15 +115,13 @@ def _finite(point: common_pb2.Point) -> bool:
 def _plans(seat: PlayerSeat, action: sc.Action, first: OrderPlan | None = None) -> Iterator[OrderPlan]:
     """Yield the plans of an action's commands, each judged when its turn comes; ``first`` is already known."""
     if action.action_raw.HasField("unit_command"):
-        yield first or _judged(seat, _from_tags(seat, action.action_raw.unit_command))
+        command = _from_tags(seat, action.action_raw.unit_command)
+        yield first or abilities.judge(seat.world, seat.player, command)
         first = None
     spatial, view = _spatial(seat, action)
     if spatial.HasField("unit_command"):
-        yield first or _judged(seat, _from_click(seat, spatial.unit_command, view))
-
-
-def _judged(seat: PlayerSeat, command: UnitCommand) -> OrderPlan:
-    return abilities.judge(seat.world, seat.player, command)
+        command = _from_click(seat, spatial.unit_command, view)
+        yield first or abilities.judge(seat.world, seat.player, command)
 
 
 def _from_tags(seat: PlayerSeat, message: raw_pb2.ActionRawUnitCommand) -> UnitCommand:
@@ -142,7 +140,9 @@ def _from_tags(seat: PlayerSeat, message: raw_pb2.ActionRawUnitCommand) -> UnitC
 
 def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand, view: ImagePair) -> UnitCommand:
     """Return the command that a click on the screen or the minimap gives to the selected units."""
-    target, point, clicked = 0, None, None
+    target = 0
+    point = None
+    clicked = None
     if message.HasField("target_screen_coord"):
         pixel = message.target_screen_coord
         point = clicked = view.screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
@@ -150,7 +150,8 @@ def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand,
             sight = seat.look()
             row = at_point(sight, seat.types, point, view.screen.scale / 2)
             if row is not None:
-                target, point = int(sight.tag[row]), None
+                target = int(sight.tag[row])
+                point = None
     elif message.HasField("target_minimap_coord"):
         pixel = message.target_minimap_coord
         point = view.minimap.to_world(float(pixel.x), float(pixel.y))
@@ -161,11 +162,12 @@ def _from_click(seat: PlayerSeat, message: spatial_pb2.ActionSpatialUnitCommand,
 def _takes_units(seat: PlayerSeat, requested: int) -> bool:
     """Return whether a click can mean a unit: the selected units' form of a general ability may take points only."""
     meant = (abilities.meant(seat.world, slot, requested) for slot in seat.selection.slots(seat.world))
-    return any(Aim.UNIT in ability.aim for ability in meant if ability is not None)
+    return any(AbilityAim.UNIT in ability.aim for ability in meant if ability is not None)
 
 
 def _give(seat: PlayerSeat, plan: OrderPlan, loop: int, *, by_tags: bool) -> None:
-    command, outcome = plan.asked, carry_out(seat.world, plan)
+    command = plan.asked
+    outcome = carry_out(seat.world, plan)
     if outcome.result != error_pb2.Success:
         tag = command.tags[0] if command.tags else 0
         seat.hands.errors.append(
@@ -178,7 +180,9 @@ def _give(seat: PlayerSeat, plan: OrderPlan, loop: int, *, by_tags: bool) -> Non
     _report_command(seat, command, outcome, tags, loop)
 
 
-def _report_command(seat: PlayerSeat, command: UnitCommand, outcome: Outcome, tags: list[int], loop: int) -> None:
+def _report_command(
+    seat: PlayerSeat, command: UnitCommand, outcome: CommandOutcome, tags: list[int], loop: int
+) -> None:
     action = seat.report(loop)
     if seat.options.raw:
         raw = action.action_raw.unit_command

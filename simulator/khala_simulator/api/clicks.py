@@ -22,7 +22,7 @@ from khala_simulator.world.columns import NOBODY
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_simulator.api.projection import Screen
+    from khala_simulator.api.projection import ScreenView
     from khala_simulator.api.seat import PlayerSeat
     from khala_simulator.world.world import World
 
@@ -32,7 +32,7 @@ Panel = ui_pb2.ActionMultiPanel
 IdleWorker = ui_pb2.ActionSelectIdleWorker
 
 
-def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: Screen) -> bool:
+def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: ScreenView) -> bool:
     """Select by a click or a rectangle on the screen that the player looks at."""
     if spatial.HasField("unit_selection_point"):
         return _select_point(seat, spatial.unit_selection_point, screen)
@@ -44,7 +44,8 @@ def select(seat: PlayerSeat, spatial: spatial_pb2.ActionSpatial, screen: Screen)
 def press(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
     """Apply a hotkey or a click on a panel; panels that are not there do nothing."""
     kind = ui.WhichOneof("action")
-    sight, types = seat.look(), seat.types
+    sight = seat.look()
+    types = seat.types
     match kind:
         case "control_group":
             done = _use_group(seat, ui.control_group)
@@ -83,7 +84,7 @@ def is_possible(seat: PlayerSeat, ui: ui_pb2.ActionUI) -> bool:
     if kind == "toggle_autocast":
         return bool(_autocasters(seat.world, seat.player, ui.toggle_autocast.ability_id, seat.selection.tags))
     if kind == "production_panel":
-        return 0 <= ui.production_panel.unit_index < _queued(seat)
+        return 0 <= ui.production_panel.unit_index < _queue_length(seat)
     return True
 
 
@@ -113,7 +114,7 @@ def _cargo(seat: PlayerSeat) -> list[int]:
     return [seat.world.tag_of(s) for s in seat.world.passengers(slots[0])] if len(slots) == 1 else []
 
 
-def _queued(seat: PlayerSeat) -> int:
+def _queue_length(seat: PlayerSeat) -> int:
     """Return the number of jobs in the selected structure's queue."""
     slots = seat.selection.slots(seat.world)
     own = len(slots) == 1 and seat.world.owner[slots[0]] == seat.player
@@ -148,9 +149,10 @@ def _is_own(seat: PlayerSeat, tag: int) -> bool:
     return slot >= 0 and bool(seat.world.owner[slot] == seat.player)
 
 
-def _select_point(seat: PlayerSeat, click: Point, screen: Screen) -> bool:
+def _select_point(seat: PlayerSeat, click: Point, screen: ScreenView) -> bool:
     pixel = click.selection_screen_coord
-    sight, types = seat.look(), seat.types
+    sight = seat.look()
+    types = seat.types
     world_point = screen.to_world(float(pixel.x), float(pixel.y), seat.camera)
     row = picking.at_point(sight, types, world_point, screen.scale / 2)
     if row is None:
@@ -168,8 +170,9 @@ def _select_point(seat: PlayerSeat, click: Point, screen: Screen) -> bool:
     return _choose(seat, [tag], add=click.type == Point.Toggle)
 
 
-def _select_rectangles(seat: PlayerSeat, drag: spatial_pb2.ActionSpatialUnitSelectionRect, screen: Screen) -> bool:
-    sight, types = seat.look(), seat.types
+def _select_rectangles(seat: PlayerSeat, drag: spatial_pb2.ActionSpatialUnitSelectionRect, screen: ScreenView) -> bool:
+    sight = seat.look()
+    types = seat.types
     rows = [np.zeros(0, np.intp)]
     for rectangle in drag.selection_screen_coord:
         corners = (
@@ -192,7 +195,8 @@ def _use_group(seat: PlayerSeat, message: Group) -> bool:
     index, action = message.control_group_index, message.action
     if index >= GROUPS:
         return False
-    groups, tags = seat.selection.groups, [tag for tag in seat.selection.tags if _is_own(seat, tag)]
+    groups = seat.selection.groups
+    tags = [tag for tag in seat.selection.tags if _is_own(seat, tag)]
     if action == Group.Recall:
         return _choose(seat, groups[index])
     if not tags:

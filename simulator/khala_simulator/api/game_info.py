@@ -37,7 +37,8 @@ class GameInfo:
     """The game info of one seat."""
 
     def __init__(self, game: HostedGame, seat: PlayerSeat) -> None:
-        self._world, self._seat = game.world, seat
+        self._world = game.world
+        self._seat = seat
         self._fixed = _message(game, seat).SerializeToString()
         self._map = _start_raw(seat).SerializeToString()
         self._known: tuple[Structure, ...] | None = None
@@ -49,7 +50,8 @@ class GameInfo:
         if known != self._known:
             start = raw_pb2.StartRaw()
             _write_image(start.pathing_grid, _crop(self._seat, paths(self._world, known)), 1)
-            self._known, self._paths = known, start.SerializeToString()
+            self._known = known
+            self._paths = start.SerializeToString()
         return [self._fixed, *wire.embed(_START_RAW, [self._map, self._paths])]
 
 
@@ -77,7 +79,8 @@ def _message(game: HostedGame, seat: PlayerSeat) -> sc.ResponseGameInfo:
 
 def _start_raw(seat: PlayerSeat) -> raw_pb2.StartRaw:
     """Return the part of the map that never changes; the placement grid is of the bare terrain, as in the game."""
-    terrain, start = seat.world.map.terrain, raw_pb2.StartRaw()
+    terrain = seat.world.map.terrain
+    start = raw_pb2.StartRaw()
     start.map_size.x, start.map_size.y = _crop(seat, terrain.build).shape[::-1]
     x0, y0, x1, y1 = terrain.playable
     (start.playable_area.p0.x, start.playable_area.p0.y) = (x0 - int(seat.origin[0]), y0 - int(seat.origin[1]))
@@ -114,7 +117,8 @@ def known_structures(seat: PlayerSeat) -> tuple[Structure, ...]:
 
 def paths(world: World, structures: tuple[Structure, ...]) -> NDArray[np.bool_]:
     """Return [y, x] where ground units can walk, if these structures are all that stands there."""
-    grid, catalog = world.map.terrain.walk.copy(), world.catalog
+    grid = world.map.terrain.walk.copy()
+    catalog = world.catalog
     for row, x, y in structures:
         footprint = catalog.footprints.get(catalog.units[row].footprint)
         if footprint is not None and footprint.cells:

@@ -18,13 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_simulator.api.abilities import OrderPlan, Result
-    from khala_simulator.tables.catalog import Ability
-    from khala_simulator.world.casts import Cast
     from khala_simulator.world.world import World
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Outcome:
+class CommandOutcome:
     """The outcome of a command: its result, the specific ability, and the units that took it."""
 
     result: Result
@@ -32,28 +30,23 @@ class Outcome:
     slots: tuple[int, ...] = ()
 
 
-def carry_out(world: World, plan: OrderPlan) -> Outcome:
+def carry_out(world: World, plan: OrderPlan) -> CommandOutcome:
     """Give a command to the units that can take it, as judged in the present world."""
     if plan.result != error_pb2.Success:
-        return Outcome(plan.result)
+        return CommandOutcome(plan.result)
     taken: list[int] = []
+    queue = plan.asked.queue
     for ability, casts in plan.parts:
-        if ability.effect not in GIVE and taken:  # what an earlier part has cost may be missing now
-            slots = [cast.slot for cast in casts]
-            queue = plan.asked.queue
+        slots = [cast.slot for cast in casts]
+        if ability.effect in GIVE:
+            taken += GIVE[ability.effect](world, slots, plan)
+        elif taken:  # an earlier part may have used up what this one costs
             taken += casting.use(world, slots, ability, target=plan.target, point=plan.point, queue=queue)
         else:
-            taken += _give(world, ability, casts, plan)
+            taken += casting.order(world, casts, ability, queue=queue)
     if not taken:
-        return Outcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if plan.asked.queue else ActionResult.ERROR))
-    return Outcome(error_pb2.Success, plan.ability, tuple(taken))
-
-
-def _give(world: World, ability: Ability, casts: tuple[Cast, ...], plan: OrderPlan) -> list[int]:
-    give = GIVE.get(ability.effect)
-    if give is None:
-        return casting.order(world, casts, ability, queue=plan.asked.queue)
-    return give(world, [cast.slot for cast in casts], plan)
+        return CommandOutcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if queue else ActionResult.ERROR))
+    return CommandOutcome(error_pb2.Success, plan.ability, tuple(taken))
 
 
 def _move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:

@@ -89,7 +89,8 @@ class FeatureLayers:
         screen = self.screen
 
         def axes() -> tuple[Floats, Floats]:
-            corner, pixels = np.zeros(1), np.arange(max(screen.columns, screen.rows), dtype=np.float64)
+            corner = np.zeros(1)
+            pixels = np.arange(max(screen.columns, screen.rows), dtype=np.float64)
             columns, _ = screen.to_world(pixels[: screen.columns], corner, frame.camera)
             _, lines = screen.to_world(corner, pixels[: screen.rows], frame.camera)
             return columns, lines
@@ -112,14 +113,16 @@ class FeatureLayers:
         return self._spots("effects", Spots(table[:, :2], table[:, 2]), table[:, 3].astype(np.int32), frame)
 
     def _power(self, frame: Frame) -> list[Part]:
-        layer, sources = self._screen.layers["power"], power(frame.sight, frame.types)
+        layer = self._screen.layers["power"]
+        sources = power(frame.sight, frame.types)
         if sources is None:
             return layer.blank
         spots = Spots(frame.sight.pos[sources.row], sources.radius)
         return self._spots("power", spots, np.ones(len(sources.row), np.int32), frame)
 
     def _blips(self, frame: Frame) -> list[Part]:
-        layer, places = self._screen.layers["blip"], blips(frame.world, frame.types, frame.player)
+        layer = self._screen.layers["blip"]
+        places = blips(frame.world, frame.types, frame.player)
         if not len(places):
             return layer.blank
         spots = Spots(places, np.full(len(places), BLIP_RADIUS))
@@ -135,13 +138,16 @@ class FeatureLayers:
         minimap = self.minimap
 
         def axes() -> tuple[Floats, Floats]:
-            corner, pixels = np.zeros(1), np.arange(max(minimap.columns, minimap.rows), dtype=np.float64)
+            corner = np.zeros(1)
+            pixels = np.arange(max(minimap.columns, minimap.rows), dtype=np.float64)
             columns, _ = minimap.to_world(pixels[: minimap.columns], corner)
             _, lines = minimap.to_world(corner, pixels[: minimap.rows])
             return columns, lines
 
         sight, image = frame.sight, self._minimap
-        pos, radius, known = sight.pos, sight.radius, sight.display != Display.HIDDEN.value
+        pos = sight.pos
+        radius = sight.radius
+        known = sight.display != Display.HIDDEN.value
         if not known.all():
             pos, radius, values = pos[known], radius[known], values.compress(known, axis=1)
         x, y = minimap.to_pixels(pos[:, 0], pos[:, 1])
@@ -155,7 +161,8 @@ class FeatureLayers:
             x1, y1 = self.minimap.to_pixels(view.x1, view.y0)
             image = np.zeros((self.minimap.rows, self.minimap.columns), np.bool_)
             image[max(0, round(y0)) : max(0, round(y1)), max(0, round(x0)) : max(0, round(x1))] = True
-            self._outlined, self._outline = frame.camera, self._minimap.layers["camera"].encode(image)
+            self._outlined = frame.camera
+            self._outline = self._minimap.layers["camera"].encode(image)
         return self._outline
 
     def _alerts(self, frame: Frame) -> list[Part]:
@@ -195,7 +202,9 @@ class _Image:
         """Return terrain and visibility; drawn again only if the camera moved, the ground changed, or fog may have."""
         world, layers, terrain = frame.world, self.layers, frame.world.map.terrain
         if self._sampler is None or self._camera != frame.camera:
-            self._sampler, self._camera, self._walk = Sampler(terrain.size, *axes()), frame.camera, None
+            self._sampler = Sampler(terrain.size, *axes())
+            self._camera = frame.camera
+            self._walk = None
         take = self._sampler.take
         changed = self._walk is not world.ground.walk or self._creep is not world.creep
         if changed:

@@ -18,7 +18,7 @@ from khala_simulator.api import ui, wire
 from khala_simulator.api.abilities import result_of, usable_by_any
 from khala_simulator.api.effects import seen_buffs
 from khala_simulator.api.layers import Frame
-from khala_simulator.api.raw import Units
+from khala_simulator.api.raw import PerceivedUnits
 from khala_simulator.api.raw_effects import write_effects, write_power, write_radar
 from khala_simulator.api.score import Holdings
 from khala_simulator.api.sight import Alliance, Display
@@ -45,7 +45,7 @@ def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) ->
     world = game.world
     sight = seat.look(through_fog=disable_fog)
     selected = seat.selection.rows(sight)
-    attacked = _attacked(seat, sight)
+    attacked = _raise_alarm(seat, sight)
     told = sc.ResponseObservation(
         actions=seat.hands.echoes,
         action_errors=[*seat.hands.errors, *_mishaps(seat)],
@@ -70,11 +70,11 @@ def observe(game: HostedGame, seat: PlayerSeat, *, disable_fog: bool = False) ->
             parts += wire.embed(_LAYERS, seat.layers.encode(frame))
         if seat.renders is not None:
             parts += wire.embed(_RENDERS, seat.renders.encode(frame))
-    _told(seat, sight, through_fog=disable_fog)
+    _note_observed(seat, sight, through_fog=disable_fog)
     return [told.SerializeToString(), *wire.embed(_OBSERVATION, parts)]
 
 
-def _told(seat: PlayerSeat, sight: Sight, *, through_fog: bool) -> None:
+def _note_observed(seat: PlayerSeat, sight: Sight, *, through_fog: bool) -> None:
     seat.hands.forget()
     seat.deaths_told = len(seat.world.deaths)
     seat.mishaps_told = len(seat.world.mishaps)
@@ -105,8 +105,8 @@ def _abilities(seat: PlayerSeat) -> list[common_pb2.AvailableAbility]:
     ]
 
 
-def _attacked(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
-    """Return the rows of own units damaged since the last observation, if another alarm is due."""
+def _raise_alarm(seat: PlayerSeat, sight: Sight) -> NDArray[np.intp]:
+    """Raise an alarm if it is due; return the rows of own units damaged since the last observation, or none."""
     world = seat.world
     if world.loop - seat.alarm_loop < _ALARM_PAUSE_LOOPS:
         return np.zeros(0, np.intp)
@@ -136,7 +136,7 @@ def _encode_raw(seat: PlayerSeat, sight: Sight, selected: NDArray[np.bool_], *, 
     first.player.upgrade_ids.extend(world.players[seat.player].upgrades)
     write_power(first, seat, sight)
     worn = seen_buffs(world, sight)
-    units = Units(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, worn, seat.player)
+    units = PerceivedUnits(world, seat.types, sight, selected, seat.on_screen(sight), seat.origin, worn, seat.player)
     dead = (d.tag for d in world.deaths[seat.deaths_told :] if d.owner == seat.player or d.tag in seat.known)
     last.event.dead_units.extend(dead)
     write_effects(last, seat, through_fog=through_fog)

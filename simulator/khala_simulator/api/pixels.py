@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from s2clientprotocol import common_pb2, spatial_pb2
 
-    from khala_simulator.api.projection import ImagePair, Screen
+    from khala_simulator.api.projection import ImagePair, ScreenView
 
     Point = tuple[float, float]
 
@@ -60,7 +60,7 @@ def _write_on_minimap(pixel: common_pb2.PointI, view: ImagePair, point: Point) -
     pixel.y = min(max(row, 0), view.minimap.rows - 1)
 
 
-def _translate(pixel: common_pb2.PointI, source: Screen, target: Screen) -> None:
+def _translate(pixel: common_pb2.PointI, source: ScreenView, target: ScreenView) -> None:
     centre = (0.0, 0.0)  # both screens look through the same camera
     column, row = target.to_pixels(*source.to_world(float(pixel.x), float(pixel.y), centre), centre)
     pixel.x = min(max(math.floor(column), 0), target.columns - 1)

@@ -37,7 +37,7 @@ class Rect(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Screen:
+class ScreenView:
     """The camera's view: `width` world units along the shorter side of the image, whatever its shape."""
 
     columns: int
@@ -95,14 +95,14 @@ class Minimap:
 class ImagePair:
     """The two images of one kind that a client looks at and clicks on."""
 
-    screen: Screen
+    screen: ScreenView
     minimap: Minimap
 
 
 def view_of(setup: sc.SpatialCameraSetup, area: Rect, width: float = DEFAULT_WIDTH) -> ImagePair:
     """Return the images that a client asked for, the minimap of this part of the map; `width` is the default width."""
     screen, minimap = setup.resolution, setup.minimap_resolution
-    return ImagePair(Screen(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
+    return ImagePair(ScreenView(screen.x, screen.y, setup.width or width), Minimap(minimap.x, minimap.y, area))
 
 
 def size_problem(options: sc.InterfaceOptions) -> str | None:
@@ -115,7 +115,8 @@ def size_problem(options: sc.InterfaceOptions) -> str | None:
         for size in (setup.resolution, setup.minimap_resolution) if wanted else ():
             if not (0 < size.x <= MAX_PIXELS and 0 < size.y <= MAX_PIXELS):
                 return f"{name} of {size.x} x {size.y} pixels; between 1 and {MAX_PIXELS} are possible"
-        shorter, width = min(setup.resolution.x, setup.resolution.y), setup.width or DEFAULT_WIDTH
+        shorter = min(setup.resolution.x, setup.resolution.y)
+        width = setup.width or DEFAULT_WIDTH
         if wanted and not shorter / MAX_SCALE <= width <= MAX_WIDTH:
             least = shorter / MAX_SCALE
             return f"{name} of {width:g} world units; between {least:g} and {MAX_WIDTH:g} are possible in this size"

@@ -25,7 +25,7 @@ cdef class _View:
     cdef object world
     cdef Columns c
     cdef Heights heights
-    cdef wire.Message part
+    cdef wire.MessageWriter part
     cdef int64_t loop
     cdef Py_ssize_t top
     cdef double x0
@@ -74,24 +74,24 @@ cdef class _View:
 
 cdef dict _buffs_by_row(object worn)
 cdef dict _last_ends(object world)
-@cython.locals(n=Py_ssize_t, message=wire.Message, unit=wire.Message, i=Py_ssize_t, is_here=bint, own=bint)
+@cython.locals(n=Py_ssize_t, message=wire.MessageWriter, unit=wire.MessageWriter, i=Py_ssize_t, is_here=bint, own=bint)
 cdef _encode(object units)
-cdef int _put_known(wire.Message unit, _View view, Py_ssize_t i, bint is_here) except -1
+cdef int _put_known(wire.MessageWriter unit, _View view, Py_ssize_t i, bint is_here) except -1
 @cython.locals(row=int64_t, contents=int64_t)
-cdef int _put_vitals(wire.Message unit, _View view, Py_ssize_t i) except -1
+cdef int _put_vitals(wire.MessageWriter unit, _View view, Py_ssize_t i) except -1
 @cython.locals(slot=int64_t, row=int64_t, fixed=bint, levels=int64_t, powered=bint)
-cdef int _put_standing(wire.Message unit, _View view, Py_ssize_t i) except -1
-cdef int _put_orders(wire.Message unit, _View view, int64_t slot) except -1
+cdef int _put_standing(wire.MessageWriter unit, _View view, Py_ssize_t i) except -1
+cdef int _put_orders(wire.MessageWriter unit, _View view, int64_t slot) except -1
 @cython.locals(kind=int64_t, target=int64_t, aimed=bint, tag=int64_t, progress=double, x=double, y=double)
-cdef int _put_only_order(wire.Message unit, _View view, int64_t slot) except -1
+cdef int _put_only_order(wire.MessageWriter unit, _View view, int64_t slot) except -1
 @cython.locals(begun=double, end=double, progress=double)
 cdef double _progress(Columns c, int64_t slot, int64_t loop) noexcept
-cdef int _put_order(wire.Message unit, _View view, uint32_t ability, int64_t target, bint aimed, double x, double y,
+cdef int _put_order(wire.MessageWriter unit, _View view, uint32_t ability, int64_t target, bint aimed, double x, double y,
                     double progress) except -1
 @cython.locals(taken=int64_t, inside=int64_t)
-cdef int _put_load(wire.Message unit, _View view, int64_t slot, int64_t row) except -1
-cdef int _put_passenger(wire.Message unit, _View view, int64_t slot) except -1
+cdef int _put_load(wire.MessageWriter unit, _View view, int64_t slot, int64_t row) except -1
+cdef int _put_passenger(wire.MessageWriter unit, _View view, int64_t slot) except -1
 @cython.locals(workers=int64_t, ideal=int64_t)
-cdef int _put_service(wire.Message unit, _View view, int64_t slot, int64_t row) except -1
-cdef int _put_time_left(wire.Message unit, _View view, int64_t slot) except -1
-cdef int _put_rallies(wire.Message unit, _View view, int64_t slot) except -1
+cdef int _put_service(wire.MessageWriter unit, _View view, int64_t slot, int64_t row) except -1
+cdef int _put_time_left(wire.MessageWriter unit, _View view, int64_t slot) except -1
+cdef int _put_rallies(wire.MessageWriter unit, _View view, int64_t slot) except -1

@@ -42,7 +42,7 @@ CAST: Final = OrderKind.CAST.value
 
 
 @dataclasses.dataclass(frozen=True)
-class Units:
+class PerceivedUnits:
     """The input for the units' fields: their perception, and their state in the player's interface."""
 
     world: World
@@ -67,13 +67,13 @@ class Units:
 class _View:
     """What the fields are made from, as rows of numbers, and a message for parts of units."""
 
-    def __init__(self, units: Units) -> None:
+    def __init__(self, units: PerceivedUnits) -> None:
         world, types, sight = units.world, units.types, units.sight
         self.units = units  # keeps the memory alive
         self.world = world
         self.c = columns.columns_of(world)
         self.heights = world.map.terrain.heights
-        self.part = wire.Message(256)
+        self.part = wire.MessageWriter(256)
         self.loop = world.loop
         self.top = world.top
         self.x0, self.y0 = units.origin
@@ -139,12 +139,12 @@ def _last_ends(world: World) -> dict[int, tuple[int, float]]:
     return found
 
 
-def _encode(units: Units) -> bytes:
+def _encode(units: PerceivedUnits) -> bytes:
     """Return the units as a field of an observation; those that are only remembered or planned have few fields."""
     view = _View(units)
     n = len(units.sight)
-    message = wire.Message(256 * n + 512)
-    unit = wire.Message(1024)
+    message = wire.MessageWriter(256 * n + 512)
+    unit = wire.MessageWriter(1024)
     for i in range(n):
         unit.clear()
         is_here = view.display[i] == VISIBLE or view.display[i] == HIDDEN
@@ -169,7 +169,7 @@ def _encode(units: Units) -> bytes:
     return message.content()
 
 
-def _put_known(unit: wire.Message, view: _View, i: int, is_here: bool) -> None:
+def _put_known(unit: wire.MessageWriter, view: _View, i: int, is_here: bool) -> None:
     """Write what is known of remembered and planned units too."""
     unit.put_number(fields.DISPLAY_TYPE, view.display[i])
     unit.put_number(fields.ALLIANCE, view.alliance[i])
@@ -187,7 +187,7 @@ def _put_known(unit: wire.Message, view: _View, i: int, is_here: bool) -> None:
     unit.put_number(fields.IS_BLIP, False)
 
 
-def _put_vitals(unit: wire.Message, view: _View, i: int) -> None:
+def _put_vitals(unit: wire.MessageWriter, view: _View, i: int) -> None:
     """Write life, shields and energy, what a resource still holds, and where the unit is."""
     row = view.row[i]
     contents = view.c.contents[view.slot[i]]
@@ -203,7 +203,7 @@ def _put_vitals(unit: wire.Message, view: _View, i: int) -> None:
     unit.put_number(fields.IS_BURROWED, view.burrowed[i])
 
 
-def _put_standing(unit: wire.Message, view: _View, i: int) -> None:
+def _put_standing(unit: wire.MessageWriter, view: _View, i: int) -> None:
     """Write what its owner's upgrades and its state make of the unit; what can't move may have power."""
     c = view.c
     slot = view.slot[i]
@@ -226,7 +226,7 @@ def _put_standing(unit: wire.Message, view: _View, i: int) -> None:
 # own units ------------------------------------------------------------------------------------------------------------
 
 
-def _put_orders(unit: wire.Message, view: _View, slot: int) -> None:
+def _put_orders(unit: wire.MessageWriter, view: _View, slot: int) -> None:
     """Write its orders, as `World.orders_of` has them."""
     world = view.world
     if world.queue[slot] or (view.makes and view.c.order_kind[slot] == IDLE and slot in world.jobs):
@@ -237,7 +237,7 @@ def _put_orders(unit: wire.Message, view: _View, slot: int) -> None:
         _put_only_order(unit, view, slot)
 
 
-def _put_only_order(unit: wire.Message, view: _View, slot: int) -> None:
+def _put_only_order(unit: wire.MessageWriter, view: _View, slot: int) -> None:
     """Write the only order of a unit; an idle one may fight by itself."""
     c = view.c
     kind = c.order_kind[slot]
@@ -262,7 +262,7 @@ def _progress(c: Columns, slot: int, loop: int) -> float:
 
 
 def _put_order(
-    unit: wire.Message, view: _View, ability: int, target: int, aimed: bool, x: float, y: float, progress: float
+    unit: wire.MessageWriter, view: _View, ability: int, target: int, aimed: bool, x: float, y: float, progress: float
 ) -> None:
     """Write one order: its target is a unit, or else a point if it is aimed at one."""
     order = view.part
@@ -277,7 +277,7 @@ def _put_order(
     unit.put_message(fields.ORDERS, order)
 
 
-def _put_load(unit: wire.Message, view: _View, slot: int, row: int) -> None:
+def _put_load(unit: wire.MessageWriter, view: _View, slot: int, row: int) -> None:
     """Write its add-on, its passengers, and the room that they take."""
     c = view.c
     if c.addon[slot] != NOBODY:
@@ -292,7 +292,7 @@ def _put_load(unit: wire.Message, view: _View, slot: int, row: int) -> None:
         unit.put_number(fields.CARGO_SPACE_MAX, view.cargo[row])
 
 
-def _put_passenger(unit: wire.Message, view: _View, slot: int) -> None:
+def _put_passenger(unit: wire.MessageWriter, view: _View, slot: int) -> None:
     """Write a unit inside of another."""
     c = view.c
     passenger = view.part
@@ -308,7 +308,7 @@ def _put_passenger(unit: wire.Message, view: _View, slot: int) -> None:
     unit.put_message(fields.PASSENGERS, passenger)
 
 
-def _put_service(unit: wire.Message, view: _View, slot: int, row: int) -> None:
+def _put_service(unit: wire.MessageWriter, view: _View, slot: int, row: int) -> None:
     """Write its workers, its weapon and its sensors."""
     c = view.c
     workers = 0
@@ -325,7 +325,7 @@ def _put_service(unit: wire.Message, view: _View, slot: int, row: int) -> None:
         unit.put_number(fields.ENGAGED_TARGET_TAG, c.tag[c.target[slot]])
 
 
-def _put_time_left(unit: wire.Message, view: _View, slot: int) -> None:
+def _put_time_left(unit: wire.MessageWriter, view: _View, slot: int) -> None:
     """Write how long its timed life, or else the buff that ends last, still lasts."""
     c = view.c
     if c.expires[slot]:
@@ -337,7 +337,7 @@ def _put_time_left(unit: wire.Message, view: _View, slot: int) -> None:
         unit.put_number(fields.BUFF_DURATION_MAX, round(end) - begun)
 
 
-def _put_rallies(unit: wire.Message, view: _View, slot: int) -> None:
+def _put_rallies(unit: wire.MessageWriter, view: _View, slot: int) -> None:
     """Write where a structure sends new units."""
     target = view.part
     for rally in dict.fromkeys(view.world.rallies.get(slot, {}).values()):

@@ -24,7 +24,9 @@ def write_radar(raw: raw_pb2.ObservationRaw, seat: PlayerSeat) -> None:
     for radar in seen_radars(seat.world, seat.player):
         ring = raw.radar.add(radius=radar.radius)
         x, y = radar.point
-        ring.pos.x, ring.pos.y, ring.pos.z = x - seat.origin[0], y - seat.origin[1], seat.ground_z(x, y)
+        ring.pos.x = x - seat.origin[0]
+        ring.pos.y = y - seat.origin[1]
+        ring.pos.z = seat.ground_z(x, y)
 
 
 def write_effects(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, *, through_fog: bool) -> None:
@@ -45,4 +47,6 @@ def write_power(raw: raw_pb2.ObservationRaw, seat: PlayerSeat, sight: Sight) -> 
     for row, radius in zip(sources.row.tolist(), sources.radius.tolist(), strict=True):
         source = raw.player.power_sources.add(radius=radius, tag=int(sight.tag[row]))
         x, y = sight.pos[row].tolist()
-        source.pos.x, source.pos.y, source.pos.z = x - seat.origin[0], y - seat.origin[1], float(sight.z[row])
+        source.pos.x = x - seat.origin[0]
+        source.pos.y = y - seat.origin[1]
+        source.pos.z = float(sight.z[row])

@@ -12,8 +12,8 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.api.layers import FeatureLayers
 from khala_simulator.api.map_state import GroundImages
-from khala_simulator.api.projection import DEFAULT_WIDTH, ImagePair, Minimap, Rect, Screen, view_of
-from khala_simulator.api.selection import Selection
+from khala_simulator.api.projection import DEFAULT_WIDTH, ImagePair, Minimap, Rect, ScreenView, view_of
+from khala_simulator.api.selection import PlayerSelection
 from khala_simulator.api.sight import Sight, look
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from khala_simulator.api.types import Types
     from khala_simulator.world.world import World
 
-_WITHOUT_IMAGES = Screen(1, 1, DEFAULT_WIDTH)
+_WITHOUT_IMAGES = ScreenView(1, 1, DEFAULT_WIDTH)
 
 
 @dataclasses.dataclass
@@ -33,7 +33,7 @@ class Hands:
 
     camera: tuple[float, float]
     camera_z: float  # of the ground there
-    selection: Selection = dataclasses.field(default_factory=Selection)
+    selection: PlayerSelection = dataclasses.field(default_factory=PlayerSelection)
     echoes: list[sc.Action] = dataclasses.field(default_factory=list)
     errors: list[sc.ActionError] = dataclasses.field(default_factory=list)
     chat: list[sc.ChatReceived] = dataclasses.field(default_factory=list)
@@ -63,7 +63,8 @@ class PlayerSeat:
             self.views["action_feature_layer"] = view
             self.layers = FeatureLayers(layers, view)
         if options.HasField("render"):
-            render, otherwise = options.render, options.feature_layer.width or DEFAULT_WIDTH
+            render = options.render
+            otherwise = options.feature_layer.width or DEFAULT_WIDTH
             view = view_of(render, self.playable if crop or render.crop_to_playable_area else whole, otherwise)
             self.views["action_render"] = view
             self.renders = _renders(view, types)
@@ -83,7 +84,7 @@ class PlayerSeat:
         self.alarm_loop = -(1 << 30)  # when an attack was last reported
 
     @property
-    def screen(self) -> Screen:
+    def screen(self) -> ScreenView:
         """The screen that decides whether a unit is in view."""
         return self.view.screen
 
@@ -98,7 +99,7 @@ class PlayerSeat:
         return self.hands.camera_z
 
     @property
-    def selection(self) -> Selection:
+    def selection(self) -> PlayerSelection:
         """The selected units and the control groups."""
         return self.hands.selection
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 GROUPS = 10
 
 
-class Selection:
+class PlayerSelection:
     """The selected units and the ten control groups of one player, as tags in the order of the unit panel."""
 
     def __init__(self) -> None:
@@ -91,7 +91,8 @@ def at_point(sight: Sight, types: Types, point: tuple[float, float], reach: floa
 
 def in_rectangle(sight: Sight, types: Types, corner: tuple[float, float], other: tuple[float, float]) -> Rows:
     """Return the rows of own units whose bodies touch a rectangle of the world; structures only if no unit does."""
-    low, high = np.minimum(corner, other), np.maximum(corner, other)
+    low = np.minimum(corner, other)
+    high = np.maximum(corner, other)
     nearest = np.clip(sight.pos, low, high)
     touched = ((sight.pos - nearest) ** 2).sum(axis=1) <= sight.radius**2
     own = touched & (sight.alliance == Alliance.SELF) & selectable(sight, types)

@@ -19,7 +19,7 @@ from khala_simulator.native import columns, memory
 from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some
 from khala_simulator.systems import vision
-from khala_simulator.systems.vision import detected
+from khala_simulator.systems.vision import are_detected
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 from khala_simulator.world.snapshots import INDEX_SHIFT, RememberedUnit
@@ -164,7 +164,7 @@ def _units_seen(world: World, types: Types, player: int, show_cloaked: bool, thr
             if flies[c.type[slot]] != flying:
                 continue
             own = c.owner[slot] == player and not observes
-            hides = _cloak_of(c, slot, own, observes or c.visible[player * c.capacity + slot])
+            hides = _cloak(c, slot, own, observes or c.visible[player * c.capacity + slot])
             seen = (
                 not fogged
                 or c.owner[slot] == player
@@ -175,10 +175,10 @@ def _units_seen(world: World, types: Types, player: int, show_cloaked: bool, thr
                 cloak[n] = hides if seen else UNKNOWN
                 clear[n] = seen and hides != CLOAKED
                 n += 1
-    return _sight_of(world, types, c, player, kept[:n], cloaks[:n], clear)
+    return _make_sight(world, types, c, player, kept[:n], cloaks[:n], clear)
 
 
-def _cloak_of(c: Columns, slot: int, own: bool, uncovered: bool) -> int:
+def _cloak(c: Columns, slot: int, own: bool, uncovered: bool) -> int:
     """Return what a player knows of the cloak of a unit of its own or another's, if it sees the place."""
     if not c.cloaked[slot] and not (c.burrowed[slot] and not own):
         return NOT_CLOAKED
@@ -191,7 +191,7 @@ def _placeholders(world: World, player: int) -> list[RememberedUnit]:
     """Return the structures that the player's builders are on their way to build, with made-up tags."""
     return [
         RememberedUnit(PLACEHOLDER_TAG | i << INDEX_SHIFT, 0, unit.row, player, point, (0.0, -1.0), 0.0)
-        for i, (unit, point) in enumerate(building_sites.planned(world, player))
+        for i, (unit, point) in enumerate(building_sites.planned_structures(world, player))
     ]
 
 
@@ -227,13 +227,13 @@ def _with_snapshots(
     return Sight(**joined)
 
 
-def _sight_of(world: World, types: Types, c: Columns, player: int, slot: Ints, cloak: Ints, clear: Cells) -> Sight:
+def _make_sight(world: World, types: Types, c: Columns, player: int, slot: Ints, cloak: Ints, clear: Cells) -> Sight:
     """Return what a player perceives of these units: how they hide, and which it sees clearly."""
     n = len(slot)
     slots = memory.ints(slot)
     stats = world.stats
-    row = _ints_at(c.type, slots, n)
-    owner = _ints_at(c.owner, slots, n)
+    row = _pick_ints(c.type, slots, n)
+    owner = _pick_ints(c.owner, slots, n)
     place = memory.new_ints(n)
     rows = memory.ints(row)
     owners = memory.ints(owner)
@@ -254,30 +254,30 @@ def _sight_of(world: World, types: Types, c: Columns, player: int, slot: Ints, c
             sides[i] = NEUTRAL if owners[i] == 0 else ENEMY
         if owners[i] == 0:
             owners[i] = neutral
-    pos = _points_at(c.pos, slots, n)
+    pos = _pick_points(c.pos, slots, n)
     return Sight(
         slot=slot,
         row=row,
-        tag=_ints_at(c.tag, slots, n),
-        type_id=_ints_at(memory.ints(types.id), rows, n),
+        tag=_pick_ints(c.tag, slots, n),
+        type_id=_pick_ints(memory.ints(types.id), rows, n),
         owner=owner,
         alliance=alliance,
         display=display,
         cloak=cloak,
         pos=pos,
-        z=_z_of(world.map.terrain.heights, pos, memory.floats(types.height), rows, n),
-        facing=geometry.facing(_points_at(c.heading, slots, n)),
-        radius=_floats_at(memory.floats(types.radius), rows, n),
-        life=_told_at(c.life, slots, clear, n),
-        life_max=_told_at(memory.floats(stats.life_max), places, clear, n),
-        shields=_told_at(c.shields, slots, clear, n),
-        shields_max=_told_at(memory.floats(stats.shields_max), places, clear, n),
-        energy=_told_at(c.energy, slots, clear, n),
-        energy_max=_told_at(memory.floats(stats.energy_max), places, clear, n),
-        build_progress=_floats_at(c.build_progress, slots, n),
-        flying=_bools_at(memory.bools(types.flying), rows, n),
-        burrowed=_bools_at(c.burrowed, slots, n),
-        hallucination=_fakes(world, player, slot, alliance, _bools_at(c.hallucination, slots, n)),
+        z=_heights(world.map.terrain.heights, pos, memory.floats(types.height), rows, n),
+        facing=geometry.facing(_pick_points(c.heading, slots, n)),
+        radius=_pick_floats(memory.floats(types.radius), rows, n),
+        life=_pick_clear(c.life, slots, clear, n),
+        life_max=_pick_clear(memory.floats(stats.life_max), places, clear, n),
+        shields=_pick_clear(c.shields, slots, clear, n),
+        shields_max=_pick_clear(memory.floats(stats.shields_max), places, clear, n),
+        energy=_pick_clear(c.energy, slots, clear, n),
+        energy_max=_pick_clear(memory.floats(stats.energy_max), places, clear, n),
+        build_progress=_pick_floats(c.build_progress, slots, n),
+        flying=_pick_bools(memory.bools(types.flying), rows, n),
+        burrowed=_pick_bools(c.burrowed, slots, n),
+        hallucination=_fakes(world, player, slot, alliance, _pick_bools(c.hallucination, slots, n)),
         active=_active(world, c, slots, clear, n),
     )
 
@@ -287,7 +287,7 @@ def _fakes(world: World, player: int, slot: Ints, alliance: Ints, fakes: Bools) 
     if player != OBSERVER and some(fakes):
         foreign = np.flatnonzero(fakes & (alliance != Alliance.SELF.value))
         if foreign.size:
-            fakes[foreign] = detected(world, player, slot[foreign])
+            fakes[foreign] = are_detected(world, player, slot[foreign])
     return fakes
 
 
@@ -304,7 +304,7 @@ def _active(world: World, c: Columns, slots: Cells, clear: Cells, n: int) -> Boo
     return array
 
 
-def _z_of(heights: Heights, pos: Floats, above: Cells, rows: Cells, n: int) -> Floats:
+def _heights(heights: Heights, pos: Floats, above: Cells, rows: Cells, n: int) -> Floats:
     """Return (n,) the height of each unit: that of the ground, and how far its type is above it."""
     array = memory.new_floats(n)
     z = memory.floats(array)
@@ -314,16 +314,16 @@ def _z_of(heights: Heights, pos: Floats, above: Cells, rows: Cells, n: int) -> F
     return array
 
 
-def _told_at(column: Cells, at: Cells, clear: Cells, n: int) -> Floats:
-    """Return (n,) the numbers at these places of a column, 0 for units that are not seen clearly."""
+def _pick_clear(column: Cells, at: Cells, clear: Cells, n: int) -> Floats:
+    """Return (n,) the numbers at these places of a column, 0 for units that the player does not see clearly."""
     array = memory.new_floats(n)
-    told = memory.floats(array)
+    found = memory.floats(array)
     for i in range(n):
-        told[i] = column[at[i]] * clear[i]
+        found[i] = column[at[i]] * clear[i]
     return array
 
 
-def _floats_at(column: Cells, at: Cells, n: int) -> Floats:
+def _pick_floats(column: Cells, at: Cells, n: int) -> Floats:
     """Return (n,) the numbers at these places of a column."""
     array = memory.new_floats(n)
     found = memory.floats(array)
@@ -332,7 +332,7 @@ def _floats_at(column: Cells, at: Cells, n: int) -> Floats:
     return array
 
 
-def _ints_at(column: Cells, at: Cells, n: int) -> Ints:
+def _pick_ints(column: Cells, at: Cells, n: int) -> Ints:
     """Return (n,) the numbers at these places of a column."""
     array = memory.new_ints(n)
     found = memory.ints(array)
@@ -341,7 +341,7 @@ def _ints_at(column: Cells, at: Cells, n: int) -> Ints:
     return array
 
 
-def _bools_at(column: Cells, at: Cells, n: int) -> Bools:
+def _pick_bools(column: Cells, at: Cells, n: int) -> Bools:
     """Return (n,) the values at these places of a column."""
     array = memory.new_bools(n)
     found = memory.bools(array)
@@ -350,7 +350,7 @@ def _bools_at(column: Cells, at: Cells, n: int) -> Bools:
     return array
 
 
-def _points_at(column: Points, at: Cells, n: int) -> Floats:
+def _pick_points(column: Points, at: Cells, n: int) -> Floats:
     """Return (n, 2) the points at these places of a column."""
     array = memory.new_points(n)
     found = memory.points(array)

@@ -14,7 +14,7 @@ cdef int64_t ENEMY
 cdef class _Infos:
     cdef Columns c
     cdef int64_t player
-    cdef wire.Message info
+    cdef wire.MessageWriter info
     cdef tuple tables
     cdef int64_t type_count
     cdef int64_t* type_id
@@ -26,7 +26,7 @@ cdef class _Infos:
     cdef int write(self, int64_t slot) except -1
 
 
-@cython.locals(infos=_Infos, message=wire.Message, slot=int64_t)
+@cython.locals(infos=_Infos, message=wire.MessageWriter, slot=int64_t)
 cdef _encode_multi(object world, object types, list slots, int64_t player)
 @cython.locals(infos=_Infos)
 cdef _unit(object world, object types, int64_t slot, int64_t player)

@@ -15,7 +15,7 @@ from khala_simulator.api.sight import Alliance
 from khala_simulator.native import columns, memory
 
 if TYPE_CHECKING:
-    from khala_simulator.api.selection import Selection
+    from khala_simulator.api.selection import PlayerSelection
     from khala_simulator.api.types import Types
     from khala_simulator.world.world import World
 
@@ -24,12 +24,12 @@ NEUTRAL: Final = Alliance.NEUTRAL.value
 ENEMY: Final = Alliance.ENEMY.value
 
 
-def panel(world: World, types: Types, selection: Selection, player: int) -> ui_pb2.ObservationUI:
+def panel(world: World, types: Types, selection: PlayerSelection, player: int) -> ui_pb2.ObservationUI:
     """Return what a player's interface shows of the selection."""
     ui = ui_pb2.ObservationUI()
     slots = selection.slots(world)
     if len(slots) == 1:
-        _write_one(ui, world, types, slots[0], player)
+        _write_only_unit(ui, world, types, slots[0], player)
     elif slots:
         ui.multi.MergeFromString(_encode_multi(world, types, slots, player))
     for index, tags in enumerate(selection.groups):
@@ -42,14 +42,14 @@ def panel(world: World, types: Types, selection: Selection, player: int) -> ui_p
 def _encode_multi(world: World, types: Types, slots: list[int], player: int) -> bytes:
     """Return a `MultiPanel`."""
     infos = _Infos(world, types, player)
-    message = wire.Message(64 * len(slots) + 64)
+    message = wire.MessageWriter(64 * len(slots) + 64)
     for slot in slots:
         infos.write(slot)
         message.put_message(fields.PANEL_UNITS, infos.info)
     return message.content()
 
 
-def _write_one(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, player: int) -> None:
+def _write_only_unit(ui: ui_pb2.ObservationUI, world: World, types: Types, slot: int, player: int) -> None:
     own = world.owner[slot] == player
     inside = world.passengers(slot) if own and types.cargo[world.type[slot]] else []
     if own and slot in world.jobs:
@@ -94,7 +94,7 @@ class _Infos:
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.c = columns.columns_of(world)
         self.player = player
-        self.info = wire.Message(128)  # a `UnitInfo`
+        self.info = wire.MessageWriter(128)  # a `UnitInfo`
         self.tables = (types.id, world.stats.life_max, world.stats.shields_max, world.stats.energy_max)
         self.type_count = len(types.id)
         self.type_id = memory.ints(types.id)

@@ -64,16 +64,19 @@ class Viewer(PlayerSeat):
             case "player_perspective":
                 player = action.player_perspective.player_id
                 if player < len(self.world.players):
-                    self._guide, self._units = player, ()
+                    self._guide = player
+                    self._units = ()
                     self.watch(player)
             case "camera_move":
                 point = action.camera_move.world_pos
                 if np.isfinite((point.x, point.y)).all():
-                    self._guide, self._units = OBSERVER, ()
+                    self._guide = OBSERVER
+                    self._units = ()
                     self._point(point.x + self.origin[0], point.y + self.origin[1])
             case "camera_follow_player":
                 if action.camera_follow_player.player_id in self._seats:
-                    self._guide, self._units = action.camera_follow_player.player_id, ()
+                    self._guide = action.camera_follow_player.player_id
+                    self._units = ()
             case "camera_follow_units":
                 self._units = tuple(action.camera_follow_units.unit_tags)
 

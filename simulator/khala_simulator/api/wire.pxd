@@ -11,7 +11,7 @@ cdef int64_t _POINT_SIZE
 
 
 @cython.final
-cdef class Message:
+cdef class MessageWriter:
     cdef object _array
     cdef uint8_t* _bytes
     cdef Py_ssize_t _room
@@ -21,7 +21,7 @@ cdef class Message:
     cpdef int put_number(self, uint32_t key, uint64_t number) except -1
     cpdef int put_float(self, uint32_t key, double number) except -1
     cpdef int put_point(self, uint32_t key, double x, double y, double z) except -1
-    cpdef int put_message(self, uint32_t key, Message message) except -1
+    cpdef int put_message(self, uint32_t key, MessageWriter message) except -1
     cdef void _put_varint(self, uint64_t number) noexcept
     cdef int _reserve(self, Py_ssize_t more) except -1
     cdef _grow(self, Py_ssize_t room)

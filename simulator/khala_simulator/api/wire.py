@@ -6,7 +6,7 @@ copied once, and an image that is all zeros is the same object every time. With 
 copied three times (into the object, into the parent, out again), which costs more than the game itself.
 
 Everything that is small is built with the message classes; this module is for the rest. What has a part for each of
-many units is written by ``Message``, field by field.
+many units is written by ``MessageWriter``, field by field.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def embed(field: int, parts: list[Part]) -> list[Part]:
     return [head(field, sum(map(len, parts))), *parts]
 
 
-class Message:
+class MessageWriter:
     """A message that is being written, its fields in the order of their numbers; ``fields`` has the key of each.
 
     Attributes:
@@ -97,7 +97,7 @@ class Message:
         self.put_float(_Y, y)
         self.put_float(_Z, z)
 
-    def put_message(self, key: int, message: Message) -> None:
+    def put_message(self, key: int, message: MessageWriter) -> None:
         """Write a field that holds a message."""
         self._reserve(_MOST + message.size)
         self._put_varint(key)

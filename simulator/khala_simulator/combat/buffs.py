@@ -34,7 +34,7 @@ def apply(
         loops: How long it lasts, as the catalog says by default; 0 is without an end.
     """
     buff = world.catalog.buff(name)
-    if "spares_frenzied" in buff.flags and frenzied(world, slot):
+    if "spares_frenzied" in buff.flags and is_frenzied(world, slot):
         return
     lasts = buff.loops if loops is None else loops
     end = world.loop + lasts if lasts else FOREVER
@@ -52,7 +52,7 @@ def apply(
     refresh(world, slot)
 
 
-def frenzied(world: World, slot: int) -> bool:
+def is_frenzied(world: World, slot: int) -> bool:
     """Return whether a unit can't be slowed, moved or taken over: an Ultralisk."""
     return world.unit_type(slot).name in FRENZIED
 

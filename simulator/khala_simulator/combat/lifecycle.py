@@ -44,7 +44,8 @@ def become(world: World, slot: int, unit: UnitType) -> None:
 
     Its autocast settings stay where the new type has the ability.
     """
-    old, had_energy = int(world.type[slot]), bool(world.energy_max[slot] > 0.0)
+    old = int(world.type[slot])
+    had_energy = bool(world.energy_max[slot] > 0.0)
     share = float(world.life[slot]), float(world.life_max[slot]) or 1.0
     world.type[slot] = unit.row
     world.burrowed[slot] = unit.burrowed

@@ -83,7 +83,7 @@ def body_traits(world: World, slot: int) -> None:
     if unit.name.startswith(DISGUISE):
         world.can_attack[slot] = world.acquires[slot] = False
     if world.carrier[slot] != NOBODY:
-        _sheltered(world, slot)
+        _shelter(world, slot)
     if world.target[slot] != NOBODY:
         _rearm(world, slot, int(world.target[slot]))
 
@@ -99,7 +99,7 @@ def _rearm(world: World, slot: int, target: int) -> None:
         measure_reach(world, slot)
 
 
-def _sheltered(world: World, slot: int) -> None:
+def _shelter(world: World, slot: int) -> None:
     """Make a unit in a Bunker fire from its edge, one farther; no other passenger fires."""
     carrier = int(world.carrier[slot])
     if world.unit_type(carrier).name == BUNKER:
@@ -156,9 +156,10 @@ def _plain(world: World, slot: int) -> None:
 def _change(world: World, slot: int, buff: Buff) -> None:
     """Apply the numbers of one buff."""
     second = LOOPS_PER_NORMAL_SECOND
-    owner, changed = int(world.owner[slot]), world.stats.changed
-    speed = changed(owner, "behavior", buff.name, "Modification.MoveSpeedMultiplier", buff.speed)
-    gain = changed(owner, "behavior", buff.name, "Modification.AccelerationMultiplier", buff.acceleration)
+    owner = int(world.owner[slot])
+    upgraded = world.stats.with_upgrades
+    speed = upgraded(owner, "behavior", buff.name, "Modification.MoveSpeedMultiplier", buff.speed)
+    gain = upgraded(owner, "behavior", buff.name, "Modification.AccelerationMultiplier", buff.acceleration)
     world.step_max[slot] = (world.step_max[slot] + buff.speed_add_n / second) * speed * buff.time
     if buff.speed_max_n is not None:
         world.step_max[slot] = min(float(world.step_max[slot]), buff.speed_max_n / second)

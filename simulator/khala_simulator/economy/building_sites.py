@@ -14,7 +14,7 @@ import numpy as np
 
 from khala_simulator.combat import fog
 from khala_simulator.economy import power
-from khala_simulator.movement.placement import snapped
+from khala_simulator.movement.placement import snap
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
@@ -42,7 +42,7 @@ def footprint_of(world: World, unit: UnitType) -> UnitFootprint | None:
 def centre(world: World, unit: UnitType, point: Point) -> Point:
     """Return the exact centre of a structure that is requested at a point."""
     footprint = footprint_of(world, unit)
-    return point if footprint is None else snapped(point, footprint.size)
+    return point if footprint is None else snap(point, footprint.size)
 
 
 def refusal(world: World, player: int, unit: UnitType, point: Point, *, on_site: bool = False) -> ActionResult:
@@ -56,7 +56,7 @@ def refusal(world: World, player: int, unit: UnitType, point: Point, *, on_site:
     if footprint.id == CAPS:
         free = geyser_at(world, point)
         return ActionResult.SUCCESS if free != NOBODY else ActionResult.CANT_BUILD_LOCATION_INVALID
-    x, y = snapped(point, footprint.size)
+    x, y = snap(point, footprint.size)
     cells = np.floor([x + 1e-9, y + 1e-9]).astype(np.int64) + np.array(footprint.cells, dtype=np.int64)
     return (
         _of_ground(world, player, footprint, cells)
@@ -92,7 +92,8 @@ def _of_units(world: World, player: int, cells: Ints, *, on_site: bool) -> Actio
 
 def _enemies_on(world: World, player: int, cells: Ints) -> Ints:
     """Return the units of others that stand in the way; own units make room."""
-    low, high = cells.min(axis=0), cells.max(axis=0) + 1
+    low = cells.min(axis=0)
+    high = cells.max(axis=0) + 1
     live = world.live
     others = live[(world.owner[live] != player) & (world.layer_bits[live] != 0) & ~world.walled[live]]
     others = others[world.layer[others] != 2]
@@ -157,7 +158,7 @@ def _of_power(world: World, player: int, unit: UnitType, point: Point) -> Action
     return None
 
 
-def planned(world: World, player: int) -> list[tuple[UnitType, Point]]:
+def planned_structures(world: World, player: int) -> list[tuple[UnitType, Point]]:
     """Return what a player's units are on their way to build, and where, in the order of slots."""
     found: list[tuple[UnitType, Point]] = []
     for slot in world.units_of(player).tolist():

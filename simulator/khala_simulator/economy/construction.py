@@ -54,7 +54,8 @@ def begin(
 
 def finish(world: World, slot: int) -> None:
     """Make a unit complete."""
-    unit, owner = world.unit_type(slot), int(world.owner[slot])
+    unit = world.unit_type(slot)
+    owner = int(world.owner[slot])
     world.build_progress[slot] = 1.0
     world.build_loops[slot] = 0.0
     world.invested.pop(slot, None)
@@ -66,7 +67,8 @@ def finish(world: World, slot: int) -> None:
 
 def call_off(world: World, slot: int) -> None:
     """Take an unfinished structure or unit out of the world; refund a part of its price, and its drone."""
-    owner, unit = int(world.owner[slot]), world.unit_type(slot)
+    owner = int(world.owner[slot])
+    unit = world.unit_type(slot)
     x, y = world.pos[slot].tolist()
     payments.refund(world, owner, world.invested.get(slot, (0.0, 0.0)), payments.CANCELLED)
     world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, NO_KILLER))

@@ -103,7 +103,7 @@ def _nearest(world: World, slot: int, candidates: Ints) -> int:
 # who is where ---------------------------------------------------------------------------------------------------------
 
 
-def assigned(world: World) -> Ints:
+def workers_per_resource(world: World) -> Ints:
     """Return (capacity,) how many workers each resource has, whatever phase they are in."""
     patches = world.patch[(world.harvest > 0) & (world.patch != NOBODY)]
     return np.bincount(patches, minlength=world.capacity)
@@ -115,7 +115,8 @@ def staffing(world: World, player: int) -> dict[int, tuple[int, int]]:
     A town hall counts the workers on the mineral fields around it, and wants two for each.
     """
     takes, fields, halls = kinds(world.catalog)
-    workers, live = assigned(world), world.live
+    workers = workers_per_resource(world)
+    live = world.live
     rows = world.type[live]
     found: dict[int, tuple[int, int]] = {}
     mine = (world.owner[live] == player) & (world.build_progress[live] >= 1.0)
@@ -144,7 +145,7 @@ def another_field(world: World, slot: int, near: Floats, *, waiting: int = NOBOD
     fields = live[near_by]
     if not fields.size:
         return NOBODY
-    workers = assigned(world)[fields].astype(np.float64)
+    workers = workers_per_resource(world)[fields].astype(np.float64)
     if waiting != NOBODY:
         workers[fields == waiting] -= 1.0
     away = world.pos[fields] - world.pos[slot]

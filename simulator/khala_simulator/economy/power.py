@@ -60,7 +60,7 @@ def _source(world: World, slot: int, hasteners: list[int]) -> PoweredArea:
     return PoweredArea(slot, (x, y), max(radius for radius, _ in unit.power), fast)
 
 
-def covered(world: World, source: PoweredArea, points: Floats) -> Bools:
+def covers(world: World, source: PoweredArea, points: Floats) -> Bools:
     """Return (k,) which points (k, 2) lie in a field; a Pylon's does not reach up a cliff."""
     offset = points - np.array(source.point)
     inside: Bools = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= source.radius**2
@@ -73,7 +73,7 @@ def covered(world: World, source: PoweredArea, points: Floats) -> Bools:
 def best(world: World, player: int, point: tuple[float, float]) -> PoweredArea | None:
     """Return the field over a point, a fast one if there is any; None without power."""
     at = np.array([point])
-    found = [source for source in sources(world, player) if covered(world, source, at)[0]]
+    found = [source for source in sources(world, player) if covers(world, source, at)[0]]
     return max(found, key=lambda source: source.fast, default=None)
 
 
@@ -87,7 +87,7 @@ def supply(world: World) -> list[int]:
     for player in np.unique(world.owner[slots]).tolist():
         mine = world.owner[slots] == player
         for source in sources(world, player):
-            powered |= mine & covered(world, source, world.pos[slots])
+            powered |= mine & covers(world, source, world.pos[slots])
     changed: list[int] = slots[powered != world.powered[slots]].tolist()
     world.powered[slots] = powered
     return changed

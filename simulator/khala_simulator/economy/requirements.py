@@ -74,12 +74,12 @@ def _not(world: World, slot: int, need: Need) -> float:
     return float(_count(world, slot, need.parts[0]) <= 0)
 
 
-def _compared(world: World, slot: int, need: Need) -> float:
+def _compare(world: World, slot: int, need: Need) -> float:
     left, right = (_count(world, slot, part) for part in need.parts)
     return float(COMPARE[need.name](left, right))
 
 
-def _allowed(_: World, __: int, ___: Need) -> float:
+def _always(_: World, __: int, ___: Need) -> float:
     """Return the value of the tables' only operation, which is always true in melee games."""
     return 1.0
 
@@ -133,8 +133,8 @@ RULES: Final[dict[str, Callable[[World, int, Need], float]]] = {
     "and": _all,
     "or": _any,
     "not": _not,
-    "cmp": _compared,
-    "op": _allowed,
+    "cmp": _compare,
+    "op": _always,
     "const": _constant,
     "behavior": _buffs,
     "upgrade": _upgrades,

@@ -25,7 +25,7 @@ def _columns(catalog: Catalog) -> tuple[Floats, Floats]:
     return np.array([u.supply for u in catalog.units]), np.array([u.provides for u in catalog.units])
 
 
-def used(world: World, player: int) -> float:
+def in_use(world: World, player: int) -> float:
     """Return the supply that a player's units use, those in transports and in production included."""
     n = world.top
     mine = world.alive[:n] & (world.owner[:n] == player) & ~world.hallucination[:n]
@@ -57,4 +57,4 @@ def has_room(world: World, player: int, amount: float) -> bool:
     """Return whether a player can use so much more supply; always true with the debug state for food."""
     if amount <= 0.0 or "food" in world.players[player].cheats:
         return True
-    return used(world, player) + amount <= cap(world, player)
+    return in_use(world, player) + amount <= cap(world, player)

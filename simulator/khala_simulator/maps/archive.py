@@ -29,7 +29,7 @@ from khala_simulator.maps.terrain_file import TerrainError, TerrainGrids
 from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
-    from khala_simulator.maps.game_map import Terrain
+    from khala_simulator.maps.game_map import MapTerrain
 
 MAGIC: Final = b"MPQ"
 OBJECTS: Final = "Objects"
@@ -74,7 +74,7 @@ def _known(path: str) -> GameMap | None:
 
 
 @lru_cache(maxsize=8)
-def _terrain_of(data: bytes) -> tuple[Terrain, bytes]:
+def _terrain_of(data: bytes) -> tuple[MapTerrain, bytes]:
     """Return the terrain of an archive and a hash of the whole; cached, as many games use the same bytes."""
     archive = _open(data)
     try:
@@ -163,7 +163,8 @@ def _number(text: str) -> float:
 
 def _unit(element: ET.Element, players: int, size: tuple[int, int]) -> dict[str, Any] | None:
     """Return a placed unit in the form of a scenario; None for an unknown type, an absent player, or off the map."""
-    kind, owner = element.get("UnitType", ""), int(element.get("Player", "0"))
+    kind = element.get("UnitType", "")
+    owner = int(element.get("Player", "0"))
     if kind not in load_catalog().row_of_name or not 0 <= owner <= players:
         return None
     x, y = _point(element)

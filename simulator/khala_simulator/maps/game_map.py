@@ -38,7 +38,9 @@ FIRST_CHOICE = "llm_smac"
 FLAT_Z = 10.0
 FLAT_CLIFF = 128
 _PLAIN = re.compile(r"[A-Za-z0-9_]{1,64}")  # names of shipped terrains
-HEIGHT_LOW, HEIGHT_SPAN, HEIGHT_STEPS = -16.0, 32.0, 255
+HEIGHT_LOW = -16.0
+HEIGHT_SPAN = 32.0
+HEIGHT_STEPS = 255
 
 
 class MapError(ValueError):
@@ -46,7 +48,7 @@ class MapError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Terrain:
+class MapTerrain:
     """The unchanging ground: (h, w) grids unless a line says otherwise."""
 
     size: tuple[int, int]  # width, height in cells
@@ -79,7 +81,7 @@ class GameMap:
 
     name: str
     family: str
-    terrain: Terrain
+    terrain: MapTerrain
     scenario: Scenario
     digest: str
 
@@ -165,11 +167,11 @@ def map_from(scenario: Scenario, text: str) -> GameMap:
     if isinstance(scenario.terrain, Flat):
         terrain, content = _flat(scenario.terrain.flat)
     else:
-        terrain, content = _shipped(scenario.terrain)
+        terrain, content = _load_terrain(scenario.terrain)
     return game_map(scenario, terrain, text.encode() + content)
 
 
-def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
+def game_map(scenario: Scenario, terrain: MapTerrain, content: bytes) -> GameMap:
     """Return the map of a scenario on a terrain, which ``content`` defines completely.
 
     Raises:
@@ -179,7 +181,7 @@ def game_map(scenario: Scenario, terrain: Terrain, content: bytes) -> GameMap:
     for field, (x, y, *_) in scenario.stated_points():
         if not (0 <= x <= width and 0 <= y <= height):
             raise MapError(f"{field}: [{x:g}, {y:g}] is not on the map, which has {width} x {height} cells")
-    narrowed = terrain if scenario.playable is None else _narrowed(terrain, scenario.playable)
+    narrowed = terrain if scenario.playable is None else _narrow(terrain, scenario.playable)
     return GameMap(scenario.name, scenario.family, narrowed, scenario, hashlib.sha256(content).hexdigest())
 
 
@@ -191,7 +193,7 @@ def height_bytes(vertices: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 @lru_cache(maxsize=32)
-def _shipped(name: str) -> tuple[Terrain, bytes]:
+def _load_terrain(name: str) -> tuple[MapTerrain, bytes]:
     path = resources.files("khala_simulator.data") / "terrain" / f"{name}.npz"
     if not _PLAIN.fullmatch(name) or not path.is_file():
         raise MapError(f"terrain: no terrain {shown(name)!r} is shipped")
@@ -202,7 +204,7 @@ def _shipped(name: str) -> tuple[Terrain, bytes]:
     content = b"".join(arrays[key].tobytes() for key in sorted(arrays))
     walk = arrays["walk"]
     x0, y0, x1, y1 = (int(v) for v in arrays["playable"])
-    terrain = Terrain(
+    terrain = MapTerrain(
         size=(walk.shape[1], walk.shape[0]),
         playable=(x0, y0, x1, y1),
         walk=walk,
@@ -217,21 +219,21 @@ def _shipped(name: str) -> tuple[Terrain, bytes]:
 
 
 @lru_cache(maxsize=32)
-def _flat(size: tuple[int, int]) -> tuple[Terrain, bytes]:
+def _flat(size: tuple[int, int]) -> tuple[MapTerrain, bytes]:
     """Return level ground that is free everywhere."""
     width, height = size
     free = np.ones((height, width), dtype=np.bool_)
     vertices = np.full((height + 1, width + 1), FLAT_Z, dtype=np.float32)
     cliff = np.full((height, width), FLAT_CLIFF, dtype=np.uint16)
     none = np.zeros_like(free)
-    terrain = Terrain(size, (0, 0, width, height), free, free, free, none, cliff, height_bytes(vertices), vertices)
+    terrain = MapTerrain(size, (0, 0, width, height), free, free, free, none, cliff, height_bytes(vertices), vertices)
     for array in (free, none, vertices, cliff, terrain.height):
         array.setflags(write=False)
     return terrain, repr(size).encode()
 
 
 @lru_cache(maxsize=64)
-def _narrowed(terrain: Terrain, playable: Box) -> Terrain:
+def _narrow(terrain: MapTerrain, playable: Box) -> MapTerrain:
     """Return the terrain with only a part in play; heights cover that part alone, as in the game."""
     x0, y0, x1, y1 = playable
     width, height = terrain.size

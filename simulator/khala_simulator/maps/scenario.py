@@ -40,7 +40,7 @@ MELEE_MINERALS = 50.0
 
 LARGEST_SIDE = 512
 """Cells of the longest side of a map."""
-Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
+OwnSide = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
 Box = Annotated[
     tuple[int, int, int, int], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
 ]
@@ -73,7 +73,7 @@ class Flat(Model):
     """A terrain without a terrain file: level ground of this many cells."""
 
     flat: Annotated[
-        tuple[Side, Side], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+        tuple[OwnSide, OwnSide], BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
     ]
 
 
@@ -125,12 +125,12 @@ class Scenario(Model):
         )
         if self.camera is not None:
             yield "camera", self.camera
-        for field, spec in self._created():
+        for field, spec in self._create_specs():
             if isinstance(spec.at, tuple):
                 for place in spec.at if isinstance(spec.at[0], tuple) else [spec.at]:
                     yield f"{field}.at", place
 
-    def _created(self) -> Iterator[tuple[str, CreateSpec]]:
+    def _create_specs(self) -> Iterator[tuple[str, CreateSpec]]:
         yield from ((f"units[{number}]", spec) for number, spec in enumerate(self.units))
         for name, group in self.groups.items():
             yield from ((f"groups.{name}[{number}]", spec) for number, spec in enumerate(group))
@@ -169,13 +169,13 @@ def names_of(raw: Any) -> Names:
 
     return Names(
         players=frozenset({0, *keys("players")}),
-        points=frozenset(keys("points") | set(_drawn(raw.get("triggers")))),
+        points=frozenset(keys("points") | set(_drawn_points(raw.get("triggers")))),
         regions=frozenset(keys("regions")),
         groups=frozenset(keys("groups")),
     )
 
 
-def _drawn(triggers: Any) -> list[str]:
+def _drawn_points(triggers: Any) -> list[str]:
     """Return the names of the points that triggers draw."""
     found: list[str] = []
     for trigger in triggers if isinstance(triggers, list) else ():

@@ -168,14 +168,15 @@ def _laid_over(base: yaml.MappingNode, own: yaml.MappingNode, field: str = "") -
         if isinstance(value, yaml.MappingNode) and isinstance(own_value, yaml.MappingNode):
             own_value = _laid_over(value, own_value, key.value)
         elif not field and key.value in JOINED and isinstance(own_value, yaml.SequenceNode):
-            own_value = _joined(value, own_value)
+            own_value = _join(value, own_value)
         pairs.append((own_key, own_value))
     return yaml.MappingNode(own.tag, [*pairs, *said.values()], own.start_mark, own.end_mark)
 
 
-def _joined(base: yaml.SequenceNode, own: yaml.SequenceNode) -> yaml.SequenceNode:
+def _join(base: yaml.SequenceNode, own: yaml.SequenceNode) -> yaml.SequenceNode:
     """Return both lists in one; entries of the same name replace the earlier one."""
-    entries, places = list(base.value), {_entry_name(entry): i for i, entry in enumerate(base.value)}
+    entries = list(base.value)
+    places = {_entry_name(entry): i for i, entry in enumerate(base.value)}
     for entry in own.value:
         name = _entry_name(entry)
         if name and name in places:
@@ -194,7 +195,9 @@ def _locate(root: yaml.Node, where: tuple[int | str, ...], *, missing: bool) -> 
 
     Parts that are no key of the text are the validator's own names of alternatives; the last one may be ``missing``.
     """
-    node, mark, field = root, root.start_mark, ""
+    node = root
+    mark = root.start_mark
+    field = ""
     for part in where:
         if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
             node, field = node.value[part], f"{field}[{part}]"

@@ -131,7 +131,7 @@ _COMPARISON = re.compile(r"^(<=|>=|==|<|>)\s*(\d+)$")
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class NumberCondition:
     """A condition on a number: ``6`` or ``"< 6"`` in a file."""
 
     operator: str
@@ -147,14 +147,14 @@ class Comparison:
 
 def _comparison(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool):
-        return Comparison("==", value)
+        return NumberCondition("==", value)
     found = _COMPARISON.match(value) if isinstance(value, str) else None
-    if found is None and not isinstance(value, Comparison):
+    if found is None and not isinstance(value, NumberCondition):
         raise ValueError('give a number, or a comparison such as "< 6"')
-    return value if found is None else Comparison(found[1], int(found[2]))
+    return value if found is None else NumberCondition(found[1], int(found[2]))
 
 
-Asked = Annotated[Comparison, BeforeValidator(_comparison), PlainSerializer(str)]
+Asked = Annotated[NumberCondition, BeforeValidator(_comparison), PlainSerializer(str)]
 
 
 class Condition(Model):
@@ -198,7 +198,7 @@ class Create(Model):
     create: CreateSpec
 
 
-class Spawn(Model):
+class SpawnGroups(Model):
     """Make the units of named groups."""
 
     spawn: tuple[GroupName, ...]
@@ -306,7 +306,7 @@ class EndGame(Model):
 
 Action = Annotated[
     Annotated[Create, Tag("create")]
-    | Annotated[Spawn, Tag("spawn")]
+    | Annotated[SpawnGroups, Tag("spawn")]
     | Annotated[Regroup, Tag("regroup")]
     | Annotated[Remove, Tag("remove")]
     | Annotated[OrderUnits, Tag("order")]

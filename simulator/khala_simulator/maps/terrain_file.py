@@ -1,4 +1,4 @@
-"""The terrain files inside an .SC2Map archive: bytes to grids, and grids to a ``Terrain``.
+"""The terrain files inside an .SC2Map archive: bytes to grids, and grids to a ``MapTerrain``.
 
 Pure functions without any file. The formats are those of the editor's own files (``MapInfo``, ``t3SyncHeightMap``,
 ``t3SyncCliffLevel``, ``t3CellFlags``, ``CellAttribute_*``), as far as they are known; the rest of a file is ignored. No
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from khala_simulator.maps import walkability
-from khala_simulator.maps.game_map import Terrain, height_bytes
+from khala_simulator.maps.game_map import MapTerrain, height_bytes
 from khala_simulator.maps.scenario import LARGEST_SIDE
 
 if TYPE_CHECKING:
@@ -25,9 +25,12 @@ if TYPE_CHECKING:
 
 MAP_INFO_MAGIC: Final = b"IpaM"
 SIZE_AT: Final = 16  # width and height in MapInfo
-HEIGHTS_MAGIC, HEIGHTS_AT = b"SMAP", 64
-CLIFFS_MAGIC, CLIFFS_AT = b"CLIF", 32
-FLAGS_MAGIC, FLAGS_AT = b"LFCT", 32
+HEIGHTS_MAGIC = b"SMAP"
+HEIGHTS_AT = 64
+CLIFFS_MAGIC = b"CLIF"
+CLIFFS_AT = 32
+FLAGS_MAGIC = b"LFCT"
+FLAGS_AT = 32
 ATTRIBUTE_AT: Final = 4
 Z_STEP: Final = 256.0
 SIGNED_FROM: Final = 128.0  # heights from here on are below zero
@@ -114,7 +117,7 @@ def _numbers(data: bytes, magic: bytes, at: int, dtype: str, shape: tuple[int, .
     return np.frombuffer(data, kind, count, at).reshape(shape)
 
 
-def terrain_of(info: MapInfo, ground: TerrainGrids) -> Terrain:
+def terrain_of(info: MapInfo, ground: TerrainGrids) -> MapTerrain:
     """Return the terrain that the files describe."""
     width, height = info.size
     x0, y0, x1, y1 = info.playable
@@ -125,7 +128,7 @@ def terrain_of(info: MapInfo, ground: TerrainGrids) -> Terrain:
     build = walkability.buildable(ground.cliff, walk)
     told = np.where(inside, height_bytes(ground.vertices), 0).astype(np.uint8)
     none = np.zeros_like(walk)
-    terrain = Terrain(info.size, info.playable, walk, glide, build, none, ground.cliff, told, ground.vertices)
+    terrain = MapTerrain(info.size, info.playable, walk, glide, build, none, ground.cliff, told, ground.vertices)
     for grid in (walk, glide, build, none, told):
         grid.setflags(write=False)
     return terrain

@@ -58,10 +58,10 @@ def buildable(cliff: NDArray[np.uint16], walk: Grid) -> Grid:
     ramp = level % LEVEL != 0
     beside = np.zeros_like(ramp)
     for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-        other, is_ramp = _shifted(level, dy, dx), _shifted(ramp, dy, dx)
+        other, is_ramp = _shift(level, dy, dx), _shift(ramp, dy, dx)
         beside |= is_ramp & (other < level)
         if dx == 0 or dy == 0:  # the foot is where a walkable ramp rises straight away from the cell
-            beside |= is_ramp & _shifted(walk, dy, dx) & (level < other) & (other < _shifted(level, 2 * dy, 2 * dx))
+            beside |= is_ramp & _shift(walk, dy, dx) & (level < other) & (other < _shift(level, 2 * dy, 2 * dx))
     free: Grid = walk & ~ramp & ~beside
     return free
 
@@ -76,10 +76,10 @@ def _drop(level: NDArray[np.int64], ramp: Grid, other: NDArray[np.int64]) -> Gri
 
 def _neighbours(level: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
     """Return the levels to the east, west, north and south; beyond the map they continue as at its edge."""
-    return tuple(_shifted(level, dy, dx) for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)))
+    return tuple(_shift(level, dy, dx) for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)))
 
 
-def _shifted(grid: NDArray[Number], dy: int, dx: int) -> NDArray[Number]:
+def _shift(grid: NDArray[Number], dy: int, dx: int) -> NDArray[Number]:
     """Return for each cell the value of the one ``dy`` above and ``dx`` to the right."""
     height, width = grid.shape
     padded = np.pad(grid, FARTHEST, mode="edge")

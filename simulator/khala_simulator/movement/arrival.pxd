@@ -13,7 +13,7 @@ cdef int64_t CROWD_PATIENCE
 cdef int64_t CROWD_STALL
 
 
-cdef class Gathering:
+cdef class ArrivalCrowd:
     cdef object live
     cdef int64_t* slots
     cdef Py_ssize_t units
@@ -21,10 +21,10 @@ cdef class Gathering:
     cdef double area
 
 
-cdef bint packed(Columns c, Gathering crowd, int64_t slot) except -1
+cdef bint is_packed(Columns c, ArrivalCrowd crowd, int64_t slot) except -1
 @cython.locals(area=double, enough=double, i=Py_ssize_t, other=int64_t)
-cdef bint _is_filled(Columns c, Gathering crowd, int64_t slot, double squared) except -1
-cdef bint _fills(Columns c, Gathering crowd, int64_t slot, double squared, double area) except -1
+cdef bint _is_filled(Columns c, ArrivalCrowd crowd, int64_t slot, double squared) except -1
+cdef bint _fills(Columns c, ArrivalCrowd crowd, int64_t slot, double squared, double area) except -1
 cdef bint _is_inside(Columns c, int64_t slot, int64_t other, double squared) noexcept
 @cython.locals(i=Py_ssize_t, other=int64_t, is_inside=bint)
-cdef double _area(Columns c, Gathering crowd, int64_t slot, double squared) except -1.0
+cdef double _area(Columns c, ArrivalCrowd crowd, int64_t slot, double squared) except -1.0

@@ -23,7 +23,7 @@ CROWD_PATIENCE: Final = MECHANICS.crowd_patience
 CROWD_STALL: Final = MECHANICS.crowd_stall
 
 
-class Gathering:
+class ArrivalCrowd:
     """The bodies in the world at one loop."""
 
     def __init__(self, world: World) -> None:
@@ -38,7 +38,7 @@ class Gathering:
             self.area += c.separation[slot] * c.separation[slot]
 
 
-def packed(c: Columns, crowd: Gathering, slot: int) -> bool:
+def is_packed(c: Columns, crowd: ArrivalCrowd, slot: int) -> bool:
     """Return whether a walker has come as near to its goal as the crowd allows.
 
     That is when it stands before others close to the goal, when friends fill the ground between it and the goal, or
@@ -57,7 +57,7 @@ def packed(c: Columns, crowd: Gathering, slot: int) -> bool:
     return c.blocked[slot] >= BLOCKED_LOOPS and _is_filled(c, crowd, slot, squared)
 
 
-def _is_filled(c: Columns, crowd: Gathering, slot: int, squared: float) -> bool:
+def _is_filled(c: Columns, crowd: ArrivalCrowd, slot: int, squared: float) -> bool:
     """Return whether friends fill the ground between a walker and its goal."""
     area = 0.0
     enough = CROWD_SHARE * squared * (1.0 + ROUNDING)
@@ -70,7 +70,7 @@ def _is_filled(c: Columns, crowd: Gathering, slot: int, squared: float) -> bool:
     return _fills(c, crowd, slot, squared, area)
 
 
-def _fills(c: Columns, crowd: Gathering, slot: int, squared: float, area: float) -> bool:
+def _fills(c: Columns, crowd: ArrivalCrowd, slot: int, squared: float, area: float) -> bool:
     """Return whether an area is as large as it must be at a distance; where the order of its sum matters, measure."""
     wanted = CROWD_SHARE * squared
     if abs(area - wanted) > wanted * ROUNDING:
@@ -90,7 +90,7 @@ def _is_inside(c: Columns, slot: int, other: int, squared: float) -> bool:
     )
 
 
-def _area(c: Columns, crowd: Gathering, slot: int, squared: float) -> float:
+def _area(c: Columns, crowd: ArrivalCrowd, slot: int, squared: float) -> float:
     """Return the area of the bodies between a walker and its goal, or of all bodies for NOBODY, summed in pairs."""
     areas = memory.new_floats(crowd.units)
     cells = memory.floats(areas)

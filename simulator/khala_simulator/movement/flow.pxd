@@ -2,7 +2,7 @@ cimport cython
 from libc cimport math
 from libc.stdint cimport int64_t, uint8_t
 
-from khala_simulator.movement.grids cimport Grid
+from khala_simulator.movement.grids cimport SurfaceGrid
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport Point
 
@@ -46,9 +46,9 @@ cdef class Flow:
 
     @cython.locals(first=Walker, walker=Walker, low=Point, high=Point, x0=int64_t, y0=int64_t, x1=int64_t,
                    y1=int64_t, size=int64_t)
-    cdef cover(self, Grid grid, list walkers)
+    cdef cover(self, SurfaceGrid grid, list walkers)
     @cython.locals(x=int64_t, y=int64_t, row=int64_t, line=int64_t)
-    cdef void lay_ground(self, Grid grid, int64_t x0, int64_t y0) noexcept
+    cdef void lay_ground(self, SurfaceGrid grid, int64_t x0, int64_t y0) noexcept
     cdef void stand(self, Point at, double apart) noexcept
     cdef void reach(self, Point at, double within) noexcept
     @cython.locals(middle_x=double, middle_y=double, half=int64_t, column=int64_t, row=int64_t, i=int64_t, j=int64_t,
@@ -70,7 +70,7 @@ cdef class Flow:
     cdef Point look_ahead(self, Walker walker) noexcept
 
 
-cdef Flow flow_around(Grid grid, list walkers)
+cdef Flow flow_around(SurfaceGrid grid, list walkers)
 @cython.locals(walker=Walker, rival=Walker, settled=int64_t)
 cdef int64_t _settle(list walkers, double width) except -1
 cdef bint _are_near(Walker walker, Walker rival, double width) noexcept

@@ -15,7 +15,7 @@ from khala_simulator.native import memory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.grids import SurfaceGrid
 
 FINE: Final = 4  # cells of the grid in a cell of the ground, on each axis
 MARGIN: Final = 4.0  # how far beyond the crowd its ways may lead; no hop leads out of the grid
@@ -67,7 +67,7 @@ def walker_of(slot: int, at: memory.Point, goal: memory.Point) -> Walker:
 class Flow:
     """A grid around walkers; ``stand`` and ``reach`` say what is on it, ``find`` finds the ways."""
 
-    def cover(self, grid: Grid, walkers: list[Walker]) -> None:
+    def cover(self, grid: SurfaceGrid, walkers: list[Walker]) -> None:
         """Lay the grid around walkers, with nothing on it yet."""
         first: Walker = walkers[0]
         low = first.at
@@ -96,7 +96,7 @@ class Flow:
         self.end = 0  # of the cells that were reached
         self.lay_ground(grid, x0, y0)
 
-    def lay_ground(self, grid: Grid, x0: int, y0: int) -> None:
+    def lay_ground(self, grid: SurfaceGrid, x0: int, y0: int) -> None:
         """Free the cells on free ground, but none at the edge, so that no step leads round it.
 
         Args:
@@ -272,7 +272,7 @@ class Flow:
         return memory.point((x + 0.5) / FINE + self.low.x, (y + 0.5) / FINE + self.low.y)
 
 
-def flow_around(grid: Grid, walkers: list[Walker]) -> Flow:
+def flow_around(grid: SurfaceGrid, walkers: list[Walker]) -> Flow:
     """Return a grid around walkers, with nothing on it yet."""
     flow = Flow()
     flow.cover(grid, walkers)

@@ -10,7 +10,7 @@ cdef double SAMPLE_STEP
 
 
 @cython.final
-cdef class Grid:
+cdef class SurfaceGrid:
     cdef readonly object surface
     cdef Py_ssize_t fields_kept
     cdef dict fields
@@ -39,15 +39,15 @@ cdef class Lines:
     cdef void add(self, Point start, Point end) noexcept
 
 
-cpdef Grid read(object surface)
-cdef Grid grid_of(object ground, int64_t layer)
+cpdef SurfaceGrid read(object surface)
+cdef SurfaceGrid grid_of(object ground, int64_t layer)
 @cython.locals(column=int64_t, row=int64_t)
-cdef int64_t cell_at(Grid grid, double x, double y) noexcept
-cdef Point centre_of(Grid grid, int64_t cell) noexcept
+cdef int64_t cell_at(SurfaceGrid grid, double x, double y) noexcept
+cdef Point centre_of(SurfaceGrid grid, int64_t cell) noexcept
 @cython.locals(i=Py_ssize_t, start=Point, end=Point, longest=double, samples=int64_t)
-cdef void clear(Grid grid, Lines lines) noexcept
+cdef void clear(SurfaceGrid grid, Lines lines) noexcept
 @cython.locals(left=int64_t, low=int64_t, right=int64_t, high=int64_t)
-cdef bint _box_is_free(Grid grid, Point start, Point end) noexcept
+cdef bint _box_is_free(SurfaceGrid grid, Point start, Point end) noexcept
 cdef int64_t _floor(double x) noexcept
 @cython.locals(i=int64_t, share=double)
-cdef bint _sides_are_free(Grid grid, Point start, Point end, int64_t samples) noexcept
+cdef bint _sides_are_free(SurfaceGrid grid, Point start, Point end, int64_t samples) noexcept

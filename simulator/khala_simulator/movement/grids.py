@@ -16,13 +16,13 @@ from khala_simulator.tables.layers import Layer
 
 if TYPE_CHECKING:
     from khala_simulator.movement.pathfinding import Surface
-    from khala_simulator.world.ground import Ground
+    from khala_simulator.world.ground import BuiltGround
 
 SIDE_CLEARANCE: Final = 0.3
 SAMPLE_STEP: Final = 0.35
 
 
-class Grid:
+class SurfaceGrid:
     """The cells of one surface, row by row; they never change.
 
     Attributes:
@@ -61,15 +61,15 @@ class Grid:
         return type(None), ()
 
 
-def read(surface: Surface) -> Grid:
+def read(surface: Surface) -> SurfaceGrid:
     """Return the grid of a surface."""
     if surface.grid is None:
-        surface.grid = Grid(surface)
-    grid: Grid = surface.grid  # type: ignore[assignment]  # a surface does not know its grid
+        surface.grid = SurfaceGrid(surface)
+    grid: SurfaceGrid = surface.grid  # type: ignore[assignment]  # a surface does not know its grid
     return grid
 
 
-def grid_of(ground: Ground, layer: int) -> Grid:
+def grid_of(ground: BuiltGround, layer: int) -> SurfaceGrid:
     """Return the grid that units of a layer move on now."""
     grid = ground.grids[layer]
     if grid is None:
@@ -78,7 +78,7 @@ def grid_of(ground: Ground, layer: int) -> Grid:
     return grid  # type: ignore[return-value]  # the ground does not know its grids
 
 
-def cell_at(grid: Grid, x: float, y: float) -> int:
+def cell_at(grid: SurfaceGrid, x: float, y: float) -> int:
     """Return the cell under a point; a point outside counts as the nearest cell inside."""
     column = int(x + grid.shift)
     row = int(y + grid.shift)
@@ -87,7 +87,7 @@ def cell_at(grid: Grid, x: float, y: float) -> int:
     return row * grid.width + column
 
 
-def centre_of(grid: Grid, cell: int) -> memory.Point:
+def centre_of(grid: SurfaceGrid, cell: int) -> memory.Point:
     """Return the centre of a cell."""
     row = cell // grid.width
     return memory.point(cell - row * grid.width + (0.5 - grid.shift), row + (0.5 - grid.shift))
@@ -118,7 +118,7 @@ class Lines:
         self.count += 1
 
 
-def clear(grid: Grid, lines: Lines) -> None:
+def clear(grid: SurfaceGrid, lines: Lines) -> None:
     """Write which of the lines are free; all that are not obviously so are sampled as finely as the longest needs."""
     longest = -1.0
     for i in range(lines.count):
@@ -135,7 +135,7 @@ def clear(grid: Grid, lines: Lines) -> None:
             lines.free[i] = _sides_are_free(grid, lines.ends[2 * i], lines.ends[2 * i + 1], samples)
 
 
-def _box_is_free(grid: Grid, start: memory.Point, end: memory.Point) -> bool:
+def _box_is_free(grid: SurfaceGrid, start: memory.Point, end: memory.Point) -> bool:
     """Return whether all cells of the box around a line are free."""
     inward = grid.shift - SIDE_CLEARANCE
     outward = grid.shift + SIDE_CLEARANCE
@@ -155,7 +155,7 @@ def _floor(x: float) -> int:
     return int(math.floor(x))
 
 
-def _sides_are_free(grid: Grid, start: memory.Point, end: memory.Point, samples: int) -> bool:
+def _sides_are_free(grid: SurfaceGrid, start: memory.Point, end: memory.Point, samples: int) -> bool:
     """Return whether both sides of a line are free at so many places along it."""
     x = end.x - start.x
     y = end.y - start.y

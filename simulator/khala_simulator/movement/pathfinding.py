@@ -1,8 +1,8 @@
 """Pathfinding: free cells and connected parts of a terrain with its structures.
 
 A ``Surface`` is one grid of free cells that never changes, so what was found on it is remembered, across games too.
-``surface`` finds the one that holds now on a game's ``Ground``, whose structures come and go; ``grids`` has its cells
-for the rules, ``ways`` the shortest ways over them. Positions are world units, cells are flat indices
+``surface`` finds the one that holds now on a game's ``BuiltGround``, whose structures come and go; ``grids`` has its
+cells for the rules, ``ways`` the shortest ways over them. Positions are world units, cells are flat indices
 ``y * width + x``; a unit is a point here; ``systems.collision`` has its body.
 """
 
@@ -19,9 +19,9 @@ from khala_simulator.numeric.arrays import which
 from khala_simulator.tables.layers import Layer
 
 if TYPE_CHECKING:
-    from khala_simulator.maps.game_map import Grid, Terrain
+    from khala_simulator.maps.game_map import Grid, MapTerrain
     from khala_simulator.numeric.geometry import Floats
-    from khala_simulator.world.ground import Ground
+    from khala_simulator.world.ground import BuiltGround
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -173,8 +173,8 @@ def connected_parts(free: Grid) -> Ints:
             above += 1
         touching = above
         while runs[touching][0] == row - 1 and runs[touching][1] < end:
-            one, other = sorted((find(run), find(touching)))
-            root[other] = one
+            first, later = sorted((find(run), find(touching)))
+            root[later] = first
             touching += 1
     numbers = {first: number for number, first in enumerate(sorted({find(run) for run in range(len(runs))}))}
     parts = np.full((height, width), -1, dtype=np.int64)
@@ -184,12 +184,12 @@ def connected_parts(free: Grid) -> Ints:
 
 
 @lru_cache(maxsize=64)
-def _bare_surface(terrain: Terrain, layer: Layer) -> Surface:
+def _bare_surface(terrain: MapTerrain, layer: Layer) -> Surface:
     """Return the surface of a terrain without structures, shared by all games on it."""
     return _surface(_layer_grid(terrain, layer), layer)
 
 
-def _layer_grid(terrain: Terrain, layer: Layer) -> Grid:
+def _layer_grid(terrain: MapTerrain, layer: Layer) -> Grid:
     if layer is Layer.AIR:
         grid = np.zeros_like(terrain.walk)
         x0, y0, x1, y1 = terrain.playable
@@ -207,7 +207,7 @@ def _surface(free: Grid, layer: Layer) -> Surface:
     return Surface(corners, shift=0.5)
 
 
-def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surface:
+def surface(ground: BuiltGround, layer: Layer, without: tuple[int, ...] = ()) -> Surface:
     """Return the surface that units of a layer move on now, as if some structures (slots) were not there."""
     found = ground.surfaces.get((layer, without))
     if not isinstance(found, Surface):
@@ -217,5 +217,5 @@ def surface(ground: Ground, layer: Layer, without: tuple[int, ...] = ()) -> Surf
     return found
 
 
-def _free_now(ground: Ground, layer: Layer, without: tuple[int, ...]) -> Grid:
+def _free_now(ground: BuiltGround, layer: Layer, without: tuple[int, ...]) -> Grid:
     return ground.with_structures(_layer_grid(ground.terrain, layer), without)

@@ -35,7 +35,7 @@ def free_places(world: World, unit: UnitType, point: tuple[float, float], count:
     """
     footprint = world.catalog.footprints.get(unit.footprint)
     if footprint is not None and footprint.cells:
-        return [snapped(point, footprint.size)] * count
+        return [snap(point, footprint.size)] * count
     places: list[tuple[float, float]] = []
     for radius in SEARCH_RADII:
         places = _places_within(world, unit, point, count, radius)
@@ -76,7 +76,7 @@ def candidates(
     return free
 
 
-def snapped(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
+def snap(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
     """Return the centre nearest to ``point`` at which a footprint of ``size`` cells lies on the grid."""
     x, y = (round(v - s / 2.0) + s / 2.0 for v, s in zip(point, size, strict=True))
     return x, y

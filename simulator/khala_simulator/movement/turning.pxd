@@ -1,4 +1,4 @@
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport Point
 
-cdef Point turned(Point now, Point wanted, double cosine, double sine) noexcept
+cdef Point turn(Point now, Point wanted, double cosine, double sine) noexcept

@@ -5,7 +5,7 @@ from __future__ import annotations
 from khala_simulator.native import memory
 
 
-def turned(now: memory.Point, wanted: memory.Point, cosine: float, sine: float) -> memory.Point:
+def turn(now: memory.Point, wanted: memory.Point, cosine: float, sine: float) -> memory.Point:
     """Return a direction after a turn towards another one by at most the angle of this cosine and sine.
 
     What is within the angle is reached exactly; straight backwards turns left. A wanted vector of length zero turns

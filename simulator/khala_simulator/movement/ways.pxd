@@ -2,7 +2,7 @@ cimport cython
 from libc.stdint cimport int64_t
 
 from khala_simulator.movement cimport grids
-from khala_simulator.movement.grids cimport Grid, Lines
+from khala_simulator.movement.grids cimport SurfaceGrid, Lines
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport Point, boolean
 
@@ -27,11 +27,11 @@ cdef class Way:
 
 cdef Way way_from(int64_t walker, Point start, int64_t goal)
 @cython.locals(field=Field, way=Way, lines=Lines, i=Py_ssize_t)
-cdef find_corners(Grid grid, list ways)
-cdef Point corner_of(Grid grid, Way way)
-@cython.locals(grid=Grid, line=Lines, field=Field, here=int64_t, there=int64_t)
+cdef find_corners(SurfaceGrid grid, list ways)
+cdef Point corner_of(SurfaceGrid grid, Way way)
+@cython.locals(grid=SurfaceGrid, line=Lines, field=Field, here=int64_t, there=int64_t)
 cpdef double distance(object surface, object start, object goal) except -1.0
-cdef Field _field_to(Grid grid, int64_t goal)
+cdef Field _field_to(SurfaceGrid grid, int64_t goal)
 
 
 @cython.final
@@ -43,9 +43,9 @@ cdef class Field:
     cdef boolean* settled
     cdef _Heap heap
     @cython.locals(cell=int64_t, at=int64_t, i=Py_ssize_t)
-    cdef follow(self, Grid grid, Way way)
+    cdef follow(self, SurfaceGrid grid, Way way)
     @cython.locals(cell=int64_t, i=Py_ssize_t)
-    cdef reach(self, Grid grid, int64_t wanted)
+    cdef reach(self, SurfaceGrid grid, int64_t wanted)
 
 
 @cython.final

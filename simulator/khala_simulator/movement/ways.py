@@ -16,7 +16,7 @@ from khala_simulator.movement.pathfinding import NEIGHBOURS
 from khala_simulator.native import memory
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.grids import SurfaceGrid
     from khala_simulator.movement.pathfinding import Surface
     from khala_simulator.numeric.geometry import Floats
 
@@ -60,7 +60,7 @@ def way_from(walker: int, start: memory.Point, goal: int) -> Way:
     return way
 
 
-def find_corners(grid: Grid, ways: list[Way]) -> None:
+def find_corners(grid: SurfaceGrid, ways: list[Way]) -> None:
     """Find how far ahead on its way each walker gets straight, by halving.
 
     A walker that can't reach one place straight is assumed not to reach a later one.
@@ -90,7 +90,7 @@ def find_corners(grid: Grid, ways: list[Way]) -> None:
         unsure = [way for way in unsure if way.near < way.far]
 
 
-def corner_of(grid: Grid, way: Way) -> memory.Point:
+def corner_of(grid: SurfaceGrid, way: Way) -> memory.Point:
     """Return the farthest place on a way that its walker gets to straight, at least the next cell."""
     return grids.centre_of(grid, way.ahead[way.near])
 
@@ -112,7 +112,7 @@ def distance(surface: Surface, start: Floats, goal: Floats) -> float:
     return field.distance[here]
 
 
-def _field_to(grid: Grid, goal: int) -> Field:
+def _field_to(grid: SurfaceGrid, goal: int) -> Field:
     """Return the ways to a goal."""
     field = grid.fields.get(goal)
     if field is None:
@@ -143,7 +143,7 @@ class Field:
         self.distance[self.goal] = 0.0
         self.heap.push(0.0, self.goal)
 
-    def follow(self, grid: Grid, way: Way) -> None:
+    def follow(self, grid: SurfaceGrid, way: Way) -> None:
         """Write the cells that are ahead on a way."""
         cell = grids.cell_at(grid, way.start.x, way.start.y)
         if not self.settled[cell]:
@@ -155,7 +155,7 @@ class Field:
                 at += 1
             way.ahead[i] = cell
 
-    def reach(self, grid: Grid, wanted: int) -> None:
+    def reach(self, grid: SurfaceGrid, wanted: int) -> None:
         """Go on until a cell is settled or nothing is left to settle."""
         heap = self.heap
         while heap.size and not self.settled[wanted]:

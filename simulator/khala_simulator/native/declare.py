@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from khala_simulator.world.columns import COLUMNS, Column
+from khala_simulator.world.columns import COLUMNS, ColumnSpec
 
 HERE: Final = Path(__file__).parent
 C_TYPES: Final = {np.bool_: "boolean", np.int64: "int64_t", np.float64: "double"}
@@ -82,12 +82,12 @@ cdef Columns bind(object world):
 '''
 
 
-def c_type(column: Column) -> str:
+def c_type(column: ColumnSpec) -> str:
     """Return the type of a column's rows in C."""
     return "Point" if column.width else C_TYPES[column.dtype]
 
 
-def declared() -> dict[str, str]:
+def declarations() -> dict[str, str]:
     """Return the text of every file that follows from the columns."""
     types = {name: c_type(column) for name, column in COLUMNS.items()}
     pointers = "\n".join(f"    cdef {kind}* {name}" for name, kind in types.items())
@@ -104,7 +104,7 @@ def declared() -> dict[str, str]:
 
 def write() -> None:
     """Write the files that are missing or stale."""
-    for name, text in declared().items():
+    for name, text in declarations().items():
         file = HERE / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")

@@ -26,7 +26,7 @@ PACKAGE: Final = __name__.partition(".")[0]
 ROOT: Final = Path(__file__).parent.parent
 
 
-def wanted() -> str:
+def request() -> str:
     """Return which engine the environment asks for; raise ``ValueError`` if that is none."""
     engine = os.environ.get(VARIABLE) or "auto"
     if engine not in ENGINES:
@@ -58,9 +58,9 @@ def check() -> None:
         ValueError: the environment asks for an engine that does not exist.
         ImportError: it asks for the compiled one, which was not built; or a rule was changed since it was compiled.
     """
-    if wanted() == "python":
+    if request() == "python":
         return
-    if wanted() == "compiled" and engine() == "python":
+    if request() == "compiled" and engine() == "python":
         raise ImportError(f"{VARIABLE}=compiled, but the rules were not compiled: install with a C compiler")
     if (rule := changed_rule()) is not None:
         raise ImportError(f"{rule} was changed since it was compiled: say make install, or {VARIABLE}=python")

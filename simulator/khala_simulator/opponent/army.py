@@ -10,10 +10,10 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
 
 
-def lead(side: Side, enemy: Enemy) -> None:
+def lead(side: OwnSide, enemy: Enemy) -> None:
     """Give the army its orders for this thought."""
     army = [slot for slot in side.army if side.world.can_act[slot] and side.world.carrier[slot] == NOBODY]
     threat = defence.watch(side, enemy)
@@ -27,11 +27,11 @@ def lead(side: Side, enemy: Enemy) -> None:
         attack.set_out(side, enemy)
 
 
-def _garrison(side: Side, army: list[int]) -> None:
+def _garrison(side: OwnSide, army: list[int]) -> None:
     """Send Marines into Bunkers with room."""
     world = side.world
     marines = [s for s in army if world.unit_type(s).name == "Marine" and stance.idle(side, s)]
-    for bunker in side.named("Bunker"):
+    for bunker in side.of_type("Bunker"):
         room = world.unit_type(bunker).cargo_space - len(world.passengers(bunker))
         marines.sort(key=lambda s: (math.dist(side.place(s), side.place(bunker)), s))
         if room > 0 and marines and hands.smart(side, marines[:room], world.tag_of(bunker)):

@@ -17,7 +17,7 @@ from khala_simulator.world.orders import OrderKind
 if TYPE_CHECKING:
     from khala_simulator.maps.game_map import GameMap
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
 
 FIGHT: Final = 14.0
@@ -45,7 +45,7 @@ SEARCH_STEP: Final = 12
 """With all bases empty, points so far apart all over the map are looked at, each for so many seconds at most."""
 
 
-def set_out(side: Side, enemy: Enemy) -> None:
+def set_out(side: OwnSide, enemy: Enemy) -> None:
     """Begin an attack when its time has come and the army is large enough.
 
     A level that adapts waits while it knows of a stronger army, and goes early against one that has just lost a battle
@@ -59,18 +59,19 @@ def set_out(side: Side, enemy: Enemy) -> None:
     on_time = side.clock_s >= first.from_s and own >= max(enough, known)
     easy = (side.level.vision or _won(side)) and own >= max(LEAST_EASY, EASY * known)
     if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
-        mind.attacking, mind.searched_since = True, side.world.loop
+        mind.attacking = True
+        mind.searched_since = side.world.loop
         mind.wave_value = value(side.world, side.army)
 
 
-def _won(side: Side) -> bool:
+def _won(side: OwnSide) -> bool:
     """Return whether an attack on the own bases that was worth something has just been repelled."""
     when, worth = side.mind.repelled
     recent = when >= 0 and side.world.loop - when < COUNTER_S * FASTER_LOOPS
     return recent and "adapt" in side.level.skills and worth > BATTLE * value(side.world, side.army)
 
 
-def go_on(side: Side, enemy: Enemy, army: list[int]) -> None:
+def go_on(side: OwnSide, enemy: Enemy, army: list[int]) -> None:
     """Lead the attack: go on, wait for the others, or retreat."""
     world, mind = side.world, side.mind
     goal = _goal(side, enemy, army)
@@ -95,7 +96,7 @@ def go_on(side: Side, enemy: Enemy, army: list[int]) -> None:
         hands.attack(side, idle, goal)
 
 
-def _too_strong(side: Side, enemy: Enemy, there: list[int]) -> bool:
+def _too_strong(side: OwnSide, enemy: Enemy, there: list[int]) -> bool:
     """Return whether the enemies near the attackers are too strong for them."""
     world = side.world
     fighting = [s for s in there if world.target[s] != NOBODY]
@@ -107,7 +108,7 @@ def _too_strong(side: Side, enemy: Enemy, there: list[int]) -> bool:
     return value(world, near) < side.level.retreat * value(world, foes)
 
 
-def _goal(side: Side, enemy: Enemy, army: list[int]) -> Point:
+def _goal(side: OwnSide, enemy: Enemy, army: list[int]) -> Point:
     """Return what to attack: the nearest enemy structure that is known, else where one may be."""
     world, mind = side.world, side.mind
     known = enemy.places()
@@ -135,7 +136,7 @@ def _everywhere(game_map: GameMap) -> tuple[Point, ...]:
     return tuple(sorted(points, key=lambda p: (p[1], p[0] if p[1] // SEARCH_STEP % 2 else -p[0])))
 
 
-def _support(side: Side, there: list[int]) -> list[int]:
+def _support(side: OwnSide, there: list[int]) -> list[int]:
     """Keep units without a weapon with the others; return those that fight."""
     world = side.world
     unarmed = [s for s in there if world.ground_weapon[s] < 0 and world.air_weapon[s] < 0 and not world.channels[s]]
@@ -151,7 +152,7 @@ def _support(side: Side, there: list[int]) -> list[int]:
     return armed
 
 
-def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point) -> set[int]:
+def _ahead_of_the_others(side: OwnSide, enemy: Enemy, there: list[int], goal: Point) -> set[int]:
     """Stop the head of a long column until the others are near; return it."""
     world = side.world
     if len(there) < 4 or any(world.target[s] != NOBODY for s in there):
@@ -168,7 +169,7 @@ def _ahead_of_the_others(side: Side, enemy: Enemy, there: list[int], goal: Point
     return set(ahead)
 
 
-def _waits(side: Side, slot: int, home: Point, goal: Point) -> bool:
+def _waits(side: OwnSide, slot: int, home: Point, goal: Point) -> bool:
     """Return whether a unit has not set out yet: it does nothing, nearer to home than to the goal, or gathers."""
     at = side.place(slot)
     if stance.bound_for(side, slot, home, 2.0):

@@ -13,14 +13,14 @@ import numpy as np
 
 from khala_simulator.economy import building_sites, harvesting
 from khala_simulator.movement import pathfinding, ways
-from khala_simulator.movement.placement import snapped
+from khala_simulator.movement.placement import snap
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Floats
@@ -90,7 +90,7 @@ def _site(world: World, player: int, hall: UnitType, group: Floats, starts: list
     if start is not None:
         return start
     steps = range(-REACH, REACH + 1)
-    at = np.array([snapped((float(middle[0]) + dx, float(middle[1]) + dy), (5, 5)) for dx in steps for dy in steps])
+    at = np.array([snap((float(middle[0]) + dx, float(middle[1]) + dy), (5, 5)) for dx in steps for dy in steps])
     away = np.hypot(at[:, None, 0] - group[:, 0], at[:, None, 1] - group[:, 1])
     at, away = at[away.min(axis=1) >= APART], away[away.min(axis=1) >= APART].sum(axis=1)
     order = np.lexsort((at[:, 0], at[:, 1], np.round(away, 6)))
@@ -101,7 +101,7 @@ def _site(world: World, player: int, hall: UnitType, group: Floats, starts: list
 # the next one ---------------------------------------------------------------------------------------------------------
 
 
-def next_place(side: Side, enemy: Enemy) -> Point | None:
+def next_place(side: OwnSide, enemy: Enemy) -> Point | None:
     """Return the nearest base that nobody has and still has minerals; on the enemy's half as a last resort."""
     world = side.world
     halls = [s for s in side.slots.tolist() if harvesting.kinds(world.catalog)[2][world.type[s]]]
@@ -126,7 +126,7 @@ def fields_near(world: World, place: Point) -> list[int]:
     return near
 
 
-def front(side: Side) -> Point:
+def front(side: OwnSide) -> Point:
     """Return the own town hall that is nearest to the enemy's start, or the own start without any."""
     halls = [side.place(hall) for hall in side.halls]
     return min(halls, key=lambda p: (math.dist(p, side.mind.enemy_start), p), default=side.mind.bases[0])

@@ -11,7 +11,7 @@ from khala_simulator.tables.action_result import ActionResult
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
 
 INJECT: Final = 251
 MULE: Final = 171
@@ -19,17 +19,18 @@ CHRONO: Final = 3755
 NEAR: Final = 9.0
 
 
-def boost(side: Side) -> None:
+def boost(side: OwnSide) -> None:
     """Use what the race has to make the economy faster."""
     if "boosts" in side.level.skills:
         BOOSTS[side.owner.race](side)
 
 
-def _inject(side: Side) -> None:
+def _inject(side: OwnSide) -> None:
     """Make each Queen with the energy spit larvae on the nearest town hall that has none waiting."""
-    world, ability = side.world, side.world.catalog.ability(INJECT)
+    world = side.world
+    ability = world.catalog.ability(INJECT)
     injected = set(world.buffs.rows["slot"].tolist()) if len(world.buffs) else set()
-    queens = [q for q in side.named("Queen") if world.energy[q] >= ability.energy and not world.casts[q]]
+    queens = [q for q in side.of_type("Queen") if world.energy[q] >= ability.energy and not world.casts[q]]
     for hall in side.halls:
         if not queens or hall in injected:
             continue
@@ -39,10 +40,11 @@ def _inject(side: Side) -> None:
             queens.remove(queen)
 
 
-def _mule(side: Side) -> None:
+def _mule(side: OwnSide) -> None:
     """Call a MULE down on a field of a base from every Orbital Command with the energy."""
-    world, ability = side.world, side.world.catalog.ability(MULE)
-    for orbital in side.named("OrbitalCommand"):
+    world = side.world
+    ability = world.catalog.ability(MULE)
+    for orbital in side.of_type("OrbitalCommand"):
         if world.energy[orbital] < ability.energy:
             continue
         fields = [f for hall in side.halls for f in bases.fields_near(world, side.place(hall))]
@@ -51,10 +53,11 @@ def _mule(side: Side) -> None:
             hands.use(side, [orbital], ability, target=world.tag_of(fullest))
 
 
-def _chrono(side: Side) -> None:
+def _chrono(side: OwnSide) -> None:
     """Speed up what is busy: research first, then whatever the producers make, then workers."""
-    world, ability = side.world, side.world.catalog.ability(CHRONO)
-    for nexus in side.named("Nexus"):
+    world = side.world
+    ability = world.catalog.ability(CHRONO)
+    for nexus in side.of_type("Nexus"):
         if casting.refusal(world, nexus, ability) is not ActionResult.SUCCESS:
             continue
         boosted = set(world.buffs.rows["slot"].tolist()) if len(world.buffs) else set()
@@ -65,4 +68,4 @@ def _chrono(side: Side) -> None:
         hands.use(side, [nexus], ability, target=world.tag_of(target))
 
 
-BOOSTS: Final[dict[str, Callable[[Side], None]]] = {"zerg": _inject, "terran": _mule, "protoss": _chrono}
+BOOSTS: Final[dict[str, Callable[[OwnSide], None]]] = {"zerg": _inject, "terran": _mule, "protoss": _chrono}

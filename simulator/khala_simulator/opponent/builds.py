@@ -23,14 +23,14 @@ class Data(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Step(NamedTuple):
+class OpeningStep(NamedTuple):
     """One step of an opening: with so much supply in use, make this."""
 
     supply: float
     what: str
 
 
-class Stage(Data):
+class BuildStage(Data):
     """What is wanted from a time on; what earlier stages wanted stays wanted, except the army and the workers.
 
     ``army`` has shares, ``units`` numbers of single units, ``gas`` is the number of gas structures. ``workers`` is a
@@ -54,7 +54,7 @@ class Attack(Data):
     supply: float
 
 
-class Guard(NamedTuple):
+class ArmyGuard(NamedTuple):
     """Below how much army supply the army comes first: m minutes after ``from_s`` it is growth * m * (m + 1)."""
 
     from_s: float
@@ -66,17 +66,17 @@ class Guard(NamedTuple):
         return self.growth * minutes * (minutes + 1.0)
 
 
-class Build(Data):
+class BuildOrder(Data):
     """One way to play a race.
 
     With ``saves``, a step of the opening whose time has come is paid before more workers are.
     """
 
-    opening: tuple[Step, ...]
+    opening: tuple[OpeningStep, ...]
     attack: Attack
-    guard: Guard
+    guard: ArmyGuard
     saves: bool = False
-    stages: tuple[Stage, ...]
+    stages: tuple[BuildStage, ...]
 
 
 class Race(Data):
@@ -90,7 +90,7 @@ class Race(Data):
     producer: str
     detector: str
     transport: str
-    builds: dict[str, Build]
+    builds: dict[str, BuildOrder]
 
 
 @lru_cache(maxsize=3)
@@ -105,14 +105,15 @@ def name_of(ai_build: int, draw: float) -> str:
     return NAMES.get(ai_build, names[int(draw * len(names))])
 
 
-def stage_at(race: str, build: str, at_s: float) -> Stage:
+def stage_at(race: str, build: str, at_s: float) -> BuildStage:
     """Return what a build wants at a time of its own clock."""
     stages = load_race(race).builds[build].stages
-    return _joined(race, build, sum(stage.from_s <= at_s for stage in stages))
+    return _join_stages(race, build, sum(stage.from_s <= at_s for stage in stages))
 
 
 @lru_cache(maxsize=128)
-def _joined(race: str, build: str, count: int) -> Stage:
+def _join_stages(race: str, build: str, count: int) -> BuildStage:
+    """Return what the first stages of a build want together."""
     reached = load_race(race).builds[build].stages[:count]
     structures: dict[str, int] = {}
     research: dict[str, None] = {}

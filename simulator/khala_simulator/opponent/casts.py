@@ -15,7 +15,7 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.columns import Floats
 
 
@@ -32,13 +32,13 @@ class CastRule(Data):
     none_within: float = 0.0
 
 
-def cast(side: Side, enemy: Enemy) -> None:
+def cast(side: OwnSide, enemy: Enemy) -> None:
     """Use the abilities whose conditions hold, one order for all units of a type."""
     if "casts" not in side.level.skills:
         return
     foes = _on_the_ground(side, enemy)
     for rule in rules():
-        units = [slot for slot in side.named(rule.unit) if _holds(side, slot, rule, foes)]
+        units = [slot for slot in side.of_type(rule.unit) if _holds(side, slot, rule, foes)]
         if not units:
             continue
         ability = side.world.catalog.ability(rule.ability)
@@ -57,13 +57,13 @@ def rules() -> tuple[CastRule, ...]:
     return tuple(CastRule.model_validate(row) for row in rows)
 
 
-def _on_the_ground(side: Side, enemy: Enemy) -> Floats:
+def _on_the_ground(side: OwnSide, enemy: Enemy) -> Floats:
     """Return (k, 2) where enemies stand that fight on the ground."""
     world = side.world
     return world.pos[[s for s in enemy.fighters.tolist() if not world.unit_type(s).flying]]
 
 
-def _holds(side: Side, slot: int, rule: CastRule, foes: Floats) -> bool:
+def _holds(side: OwnSide, slot: int, rule: CastRule, foes: Floats) -> bool:
     world = side.world
     if (rule.fighting and world.target[slot] == NOBODY) or world.casts[slot]:
         return False

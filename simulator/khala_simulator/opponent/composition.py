@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
 
@@ -23,7 +23,7 @@ GAS_PILE: Final = 300.0
 PILE_SHIFT: Final = 0.5
 
 
-def wanted(side: Side) -> dict[str, float]:
+def shares(side: OwnSide) -> dict[str, float]:
     """Return the shares of the army that a side wants now."""
     shares = {name: share * _for_money(side, name) for name, share in side.stage.army.items()}
     if "adapt" not in side.level.skills:
@@ -32,7 +32,7 @@ def wanted(side: Side) -> dict[str, float]:
     return {name: share * _fit(side.world.catalog, name, flyers, attributes) for name, share in shares.items()}
 
 
-def _for_money(side: Side, name: str) -> float:
+def _for_money(side: OwnSide, name: str) -> float:
     """Return the factor on a unit's share by what there is to spend: units with vespene first when it piles up."""
     piled = side.owner.vespene > GAS_PILE and side.owner.vespene > side.owner.minerals
     if not piled:
@@ -40,13 +40,13 @@ def _for_money(side: Side, name: str) -> float:
     return 1.0 + PILE_SHIFT if side.world.catalog.unit(name).cost[1] else 1.0 - PILE_SHIFT
 
 
-def by_need(side: Side, shares: dict[str, float]) -> list[str]:
+def by_need(side: OwnSide, shares: dict[str, float]) -> list[str]:
     """Return the types of the army by how far each is behind its share, the farthest first."""
     behind = {name: (side.count(name) + 1) / share for name, share in shares.items() if share > 0.0}
     return sorted(behind, key=lambda name: (behind[name], name))
 
 
-def _seen(side: Side) -> tuple[float, dict[str, float]]:
+def _seen(side: OwnSide) -> tuple[float, dict[str, float]]:
     """Return the share of flyers among the enemies that it knows of, and the share of each attribute, by price."""
     catalog = side.world.catalog
     units = [catalog.units[row] for row, _ in side.mind.seen.values()]

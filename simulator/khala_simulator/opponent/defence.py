@@ -16,7 +16,7 @@ from khala_simulator.world.opponent_memory import NEVER
 
 if TYPE_CHECKING:
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Ints
 
@@ -34,14 +34,16 @@ RECALL: Final = 0.3
 """An attack goes on while the enemies at home are worth less than this share of the army."""
 
 
-def watch(side: Side, enemy: Enemy) -> Ints | None:
+def watch(side: OwnSide, enemy: Enemy) -> Ints | None:
     """Return the enemies at the own bases once the level has reacted to them, None without any."""
     threat = threats(side, enemy)
     mind, world = side.mind, side.world
     if not threat.size:
         if mind.threat is not None:
             mind.repelled = world.loop, mind.worst
-        mind.alarm, mind.threat, mind.worst = NEVER, None, 0.0
+        mind.alarm = NEVER
+        mind.threat = None
+        mind.worst = 0.0
         _release(side)
         return None
     mind.worst = max(mind.worst, value(world, threat))
@@ -54,7 +56,7 @@ def watch(side: Side, enemy: Enemy) -> Ints | None:
     return threat
 
 
-def threats(side: Side, enemy: Enemy) -> Ints:
+def threats(side: OwnSide, enemy: Enemy) -> Ints:
     """Return the enemies in sight that fight at an own structure."""
     world = side.world
     foes = enemy.fighters
@@ -71,26 +73,27 @@ def threats(side: Side, enemy: Enemy) -> Ints:
     return found[:0] if len(harmless) == found.size <= SCOUTS else found
 
 
-def _nearest_home(side: Side, threat: Ints) -> int:
+def _nearest_home(side: OwnSide, threat: Ints) -> int:
     home = np.array([side.place(h) for h in side.halls] or [side.mind.bases[0]])
     offset = side.world.pos[threat][:, None, :] - home
     return int(threat[int(np.argmin((offset[..., 0] ** 2 + offset[..., 1] ** 2).min(axis=1)))])
 
 
-def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
+def defend(side: OwnSide, army: list[int], threat: Ints) -> list[int]:
     """Send the army at home against enemies at the bases, and workers; return who goes on with the attack.
 
     An attack is called off where the army at home is too weak, unless the threat is small beside the whole army. An
     army that is too weak alone waits at its front until the enemies are between its workers.
     """
     world, mind = side.world, side.mind
-    strength, at = value(world, threat), mind.threat or mind.bases[0]
+    strength = value(world, threat)
+    at = mind.threat or mind.bases[0]
     front = bases.front(side)
     home = [s for s in army if not mind.attacking or stance.nearer(side.place(s), front, mind.enemy_start)]
     if mind.attacking and strength > max(value(world, home), RECALL * value(world, army)):
         stance.call_off(side)
         home = army
-    helpers = home + side.named("Queen")
+    helpers = home + side.of_type("Queen")
     if _waits(side, helpers, at, strength):
         stance.gather_up(side, home)
         return [s for s in army if s not in set(home)]
@@ -101,17 +104,17 @@ def defend(side: Side, army: list[int], threat: Ints) -> list[int]:
     return [s for s in army if s not in set(home)]
 
 
-def _waits(side: Side, helpers: list[int], at: Point, strength: float) -> bool:
+def _waits(side: OwnSide, helpers: list[int], at: Point, strength: float) -> bool:
     """Return whether the army at home should not go to the enemies yet."""
     weak = value(side.world, helpers) < side.level.retreat * strength
     return weak and not _at_work(side, at)
 
 
-def _at_work(side: Side, at: Point) -> bool:
+def _at_work(side: OwnSide, at: Point) -> bool:
     return any(math.dist(side.place(hall), at) < AT_WORK for hall in side.halls)
 
 
-def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) -> None:
+def _pull_workers(side: OwnSide, army: list[int], threat: Ints, strength: float) -> None:
     """Make workers fight while the army at home is weaker than the threat."""
     world, mind = side.world, side.mind
     at = mind.threat or mind.bases[0]
@@ -125,7 +128,7 @@ def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) ->
     mind.pulled = [tag for tag in mind.pulled if world.slot_of(tag) != NOBODY]
     candidates = [w for w in side.workers if world.carrier[w] == NOBODY and not world.casts[w]]
     candidates.sort(
-        key=lambda w: (_wounded(side, w), world.tag_of(w) not in mind.pulled, math.dist(side.place(w), at), w)
+        key=lambda w: (_is_wounded(side, w), world.tag_of(w) not in mind.pulled, math.dist(side.place(w), at), w)
     )
     called = candidates[:wanted]
     back = [s for tag in mind.pulled if (s := world.slot_of(tag)) not in called]
@@ -136,26 +139,26 @@ def _pull_workers(side: Side, army: list[int], threat: Ints, strength: float) ->
         hands.attack(side, idle, at)
 
 
-def _wounded(side: Side, slot: int) -> bool:
+def _is_wounded(side: OwnSide, slot: int) -> bool:
     """Return whether a worker fights only after all others."""
     world = side.world
     whole = float(world.life_max[slot] + world.shields_max[slot])
     return bool(world.life[slot] + world.shields[slot] < WOUNDED * whole)
 
 
-def _release(side: Side) -> None:
+def _release(side: OwnSide) -> None:
     """Send workers that have defended back to their work."""
     back = [s for tag in side.mind.pulled if (s := side.world.slot_of(tag)) != NOBODY]
     side.mind.pulled = []
     _to_work(side, back)
 
 
-def _to_work(side: Side, workers: list[int]) -> None:
+def _to_work(side: OwnSide, workers: list[int]) -> None:
     """Send workers to a field of the first base."""
     fields = [f for hall in side.halls[:1] for f in bases.fields_near(side.world, side.place(hall))]
     if workers and fields:
         hands.gather(side, workers, side.world.tag_of(fields[0]))
 
 
-def _static(side: Side) -> list[int]:
-    return side.named("Bunker", "PhotonCannon", "ShieldBattery", "SpineCrawler", "PlanetaryFortress")
+def _static(side: OwnSide) -> list[int]:
+    return side.of_type("Bunker", "PhotonCannon", "ShieldBattery", "SpineCrawler", "PlanetaryFortress")

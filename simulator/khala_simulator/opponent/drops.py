@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_simulator.opponent.enemy import Enemy
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
 
 FIRST_S: Final = 330.0
@@ -34,7 +34,7 @@ UNLOAD: Final = "unload_all_at"
 FIGHTS: Final = frozenset({"Marine", "Marauder", "Zealot", "Adept", "Zergling", "Roach", "Hellion"})
 
 
-def lead(side: Side, enemy: Enemy) -> None:
+def lead(side: OwnSide, enemy: Enemy) -> None:
     """Begin a drop when its time has come, or lead the one that is under way."""
     drop = side.mind.drop
     if drop.phase:
@@ -43,7 +43,7 @@ def lead(side: Side, enemy: Enemy) -> None:
         _begin(side, enemy)
 
 
-def _begin(side: Side, enemy: Enemy) -> None:
+def _begin(side: OwnSide, enemy: Enemy) -> None:
     world, mind = side.world, side.mind
     if world.loop < mind.next_drop or side.clock_s < FIRST_S or side.army_supply < LEAST_ARMY or mind.attacking:
         return
@@ -56,17 +56,17 @@ def _begin(side: Side, enemy: Enemy) -> None:
     hands.smart(side, squad, world.tag_of(transport))
 
 
-def _transport(side: Side) -> int:
+def _transport(side: OwnSide) -> int:
     """Return a transport at home; without one it is made, for a later drop."""
     rally = stance.rally(side)
     name = side.race.transport
-    found = [s for s in side.named(name) if math.dist(side.place(s), rally) < 40.0]
+    found = [s for s in side.of_type(name) if math.dist(side.place(s), rally) < 40.0]
     if not found and not side.count(name):
         products.make(side, name)
     return min(found, key=lambda s: (math.dist(side.place(s), rally), s), default=NOBODY)
 
 
-def _squad(side: Side, transport: int) -> list[int]:
+def _squad(side: OwnSide, transport: int) -> list[int]:
     """Return the units nearest to a transport that fill it."""
     world, space = side.world, side.world.unit_type(transport).cargo_space
     able = [s for s in side.army if world.unit_type(s).name in FIGHTS and world.target[s] == NOBODY]
@@ -80,7 +80,7 @@ def _squad(side: Side, transport: int) -> list[int]:
     return squad
 
 
-def _target(side: Side, enemy: Enemy) -> Point:
+def _target(side: OwnSide, enemy: Enemy) -> Point:
     """Return where the resources of the enemy's base are that is farthest from the own front."""
     world = side.world
     halls = [s for s in enemy.structures.tolist() if "DropOff" in world.unit_type(s).placement]
@@ -95,7 +95,7 @@ def _target(side: Side, enemy: Enemy) -> Point:
 # phases ---------------------------------------------------------------------------------------------------------------
 
 
-def _load(side: Side) -> None:
+def _load(side: OwnSide) -> None:
     drop, world = side.mind.drop, side.world
     transport = world.slot_of(drop.transport)
     if transport == NOBODY:
@@ -110,10 +110,11 @@ def _load(side: Side) -> None:
     if not drop.squad:
         _end(side)
     elif hands.use(side, [transport], unload, point=drop.target):
-        drop.phase, drop.since = "fly", world.loop
+        drop.phase = "fly"
+        drop.since = world.loop
 
 
-def _fly(side: Side) -> None:
+def _fly(side: OwnSide) -> None:
     drop, world = side.mind.drop, side.world
     squad = [s for s in map(world.slot_of, drop.squad) if s != NOBODY]
     out = [s for s in squad if world.carrier[s] == NOBODY]
@@ -121,11 +122,12 @@ def _fly(side: Side) -> None:
     if not squad or (late and not out):
         _end(side)
     elif len(out) == len(squad) or late:
-        drop.phase, drop.since = "fight", world.loop
+        drop.phase = "fight"
+        drop.since = world.loop
         _send_home(side)
 
 
-def _fight(side: Side) -> None:
+def _fight(side: OwnSide) -> None:
     drop, world = side.mind.drop, side.world
     squad = [s for s in map(world.slot_of, drop.squad) if s != NOBODY and world.carrier[s] == NOBODY]
     if not squad or world.loop - drop.since > FIGHT_S * FASTER_LOOPS:
@@ -136,16 +138,16 @@ def _fight(side: Side) -> None:
         hands.attack(side, idle, drop.target)
 
 
-def _send_home(side: Side) -> None:
+def _send_home(side: OwnSide) -> None:
     transport = side.world.slot_of(side.mind.drop.transport)
     if transport != NOBODY:
         hands.move(side, [transport], stance.rally(side))
 
 
-def _end(side: Side) -> None:
+def _end(side: OwnSide) -> None:
     """Give the rest of the drop back to the army."""
     side.mind.drop = DropMemory()
     side.mind.next_drop = side.world.loop + round(BETWEEN_S * FASTER_LOOPS)
 
 
-PHASES: Final[dict[str, Callable[[Side], None]]] = {"load": _load, "fly": _fly, "fight": _fight}
+PHASES: Final[dict[str, Callable[[OwnSide], None]]] = {"load": _load, "fly": _fly, "fight": _fight}

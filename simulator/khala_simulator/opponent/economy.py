@@ -8,12 +8,12 @@ import numpy as np
 
 from khala_simulator.economy import construction, harvesting, supply
 from khala_simulator.opponent import hands, products
-from khala_simulator.opponent.products import Outcome
+from khala_simulator.opponent.products import MakeOutcome
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
 
 GAS_WORKERS: Final = 3
 MOVED_AT_ONCE: Final = 4
@@ -40,7 +40,7 @@ TWO_HALLS: Final = 1.5
 class Staff:
     """How many workers each town hall and gas structure has, and wants."""
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self, side: OwnSide) -> None:
         found = harvesting.staffing(side.world, side.player)
         self.halls = {hall: list(found[hall]) for hall in side.halls if hall in found}
         self.gas = {slot: list(count) for slot, count in found.items() if slot not in self.halls and count[1]}
@@ -51,12 +51,12 @@ class Staff:
         return sum(ideal for _, ideal in self.halls.values()) + GAS_WORKERS * len(self.gas)
 
 
-def mine(side: Side, staff: Staff) -> None:
+def mine(side: OwnSide, staff: Staff) -> None:
     """Send idle workers to work, fill the gas structures, and even the bases out."""
     world = side.world
     pulled = set(map(world.slot_of, side.mind.pulled))
     idle = [w for w in side.workers if int(world.order_kind[w]) == OrderKind.IDLE and w not in pulled]
-    for site in _abandoned(side):
+    for site in _abandoned_sites(side):
         if idle:
             hands.smart(side, [idle.pop()], world.tag_of(site))
     for worker in idle:
@@ -66,7 +66,7 @@ def mine(side: Side, staff: Staff) -> None:
     _even_out(side, staff)
 
 
-def _abandoned(side: Side) -> list[int]:
+def _abandoned_sites(side: OwnSide) -> list[int]:
     """Return unfinished structures that only go on with a builder, and that have none."""
     world = side.world
     halted = [s for slots in side.begun.values() for s in slots if not world.self_made[s]]
@@ -74,7 +74,7 @@ def _abandoned(side: Side) -> list[int]:
     return [s for s in halted if s not in building and construction.builder_of(world, s) == NOBODY]
 
 
-def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
+def _to_minerals(side: OwnSide, staff: Staff, worker: int) -> bool:
     """Send a worker to the nearest base with room, or to the nearest one."""
     world = side.world
     if not staff.halls:
@@ -91,7 +91,7 @@ def _to_minerals(side: Side, staff: Staff, worker: int) -> bool:
     return hands.gather(side, [worker], world.tag_of(field))
 
 
-def _fill_gas(side: Side, staff: Staff) -> None:
+def _fill_gas(side: OwnSide, staff: Staff) -> None:
     world = side.world
     plenty = side.owner.vespene > GAS_ENOUGH and side.owner.minerals < side.owner.vespene
     wanted = 1 if plenty else GAS_WORKERS
@@ -106,7 +106,7 @@ def _fill_gas(side: Side, staff: Staff) -> None:
                 return
 
 
-def _even_out(side: Side, staff: Staff) -> None:
+def _even_out(side: OwnSide, staff: Staff) -> None:
     """Send workers from bases with too many to one with too few."""
     world = side.world
     room = [h for h, (assigned, ideal) in staff.halls.items() if assigned < ideal]
@@ -124,7 +124,7 @@ def _even_out(side: Side, staff: Staff) -> None:
 # supply and workers ---------------------------------------------------------------------------------------------------
 
 
-def keep_supply_ahead(side: Side) -> None:
+def keep_supply_ahead(side: OwnSide) -> None:
     """Make more supply before it runs out."""
     name = side.race.supply
     provides = side.world.catalog.unit(name).provides
@@ -138,29 +138,30 @@ def keep_supply_ahead(side: Side) -> None:
     products.make(side, name)
 
 
-def _ahead(side: Side) -> float:
+def _ahead(side: OwnSide) -> float:
     """Return the supply that the side can use up before more is there."""
     makers = len(side.kind(side.race.producer)) + sum(len(side.kind(n)) for n in ("Factory", "Starport"))
     makers += sum(len(side.kind(n)) for n in ("RoboticsFacility", "Stargate"))
     a_second = len(side.halls) / A_WORKER_S + makers / A_SUPPLY_S
     if side.owner.race == "zerg":
-        halls, queens = len(side.halls), min(len(side.halls), len(side.named("Queen")))
+        halls = len(side.halls)
+        queens = min(len(side.halls), len(side.of_type("Queen")))
         a_second = halls * LARVAE[0] + queens * LARVAE[1] + halls * min(side.owner.minerals, MANY) / MANY / A_WORKER_S
     return 1.0 + AHEAD_S * a_second
 
 
-def train_workers(side: Side, staff: Staff) -> None:
+def train_workers(side: OwnSide, staff: Staff) -> None:
     """Make workers until the bases are full, as fast as the level can."""
     world, name = side.world, side.race.worker
-    most = min(side.level.workers, side.stage.workers or side.level.workers, _wanted(side, staff))
+    most = min(side.level.workers, side.stage.workers or side.level.workers, _workers_needed(side, staff))
     halls = max(len(side.halls), 1)
     while side.count(name) < most and world.loop >= side.mind.next_worker:
-        if products.make(side, name) is not Outcome.DONE:
+        if products.make(side, name) is not MakeOutcome.DONE:
             return
         side.mind.next_worker = side.after(side.level.worker_s / (1.0 if halls < 2 else TWO_HALLS))
 
 
-def _wanted(side: Side, staff: Staff) -> int:
+def _workers_needed(side: OwnSide, staff: Staff) -> int:
     begun = len(side.begun.get(side.race.hall, ()))
     gas = len(side.begun.get(side.race.gas, ()))
     return staff.places + A_HALL * begun + GAS_WORKERS * gas + 2

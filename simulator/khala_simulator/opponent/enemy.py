@@ -16,7 +16,7 @@ from khala_simulator.opponent.levels import FASTER_LOOPS
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Bools, Floats, Ints
@@ -35,8 +35,9 @@ A_BUNKER: Final = 250.0
 class Enemy:
     """The enemies of a side, as it knows them in one thought."""
 
-    def __init__(self, side: Side) -> None:
-        world, self.side = side.world, side
+    def __init__(self, side: OwnSide) -> None:
+        world = side.world
+        self.side = side
         live = world.live
         foes = live[(world.owner[live] > 0) & (world.owner[live] != side.player)]
         self.sees_all = side.level.vision

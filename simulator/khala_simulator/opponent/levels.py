@@ -15,7 +15,7 @@ DEFAULT: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class OpponentLevel:
     """What distinguishes a difficulty; the data file says what each column means."""
 
     name: str
@@ -38,20 +38,20 @@ class Level:
     income: float = 1.0
 
 
-def level_of(difficulty: int) -> Level:
+def level_of(difficulty: int) -> OpponentLevel:
     """Return the level for a difficulty of the API; 0 and unknown ones are the default."""
     levels = load_levels()
     return levels.get(difficulty, levels[DEFAULT])
 
 
 @lru_cache(maxsize=1)
-def load_levels() -> dict[int, Level]:
+def load_levels() -> dict[int, OpponentLevel]:
     """Return every level by its difficulty."""
     rows: dict[int, dict[str, Any]] = read_data("opponents", "levels.yaml")["levels"]
     return {number: _level(row, rows) for number, row in rows.items()}
 
 
-def _level(row: dict[str, Any], rows: dict[int, dict[str, Any]]) -> Level:
+def _level(row: dict[str, Any], rows: dict[int, dict[str, Any]]) -> OpponentLevel:
     whole = {**rows.get(row.get("extends", 0), {}), **row}
     whole.pop("extends", None)
-    return Level(**{**whole, "skills": frozenset(whole["skills"])})
+    return OpponentLevel(**{**whole, "skills": frozenset(whole["skills"])})

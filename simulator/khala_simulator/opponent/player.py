@@ -16,7 +16,7 @@ from khala_simulator.opponent import army, bases, boosts, casts, drops, economy,
 from khala_simulator.opponent.builds import load_race, name_of
 from khala_simulator.opponent.economy import Staff
 from khala_simulator.opponent.enemy import Enemy
-from khala_simulator.opponent.side import Side
+from khala_simulator.opponent.side import OwnSide
 from khala_simulator.world.opponent_memory import OpponentMemory
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def think(world: World, player: int) -> None:
     """Play one turn of a computer player."""
     if world.players[player].mind is None:
         world.players[player].mind = begin(world, player)
-    side = Side(world, player)
+    side = OwnSide(world, player)
     if not side.slots.size:
         return
     enemy = Enemy(side)
@@ -71,7 +71,7 @@ def _middle(world: World, player: int) -> Point:
     return x, y
 
 
-def tax(side: Side) -> None:
+def tax(side: OwnSide) -> None:
     """Give a player that cheats by income its extra on what its workers have delivered since."""
     collected, taxed = side.owner.score.collected, side.mind.taxed
     extra = side.level.income - 1.0

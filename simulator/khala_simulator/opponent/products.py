@@ -26,7 +26,7 @@ from khala_simulator.world.world import NO_TAG
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.tables.abilities import Ability, Need
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.casts import Point
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MAKES: Final = frozenset({"train", "build", "build_addon", "warp_in", "structure_morph", "grow", "research"})
 
 
-class Outcome(Enum):
+class MakeOutcome(Enum):
     """What came of making something."""
 
     DONE = "ordered"
@@ -43,9 +43,9 @@ class Outcome(Enum):
     BLOCKED = "nothing can make it now"
 
 
-def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
+def make(side: OwnSide, name: str, *, near: Point | None = None) -> MakeOutcome:
     """Make one of a type or an upgrade, if possible now; structures ``near`` a point, by default in the main base."""
-    found = Outcome.BLOCKED
+    found = MakeOutcome.BLOCKED
     for ability in ways(side.world.catalog, name):
         if ability.supply > 0.0 and ability.supply > side.purse.room:
             continue
@@ -53,12 +53,12 @@ def make(side: Side, name: str, *, near: Point | None = None) -> Outcome:
         if maker == NOBODY:
             continue
         if not side.purse.affords(ability):
-            found = Outcome.SHORT
+            found = MakeOutcome.SHORT
         elif _order(side, ability, maker, near):
             side.purse.spend(ability)
             side.underway[name] += 1
-            return Outcome.DONE
-    if found is Outcome.SHORT:
+            return MakeOutcome.DONE
+    if found is MakeOutcome.SHORT:
         side.purse.put_aside(ways(side.world.catalog, name)[0])
     return found
 
@@ -75,7 +75,7 @@ def _back(catalog: Catalog, ability: Ability) -> bool:
     return bool(ability.unit) and set(ability.users) <= set(names_of(catalog, ability.unit))
 
 
-def lacking(side: Side, name: str) -> str:
+def lacking(side: OwnSide, name: str) -> str:
     """Return a structure that has to stand before something can be made, and that is not even begun; "" for none."""
     for ability in ways(side.world.catalog, name)[:1]:
         for need in _structures(ability.requires):
@@ -93,17 +93,17 @@ def _structures(need: Need | None) -> Iterator[str]:
             yield from _structures(part)
 
 
-def _makers(side: Side, ability: Ability) -> Iterator[int]:
+def _makers(side: OwnSide, ability: Ability) -> Iterator[int]:
     """Yield the units that could use an ability now, cost aside."""
     world = side.world
-    for slot in side.named(*ability.users):
+    for slot in side.of_type(*ability.users):
         if not _is_free(side, slot, ability):
             continue
         if casting.refusal(world, slot, ability, free=True) is ActionResult.SUCCESS:
             yield slot
 
 
-def _is_free(side: Side, slot: int, ability: Ability) -> bool:
+def _is_free(side: OwnSide, slot: int, ability: Ability) -> bool:
     world = side.world
     if ability.effect == "build":
         return True
@@ -117,10 +117,12 @@ def _is_free(side: Side, slot: int, ability: Ability) -> bool:
     return len(world.jobs.get(slot, ())) < parallel
 
 
-def keep_for(side: Side, name: str) -> None:
+def keep_for(side: OwnSide, name: str) -> None:
     """Keep the structure that is free first from training, so that an add-on can be made there."""
-    world, ability = side.world, ways(side.world.catalog, name)[0]
-    unit, bare = world.catalog.unit(ability.unit), [s for s in side.named(*ability.users) if world.addon[s] == NOBODY]
+    world = side.world
+    ability = ways(world.catalog, name)[0]
+    unit = world.catalog.unit(ability.unit)
+    bare = [s for s in side.of_type(*ability.users) if world.addon[s] == NOBODY]
     bare.sort(key=lambda s: (len(world.jobs.get(s, ())), -_done(world, s), s))
     for slot in bare if side.purse.affords(ability) else ():
         place = addons.place_of(world, slot)
@@ -134,7 +136,7 @@ def _done(world: World, slot: int) -> float:
     return max((job.done / job.loops for job in world.jobs.get(slot, ())[:1]), default=1.0)
 
 
-def _order(side: Side, ability: Ability, maker: int, near: Point | None) -> bool:
+def _order(side: OwnSide, ability: Ability, maker: int, near: Point | None) -> bool:
     if ability.effect == "build":
         return _build(side, ability, near)
     if ability.effect == "warp_in":
@@ -145,11 +147,12 @@ def _order(side: Side, ability: Ability, maker: int, near: Point | None) -> bool
 # structures and warping in --------------------------------------------------------------------------------------------
 
 
-def _build(side: Side, ability: Ability, near: Point | None) -> bool:
+def _build(side: OwnSide, ability: Ability, near: Point | None) -> bool:
     """Send the nearest free worker to build."""
     if not hands.free(side):
         return False
-    world, unit = side.world, side.product(ability)
+    world = side.world
+    unit = side.product(ability)
     if unit is None:
         return False
     geyser = sites.geyser(side) if unit.name == side.race.gas else NOBODY
@@ -169,7 +172,7 @@ def _build(side: Side, ability: Ability, near: Point | None) -> bool:
     return taken
 
 
-def free_worker(side: Side, point: Point) -> int:
+def free_worker(side: OwnSide, point: Point) -> int:
     """Return the nearest worker to a point that does nothing more important than mine, or NOBODY."""
     world = side.world
     busy = set(map(world.slot_of, side.mind.pulled))
@@ -187,6 +190,6 @@ def _interruptible(world: World, slot: int) -> bool:
     return mines or (world.order_kind[slot] == 0 and world.carrier[slot] == NOBODY)
 
 
-def _warp_in(side: Side, ability: Ability, gate: int) -> bool:
+def _warp_in(side: OwnSide, ability: Ability, gate: int) -> bool:
     point = sites.warp_place(side, side.world.catalog.unit(ability.unit))
     return point is not None and hands.use(side, [gate], ability, point=point)

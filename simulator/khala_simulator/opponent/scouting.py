@@ -11,7 +11,7 @@ from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
 
 FIRST_S: Final = 40.0
@@ -24,7 +24,7 @@ PLACES: Final = 4
 """How many places one scout looks at."""
 
 
-def look(side: Side) -> None:
+def look(side: OwnSide) -> None:
     """Send a scout, or send the one that is under way on."""
     mind, world = side.mind, side.world
     if "scout" not in side.level.skills or side.level.vision:
@@ -47,24 +47,24 @@ def look(side: Side) -> None:
         hands.move(side, [scout], place)
 
 
-def _place(side: Side) -> Point:
+def _place(side: OwnSide) -> Point:
     """Return the place that is looked at next: the enemy's start, then the bases nearest to it."""
     enemy = side.mind.enemy_start
     places = sorted(side.mind.bases, key=lambda p: (math.dist(p, enemy), p))
     return places[side.mind.scouted % PLACES % len(places)]
 
 
-def _chosen(side: Side) -> int:
+def _chosen(side: OwnSide) -> int:
     """Return who scouts: early an Overlord or a worker, later the cheapest unit of the army."""
     if side.clock_s < WORKERS_UNTIL_S:
-        overlords = side.named("Overlord")
+        overlords = side.of_type("Overlord")
         return overlords[0] if overlords else products.free_worker(side, side.mind.enemy_start)
     world = side.world
     idle = [s for s in side.army if int(world.order_kind[s]) == OrderKind.IDLE and world.target[s] == NOBODY]
     return min(idle, key=lambda s: (sum(world.unit_type(s).cost), s), default=NOBODY)
 
 
-def _end(side: Side) -> None:
+def _end(side: OwnSide) -> None:
     """Forget the scout; the next one leaves after a while."""
     side.mind.scout = 0
     side.mind.scouted = -(-side.mind.scouted // PLACES) * PLACES

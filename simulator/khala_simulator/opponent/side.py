@@ -19,8 +19,8 @@ from khala_simulator.opponent.builds import load_race, stage_at
 from khala_simulator.opponent.levels import FASTER_LOOPS, level_of
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.builds import Build, Race, Stage
-    from khala_simulator.opponent.levels import Level
+    from khala_simulator.opponent.builds import BuildOrder, BuildStage, Race
+    from khala_simulator.opponent.levels import OpponentLevel
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Purse:
+class SidePurse:
     """What is left to spend in this thought; it is less than nothing once more is put aside than there is."""
 
     minerals: float
@@ -56,16 +56,18 @@ class Purse:
         self.vespene -= ability.vespene
 
 
-class Side:
+class OwnSide:
     """One player's units by what they are, its plan and its money."""
 
     def __init__(self, world: World, player: int) -> None:
-        self.world, self.player, self.owner = world, player, world.players[player]
+        self.world = world
+        self.player = player
+        self.owner = world.players[player]
         assert self.owner.mind is not None
         self.mind: OpponentMemory = self.owner.mind
-        self.level: Level = level_of(self.owner.difficulty)
+        self.level: OpponentLevel = level_of(self.owner.difficulty)
         self.race: Race = load_race(self.owner.race)
-        self.build: Build = self.race.builds[self.mind.build]
+        self.build: BuildOrder = self.race.builds[self.mind.build]
         self.slots: Ints = world.units_of(player)
         self.whole: dict[str, list[int]] = {}
         self.begun: dict[str, list[int]] = {}
@@ -73,10 +75,10 @@ class Side:
             self.slots.tolist(), world.type[self.slots].tolist(), world.build_progress[self.slots].tolist(), strict=True
         ):
             (self.whole if done >= 1.0 else self.begun).setdefault(world.catalog.units[row].name, []).append(slot)
-        self.used = supply.used(world, player)
+        self.used = supply.in_use(world, player)
         self.cap = supply.cap(world, player)
-        self.purse = Purse(self.owner.minerals, self.owner.vespene, self.cap - self.used)
-        self.ordered = self._ordered()
+        self.purse = SidePurse(self.owner.minerals, self.owner.vespene, self.cap - self.used)
+        self.ordered = self._count_orders()
         self.underway = Counter(self.owner.underway)
         self.kept: set[int] = set()  # structures that train nothing, for an add-on
 
@@ -92,19 +94,19 @@ class Side:
         return self.world.loop + round(seconds * FASTER_LOOPS)
 
     @cached_property
-    def stage(self) -> Stage:
+    def stage(self) -> BuildStage:
         """What its build wants now."""
         return stage_at(self.owner.race, self.mind.build, self.clock_s)
 
     # units --------------------------------------------------------------------------------------------------------
 
-    def named(self, *names: str) -> list[int]:
+    def of_type(self, *names: str) -> list[int]:
         """Return own finished units of some types, by slot."""
         return sorted(slot for name in names for slot in self.whole.get(name, ()))
 
     def kind(self, name: str) -> list[int]:
         """Return own finished units that count as a type: a Warp Gate is a Gateway."""
-        return self.named(*names_of(self.world.catalog, name))
+        return self.of_type(*names_of(self.world.catalog, name))
 
     def count(self, name: str) -> int:
         """Return how many of a type, or of what counts as it, exist, are being made, or are ordered."""
@@ -116,7 +118,7 @@ class Side:
     def workers(self) -> list[int]:
         """Own workers that are not away as a scout."""
         scout = self.world.slot_of(self.mind.scout)
-        return [slot for slot in self.named(self.race.worker) if slot != scout]
+        return [slot for slot in self.of_type(self.race.worker) if slot != scout]
 
     @cached_property
     def halls(self) -> list[int]:
@@ -128,7 +130,8 @@ class Side:
     @cached_property
     def army(self) -> list[int]:
         """Own finished units that fight or go with those that fight, except workers, scouts and a drop on its way."""
-        world, away = self.world, {self.mind.scout, self.mind.drop.transport, *self.mind.drop.squad}
+        world = self.world
+        away = {self.mind.scout, self.mind.drop.transport, *self.mind.drop.squad}
         return [
             slot for name, slots in self.whole.items()
             if (unit := world.catalog.unit(name)).army and not unit.uncommandable
@@ -151,9 +154,10 @@ class Side:
 
     # orders under way ---------------------------------------------------------------------------------------------
 
-    def _ordered(self) -> Counter[str]:
+    def _count_orders(self) -> Counter[str]:
         """Count what units are on their way to build or to become, and put its price aside if it is not paid yet."""
-        world, found = self.world, Counter[str]()
+        world = self.world
+        found = Counter[str]()
         for slot in self.slots[world.casts[self.slots]].tolist():
             ability = world.catalog.ability_of_id.get(int(world.order_ability[slot]))
             if ability is None or not ability.unit:

@@ -22,7 +22,7 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.maps.game_map import GameMap
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.casts import Point
     from khala_simulator.world.columns import Bools, Floats, Ints
@@ -46,7 +46,7 @@ WARP_SOURCES: Final = 3
 """How many Pylons are tried for a place to warp in."""
 
 
-def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | None:
+def place_for(side: OwnSide, unit: UnitType, near: Point | None = None) -> Point | None:
     """Return where a structure of a type is to stand, or None without a place; ``near`` a point if one is given."""
     if unit.name == side.race.hall:
         return near
@@ -62,19 +62,19 @@ def place_for(side: Side, unit: UnitType, near: Point | None = None) -> Point | 
     return next((place for base in around if (place := _nearest(side, unit, base)) is not None), None)
 
 
-def beside(side: Side, hall: UnitType) -> Point | None:
+def beside(side: OwnSide, hall: UnitType) -> Point | None:
     """Return where one more town hall can stand at a base that has one, for its larvae."""
     return _nearest(side, hall, side.mind.bases[0])
 
 
-def _forward(side: Side) -> Point:
+def _forward(side: OwnSide) -> Point:
     """Return a point in front of the base nearest to the enemy."""
     (x, y), (ex, ey) = bases.front(side), side.mind.enemy_start
     length = max(math.dist((x, y), (ex, ey)), 1.0)
     return x + (ex - x) / length * FORWARD_BY, y + (ey - y) / length * FORWARD_BY
 
 
-def _nearest(side: Side, unit: UnitType, near: Point) -> Point | None:
+def _nearest(side: OwnSide, unit: UnitType, near: Point) -> Point | None:
     footprint = building_sites.footprint_of(side.world, unit)
     if footprint is None:
         return None
@@ -92,20 +92,20 @@ def _nearest(side: Side, unit: UnitType, near: Point) -> Point | None:
     return None
 
 
-def _by_pylons(side: Side, unit: UnitType, at: Floats) -> Bools:
+def _by_pylons(side: OwnSide, unit: UnitType, at: Floats) -> Bools:
     """Return which places suit the Pylons: in a power field, or for a Pylon away from the others."""
     if unit.needs_power:
         powered = np.zeros(len(at), dtype=np.bool_)
         for source in power.sources(side.world, side.player):
-            powered |= power.covered(side.world, source, at)
+            powered |= power.covers(side.world, source, at)
         return powered
-    pylons = side.world.pos[side.named("Pylon") + side.begun.get("Pylon", [])]
+    pylons = side.world.pos[side.of_type("Pylon") + side.begun.get("Pylon", [])]
     apart = (np.hypot(at[:, None, 0] - pylons[:, 0], at[:, None, 1] - pylons[:, 1]) >= PYLONS_APART).all(axis=1)
     room = _room(side, at)
     return np.asarray(apart & (room >= ROOMY * room[apart].max(initial=0)), dtype=np.bool_)
 
 
-def _room(side: Side, at: Floats) -> Ints:
+def _room(side: OwnSide, at: Floats) -> Ints:
     """Return how many places for a Gateway Pylons would power."""
     gateway = _centres(side, side.world.catalog.unit(side.race.producer), (3, 3))
     powered: Ints = (np.hypot(gateway[:, None, 0] - at[:, 0], gateway[:, None, 1] - at[:, 1]) <= POWERED).sum(axis=0)
@@ -115,7 +115,7 @@ def _room(side: Side, at: Floats) -> Ints:
 # grids ----------------------------------------------------------------------------------------------------------------
 
 
-def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
+def _centres(side: OwnSide, unit: UnitType, size: tuple[int, int]) -> Floats:
     """Return (k, 2) the centres where a structure and a way around it find room."""
     world = side.world
     open_ground = world.map.terrain.build & ~building_sites.taken(world)
@@ -132,7 +132,7 @@ def _centres(side: Side, unit: UnitType, size: tuple[int, int]) -> Floats:
     return np.stack([x + 1 + size[0] / 2.0, y + 1 + size[1] / 2.0], axis=1)
 
 
-def _for_addons(side: Side) -> Bools:
+def _for_addons(side: OwnSide) -> Bools:
     """Return (h, w) the cells at the side of own structures where their add-ons stand, or will."""
     kept = np.zeros_like(side.world.map.terrain.build)
     for name in WITH_ADDON:
@@ -169,7 +169,7 @@ def _mark(grid: Bools, centre: Floats, half: float) -> None:
 # geysers and warping in -----------------------------------------------------------------------------------------------
 
 
-def geyser(side: Side) -> int:
+def geyser(side: OwnSide) -> int:
     """Return a free geyser at an own finished town hall, or NOBODY."""
     world = side.world
     ordered = {world.slot_of(order.target) for w in side.workers if world.casts[w] for order in world.orders_of(w)}
@@ -182,9 +182,10 @@ def geyser(side: Side) -> int:
     return NOBODY
 
 
-def warp_place(side: Side, unit: UnitType) -> Point | None:
+def warp_place(side: OwnSide, unit: UnitType) -> Point | None:
     """Return where to warp a unit in: at the Pylon nearest to the front, a fast one if there is any."""
-    world, front = side.world, bases.front(side)
+    world = side.world
+    front = bases.front(side)
     sources = sorted(power.sources(world, side.player), key=lambda s: (not s.fast, math.dist(s.point, front), s.slot))
     for source in sources[:WARP_SOURCES]:
         for dx, dy in _around(source.radius):

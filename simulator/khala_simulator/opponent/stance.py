@@ -11,7 +11,7 @@ from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.side import Side
+    from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
 
 RALLY_AHEAD: Final = 7.0
@@ -24,14 +24,14 @@ NEXT_WAVE: Final = 1.25
 MOST_WAVE: Final = 3.0
 
 
-def rally(side: Side) -> Point:
+def rally(side: OwnSide) -> Point:
     """Return where the army waits: in front of the base nearest to the enemy."""
     (x, y), (ex, ey) = bases.front(side), side.mind.enemy_start
     length = max(math.dist((x, y), (ex, ey)), 1.0)
     return x + (ex - x) / length * RALLY_AHEAD, y + (ey - y) / length * RALLY_AHEAD
 
 
-def gather_up(side: Side, army: list[int]) -> None:
+def gather_up(side: OwnSide, army: list[int]) -> None:
     """Send units that do nothing elsewhere to where the army waits."""
     point = rally(side)
     lost = [s for s in army if idle(side, s) and math.dist(side.place(s), point) > RALLY_NEAR]
@@ -39,7 +39,7 @@ def gather_up(side: Side, army: list[int]) -> None:
         hands.attack(side, lost, point)
 
 
-def call_off(side: Side) -> None:
+def call_off(side: OwnSide) -> None:
     """End the attack; the army goes home and the next attack is larger."""
     mind = side.mind
     mind.attacking = False
@@ -56,12 +56,12 @@ def nearer(at: Point, here: Point, there: Point) -> bool:
     return math.dist(at, here) < math.dist(at, there)
 
 
-def idle(side: Side, slot: int) -> bool:
+def idle(side: OwnSide, slot: int) -> bool:
     """Return whether a unit has no order and fights nobody."""
     return bool(int(side.world.order_kind[slot]) == OrderKind.IDLE and side.world.target[slot] == NOBODY)
 
 
-def bound_for(side: Side, slot: int, point: Point, slack: float) -> bool:
+def bound_for(side: OwnSide, slot: int, point: Point, slack: float) -> bool:
     """Return whether a unit is on its way to a point already."""
     world = side.world
     walks = int(world.order_kind[slot]) in (OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE)

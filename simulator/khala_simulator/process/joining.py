@@ -18,14 +18,14 @@ from khala_simulator.api.game_info import GameInfo
 from khala_simulator.api.projection import size_problem
 from khala_simulator.api.viewer import Viewer
 from khala_simulator.process.clock import RealtimeClock, SharedClock
-from khala_simulator.process.lan import Door, JoinRefused, NobodyCameError, Peers, knock
+from khala_simulator.process.lan import JoinRefused, LanDoor, NobodyCameError, Peers, knock
 from khala_simulator.process.lockstep import Lockstep
 from khala_simulator.process.process import Failure, Party, Playing, Process
 from khala_simulator.process.replay import Replay, ReplayError
 from khala_simulator.tables.catalog import CatalogError
 
 if TYPE_CHECKING:
-    from khala_simulator.process.lan import Link
+    from khala_simulator.process.lan import LanLink
 
 PATIENCE_S = 100.0
 """How long a process waits for the others: less than the two minutes after which PySC2 gives a game up."""
@@ -61,7 +61,8 @@ def restart_game(process: Process, _: sc.RequestRestartGame) -> sc.ResponseResta
     if before.party is None or before.peers is not None:
         text = "A replay is not restarted" if before.replay else "Only a game of one process can be restarted"
         raise Failure(sc.ResponseRestartGame(error=sc.ResponseRestartGame.LaunchError, error_details=text))
-    party, episode = before.party, before.episode + 1
+    party = before.party
+    episode = before.episode + 1
     seed = int(np.random.SeedSequence([party.setup.seed, episode]).generate_state(1)[0])
     fresh = dataclasses.replace(party, setup=dataclasses.replace(party.setup, seed=seed))
     process.play(dataclasses.replace(begin(process, fresh), party=party, episode=episode))
@@ -118,7 +119,8 @@ class Seating:
 
     def take(self, request: sc.RequestJoinGame) -> int:
         """Take the first free place of the right kind, and return its number; raise Failure if there is none."""
-        observes, players = request.HasField("observed_player_id"), len(self._setup.players)
+        observes = request.HasField("observed_player_id")
+        players = len(self._setup.players)
         if observes and request.observed_player_id > players:
             raise _failure(_JoinError.InvalidObservedPlayerId, f"There is no player {request.observed_player_id}")
         number = next((number for number in self.free if (number > players) == observes), None)
@@ -168,7 +170,7 @@ async def _host(process: Process, table: Seating, me: int, port: int) -> Playing
         except Failure as failure:
             raise JoinRefused(_REFUSED + failure.body.SerializeToString()) from failure
 
-    door = Door(admit, table.release)
+    door = LanDoor(admit, table.release)
     try:
         await door.wait(port, PATIENCE_S, lambda: table.full)
         playing = begin(process, table.party(me))
@@ -185,7 +187,7 @@ async def _host(process: Process, table: Seating, me: int, port: int) -> Playing
     return _share(playing, me, members, {link: frozenset({number}) for number, link in door.guests.items()})
 
 
-def _share(playing: Playing, me: int, members: list[int], links: dict[Link, frozenset[int]]) -> Playing:
+def _share(playing: Playing, me: int, members: list[int], links: dict[LanLink, frozenset[int]]) -> Playing:
     """Share the game with other processes."""
     playing.peers = Peers(Lockstep(playing.game, me, members), links)
     if playing.clock is not None:
@@ -215,13 +217,14 @@ async def _visit(process: Process, request: sc.RequestJoinGame) -> sc.ResponseJo
     return sc.ResponseJoinGame(player_id=me)
 
 
-def _accept(process: Process, request: sc.RequestJoinGame, link: Link, answer: bytes) -> tuple[Playing, int]:
+def _accept(process: Process, request: sc.RequestJoinGame, link: LanLink, answer: bytes) -> tuple[Playing, int]:
     head, _, invitation = answer.removeprefix(_TAKEN).partition(b"\n")
     try:
         if answer.startswith(_REFUSED):
             raise Failure(sc.ResponseJoinGame.FromString(answer[len(_REFUSED) :]))
         fields = json.loads(head)
-        me, members = int(fields["me"]), [int(member) for member in fields["members"]]
+        me = int(fields["me"])
+        members = [int(member) for member in fields["members"]]
         replay = Replay.decode(invitation)
     except (ValueError, LookupError, TypeError, ReplayError, DecodeError) as error:
         raise _failure(_JoinError.NetworkError, f"That is no host of a game: {error}") from error

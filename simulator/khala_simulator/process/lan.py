@@ -47,7 +47,7 @@ class JoinRefused(Exception):
         self.answer = answer
 
 
-class Link(asyncio.Protocol):
+class LanLink(asyncio.Protocol):
     """Messages to and from another process; None arrives when it is gone.
 
     Messages that come before a listener are kept.
@@ -123,7 +123,7 @@ class Link(asyncio.Protocol):
             self._listener(message)
 
 
-async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]:
+async def knock(port: int, patience_s: float, join: bytes) -> tuple[LanLink, bytes]:
     """Return a link to the host of the game on this port, and its answer to the request to join.
 
     Raises:
@@ -134,7 +134,7 @@ async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]
         async with asyncio.timeout(patience_s):
             while True:
                 with contextlib.suppress(OSError):  # no host yet, or one that went away again
-                    _, link = await loop.create_connection(Link, HOST, port)
+                    _, link = await loop.create_connection(LanLink, HOST, port)
                     link.send(join)
                     try:
                         answer = await link.hear()
@@ -147,7 +147,7 @@ async def knock(port: int, patience_s: float, join: bytes) -> tuple[Link, bytes]
     raise NobodyCameError(f"No game to join on port {port} of {HOST} for {patience_s:g} s")
 
 
-class Door:
+class LanDoor:
     """Where the host accepts guests, until all are there.
 
     `admit` takes a guest's message and returns its member number, or raises `JoinRefused`; `release` takes the number
@@ -155,9 +155,9 @@ class Door:
     """
 
     def __init__(self, admit: Callable[[bytes], int], release: Callable[[int], None]) -> None:
-        self.guests: dict[int, Link] = {}
+        self.guests: dict[int, LanLink] = {}
         self._admit, self._release = admit, release
-        self._strangers: set[Link] = set()  # guests without a request so far
+        self._strangers: set[LanLink] = set()  # guests without a request so far
         self._changed = asyncio.Event()
 
     async def wait(self, port: int, patience_s: float, full: Callable[[], bool]) -> None:
@@ -190,13 +190,13 @@ class Door:
             link.close()
         self.guests.clear()
 
-    def _open(self) -> Link:
-        link = Link()
+    def _open(self) -> LanLink:
+        link = LanLink()
         link.listen(lambda message: self._hear(link, message))
         self._strangers.add(link)
         return link
 
-    def _hear(self, link: Link, message: bytes | None) -> None:
+    def _hear(self, link: LanLink, message: bytes | None) -> None:
         self._strangers.discard(link)
         number = next((number for number, guest in self.guests.items() if guest is link), None)
         if number is not None:  # gone, or not following the protocol
@@ -215,7 +215,7 @@ class Door:
 class Peers:
     """The other processes of a game that has begun."""
 
-    def __init__(self, lockstep: Lockstep, links: dict[Link, frozenset[int]]) -> None:
+    def __init__(self, lockstep: Lockstep, links: dict[LanLink, frozenset[int]]) -> None:
         """Take part in a game; `links` maps each link to the members behind it."""
         self._lockstep, self._links = lockstep, links
         self._news = asyncio.Event()
@@ -284,7 +284,7 @@ class Peers:
         await asyncio.sleep(0)
         return True
 
-    def _hear(self, link: Link, data: bytes | None) -> None:
+    def _hear(self, link: LanLink, data: bytes | None) -> None:
         if link not in self._links:
             return
         if data is None:
@@ -299,7 +299,7 @@ class Peers:
         self._tell(message, but=link)
         self._news.set()
 
-    def _lose(self, link: Link) -> None:
+    def _lose(self, link: LanLink) -> None:
         for member in sorted(self._links.pop(link) & self._lockstep.members):
             self._tell(self._lockstep.leave(member))
         self._news.set()
@@ -312,7 +312,7 @@ class Peers:
             link.close()
             self._lose(link)
 
-    def _tell(self, message: Commit | Leave, but: Link | None = None) -> None:
+    def _tell(self, message: Commit | Leave, but: LanLink | None = None) -> None:
         data = message.encode()
         for link in self._links:
             if link is not but:

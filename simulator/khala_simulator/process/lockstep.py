@@ -106,7 +106,8 @@ class Lockstep:
         """Allow the world to go up to a loop for the own client; return the message for all others."""
         through = self._through[self.me] = max(loop, self._through[self.me])
         message = Commit(self.me, through, tuple(self.game.unsent or ()), self._untold)
-        self.game.unsent, self._untold = [], {}
+        self.game.unsent = []
+        self._untold = {}
         self.game.not_before = through
         return message
 

@@ -28,6 +28,7 @@ _NO_BLOCK: Final = 0xFFFFFFFF
 _STORED_WHOLE: Final = 0x81000000  # exists, in one piece
 _LISTFILE: Final = "(listfile)"
 _MASK: Final = 0xFFFFFFFF
+_SEED: Final = 0xEEEEEEEE
 
 
 class MpqError(ValueError):
@@ -37,7 +38,8 @@ class MpqError(ValueError):
 def pack(members: Mapping[str, bytes]) -> bytes:
     """Return an archive with these members, and the list of their names."""
     files = {**members, _LISTFILE: "\r\n".join(members).encode()}
-    blocks, at = [], _HEADER.size
+    blocks = []
+    at = _HEADER.size
     for data in files.values():
         blocks.append(_BLOCK.pack(at, len(data), len(data), _STORED_WHOLE))
         at += len(data)
@@ -66,7 +68,8 @@ def member(archive: bytes, name: str) -> bytes | None:
 @functools.cache
 def _table() -> list[int]:
     """Return the format's table of 5 x 256 numbers, from its own random generator."""
-    table, seed = [0] * 0x500, 0x00100001
+    table = [0] * 0x500
+    seed = 0x00100001
     for column in range(0x100):
         for row in range(5):
             high = seed = (seed * 125 + 3) % 0x2AAAAB
@@ -77,19 +80,21 @@ def _table() -> list[int]:
 
 def _hash(name: str, kind: int) -> int:
     """Return the hash of a name: kind 0 is its place in the table, 1 and 2 verify the name, 3 is a key."""
-    one, two = 0x7FED7FED, 0xEEEEEEEE
+    first = 0x7FED7FED
+    second = _SEED
     for letter in name.upper().encode():
-        one = (_table()[kind * 0x100 + letter] ^ (one + two)) & _MASK
-        two = (letter + one + two + (two << 5) + 3) & _MASK
-    return one
+        first = (_table()[kind * 0x100 + letter] ^ (first + second)) & _MASK
+        second = (letter + first + second + (second << 5) + 3) & _MASK
+    return first
 
 
 def _scramble(data: bytes, key: str) -> bytes:
-    one, two = _hash(key, 3), 0xEEEEEEEE
+    first = _hash(key, 3)
+    second = _SEED
     out = []
     for number in np.frombuffer(data, "<u4").tolist():
-        two = (two + _table()[0x400 + (one & 0xFF)]) & _MASK
-        out.append((number ^ (one + two)) & _MASK)
-        one = ((~one << 0x15) + 0x11111111 | one >> 0x0B) & _MASK
-        two = (number + two + (two << 5) + 3) & _MASK
+        second = (second + _table()[0x400 + (first & 0xFF)]) & _MASK
+        out.append((number ^ (first + second)) & _MASK)
+        first = ((~first << 0x15) + 0x11111111 | first >> 0x0B) & _MASK
+        second = (number + second + (second << 5) + 3) & _MASK
     return np.array(out, "<u4").tobytes()

@@ -39,7 +39,7 @@ def _watch(parent: int) -> None:
     os._exit(1)
 
 
-async def orphaned(
+async def wait_until_orphaned(
     has_client: Callable[[], bool], *, parent: Callable[[], int] = os.getppid, look_s: float = LOOK_S
 ) -> None:
     """Wait until the process has lost its parent and no client has been connected for `PATIENCE_LOOKS` looks.
@@ -49,7 +49,8 @@ async def orphaned(
         parent: process id of the parent; another process takes the place of a dead one.
         look_s: seconds between two looks.
     """
-    born_to, alone = parent(), 0
+    born_to = parent()
+    alone = 0
     while alone < PATIENCE_LOOKS:
         await asyncio.sleep(look_s)
         alone = 0 if parent() == born_to or has_client() else alone + 1

@@ -45,7 +45,8 @@ async def observation(process: Process, request: sc.RequestObservation) -> list[
 
 async def step(process: Process, request: sc.RequestStep) -> sc.ResponseStep:
     """Advance the game, by one loop unless the request says how many; together with the other processes, if any."""
-    table, count = process.table, request.count or 1
+    table = process.table
+    count = request.count or 1
     if table.clock is not None:
         raise UsageError("step is not possible in a game in real time")
     if table.peers is not None:

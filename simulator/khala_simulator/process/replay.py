@@ -57,7 +57,8 @@ class Replay:
 
     def file(self, version: dict[str, str]) -> bytes:
         """Return the file; `version` is its description of the game, in the form of the game's own files."""
-        title, duration_s = self.setup.game_map.name, int(self.loops / LOOPS_PER_SECOND)
+        title = self.setup.game_map.name
+        duration_s = int(self.loops / LOOPS_PER_SECOND)
         players = [{"PlayerID": player} for player in self.results]
         about = {"Title": title, **version, "Duration": duration_s, "Players": players}
         return mpq.pack({METADATA: json.dumps(about).encode(), _MEMBER: self.encode()})
@@ -91,7 +92,7 @@ class Replay:
         if not data.startswith(_MARK):
             raise ReplayError("The data is not a replay of this simulator")
         try:
-            return cls._decode(_unpacked(data[len(_MARK) :]))
+            return cls._decode(_unpack(data[len(_MARK) :]))
         except (zlib.error, ValueError, LookupError, struct.error, DecodeError) as error:
             raise ReplayError(f"The replay is damaged: {error}") from error
 
@@ -121,7 +122,7 @@ class Replay:
         return cls(setup, interfaces, head.loops, head.results, head.races, tuple(unpack(log)))
 
 
-def _unpacked(data: bytes) -> bytes:
+def _unpack(data: bytes) -> bytes:
     whole = zlib.decompressobj()
     content = whole.decompress(data, _LARGEST)
     if not whole.eof:

@@ -22,7 +22,7 @@ import socket
 
 from aiohttp import WSMsgType, web
 
-from khala_simulator.process.parent_watch import orphaned
+from khala_simulator.process.parent_watch import wait_until_orphaned
 from khala_simulator.process.session import Session
 from khala_simulator.process.status import Status
 
@@ -32,7 +32,7 @@ LARGEST_REQUEST = 256 * 2**20
 _REQUESTS = {WSMsgType.TEXT, WSMsgType.BINARY}
 
 
-class Server:
+class GameServer:
     """Serves one session to one client after the other."""
 
     def __init__(self, session: Session) -> None:
@@ -78,7 +78,8 @@ def is_from_page(request: web.BaseRequest) -> bool:
     dot; the addresses under which clients reach the game are numbers, the name of this machine, or names of a local
     network without a dot.
     """
-    origins, host = request.headers.getall("Origin", []), request.headers.get("Host", "")
+    origins = request.headers.getall("Origin", [])
+    host = request.headers.get("Host", "")
     if not origins:
         return False
     name = host.rpartition(":")[0] if host.rpartition(":")[2].isdecimal() else host
@@ -104,12 +105,12 @@ def run(sock: socket.socket, *, data_dir: str, base_build: int, data_version: st
 
 async def serve(sock: socket.socket, session: Session) -> None:
     """Serve the session on a listening socket until a client says quit, or no client is left that could."""
-    server = Server(session)
+    server = GameServer(session)
     app = web.Application()
     app.router.add_get(ENDPOINT, server.connect)
     runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=0.1, handler_cancellation=True)
     await runner.setup()
-    ends = [asyncio.create_task(server.done.wait()), asyncio.create_task(orphaned(server.has_client))]
+    ends = [asyncio.create_task(server.done.wait()), asyncio.create_task(wait_until_orphaned(server.has_client))]
     try:
         await web.SockSite(runner, sock).start()
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)

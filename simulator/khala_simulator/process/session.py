@@ -96,7 +96,7 @@ class Session:
         except Failure as failure:
             body = failure.body
         else:
-            self._machine.succeeded(move)
+            self._machine.move_on(move)
         if self._process.over:
             self._machine.end()
         parts: list[Part] = [body.SerializeToString()] if isinstance(body, Message) else body

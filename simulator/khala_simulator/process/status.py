@@ -89,7 +89,7 @@ class Machine:
             raise UsageError(f"Unknown request: {kind}")
         raise UsageError(f"{kind} is not possible in state {self.status.name}, only in: {states}")
 
-    def succeeded(self, kind: str) -> None:
+    def move_on(self, kind: str) -> None:
         """Move to the state that follows a successful request of this kind."""
         self.status = AFTER.get(kind, self.status)
 

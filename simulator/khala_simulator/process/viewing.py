@@ -85,7 +85,9 @@ def replay_info(process: Process, request: sc.RequestReplayInfo) -> sc.ResponseR
     for number, setup in enumerate(replay.setup.players, start=1):
         extra = info.player_info.add(player_mmr=0, player_apm=_actions_per_minute(replay, number))
         player = extra.player_info
-        player.player_id, player.type, player.race_requested = number, setup.type, setup.race
+        player.player_id = number
+        player.type = setup.type
+        player.race_requested = setup.race
         player.player_name = setup.player_name
         if (race := RACES.get(replay.races.get(number, ""))) is not None:
             player.race_actual = race  # type: ignore[assignment]  # numbers of the API's own enum

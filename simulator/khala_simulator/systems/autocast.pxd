@@ -8,4 +8,4 @@ cdef int64_t SCAN_PERIOD
 
 @cython.locals(loop=int64_t, closed=dict, slot=int64_t, is_free=bint)
 cpdef look_out(object world)
-cdef bint _use_one(object world, int64_t slot, int64_t owner, dict closed) except -1
+cdef bint _use_first_wanted(object world, int64_t slot, int64_t owner, dict closed) except -1

@@ -13,7 +13,7 @@ import numpy as np
 from khala_simulator.abilities import casting, commands
 from khala_simulator.economy.requirements import missing_to_all
 from khala_simulator.native import columns
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.casts import Cast
@@ -37,11 +37,11 @@ def look_out(world: World) -> None:
     for slot in sorted(world.autocast):
         c = columns.columns_of(world)
         is_free = c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]
-        if is_free and _use_one(world, slot, c.owner[slot], closed):
+        if is_free and _use_first_wanted(world, slot, c.owner[slot], closed):
             closed.clear()
 
 
-def _use_one(world: World, slot: int, owner: int, closed: dict[tuple[int, int], bool]) -> bool:
+def _use_first_wanted(world: World, slot: int, owner: int, closed: dict[tuple[int, int], bool]) -> bool:
     """Make a unit use the first of its abilities that its player would want now; return whether it does.
 
     ``closed`` has whether an ability, by owner and id, lacks what it requires, whichever unit uses it.
@@ -81,14 +81,19 @@ def _choose(world: World, slot: int, ability: Ability) -> Cast | None:
         return None
     pick = casting.skill_of(ability).pick
     target = (pick or nearest)(world, slot, ability)
-    if Aim.UNIT not in ability.aim and ability.autocast_range and pick is None and not _tempted(world, slot, ability):
+    if (
+        AbilityAim.UNIT not in ability.aim
+        and ability.autocast_range
+        and pick is None
+        and not _is_tempted(world, slot, ability)
+    ):
         return None
     cast = Cast(slot, ability, target, begun=world.loop)
     aimless = target == NOBODY and (ability.requires_point or pick is not None)
     return None if aimless or casting.aim_refusal(world, cast) is not ActionResult.SUCCESS else cast
 
 
-def _tempted(world: World, slot: int, ability: Ability) -> bool:
+def _is_tempted(world: World, slot: int, ability: Ability) -> bool:
     """Return whether a unit is near that triggers an untargeted autocast, such as coming out of the ground."""
     filters = ability.autocast_filters
     return any(
@@ -98,7 +103,7 @@ def _tempted(world: World, slot: int, ability: Ability) -> bool:
 
 def nearest(world: World, slot: int, ability: Ability) -> int:
     """Return the nearest unit that autocast may choose and that the ability may be aimed at, or NOBODY."""
-    if Aim.UNIT not in ability.aim:
+    if AbilityAim.UNIT not in ability.aim:
         return NOBODY
     for other in _near(world, slot, ability):
         if (

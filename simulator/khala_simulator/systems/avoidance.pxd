@@ -2,7 +2,7 @@ cimport cython
 from libc.stdint cimport int64_t
 
 from khala_simulator.movement cimport grids
-from khala_simulator.movement.grids cimport Grid
+from khala_simulator.movement.grids cimport SurfaceGrid
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
@@ -29,12 +29,12 @@ cpdef find_headings(object world)
 cdef bint _flows(Columns c, int64_t slot) noexcept
 @cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double, standing=_Standing)
 cpdef begin(object world, object slots, object shift)
-@cython.locals(slot=int64_t, x=double, y=double, size=double, grid=Grid, turn=int64_t)
+@cython.locals(slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
 cdef _look(object world, Columns c, list turning)
 @cython.locals(turn=int64_t)
-cdef int64_t _first_free(Columns c, _Crowd crowd, Grid grid, int64_t slot, Point way) noexcept
+cdef int64_t _first_free(Columns c, _Crowd crowd, SurfaceGrid grid, int64_t slot, Point way) noexcept
 cdef Point _heading(Point way, int64_t turn, double side) noexcept
-cdef bint _is_ground(Grid grid, Point start, Point heading) noexcept
+cdef bint _is_ground(SurfaceGrid grid, Point start, Point heading) noexcept
 cdef int64_t _stripe(double x) noexcept
 cdef bint _is_body(Columns c, int64_t slot) noexcept
 

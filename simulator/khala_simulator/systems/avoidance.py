@@ -22,7 +22,7 @@ from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.grids import SurfaceGrid
     from khala_simulator.native.columns import Columns
     from khala_simulator.numeric.geometry import Floats
     from khala_simulator.world.columns import Ints
@@ -157,7 +157,7 @@ def _look(world: World, c: Columns, turning: list[int]) -> None:
         c.aside[slot] = heading
 
 
-def _first_free(c: Columns, crowd: _Crowd, grid: Grid | None, slot: int, way: memory.Point) -> int:
+def _first_free(c: Columns, crowd: _Crowd, grid: SurfaceGrid | None, slot: int, way: memory.Point) -> int:
     """Return the number of the first heading of the fan that is free, ``FAN`` if none is."""
     for turn in range(FAN):
         heading = _heading(way, turn, c.detour[slot])
@@ -172,7 +172,7 @@ def _heading(way: memory.Point, turn: int, side: float) -> memory.Point:
     return memory.point(way.x * FAN_COS[turn] - way.y * sine, way.y * FAN_COS[turn] + way.x * sine)
 
 
-def _is_ground(grid: Grid, start: memory.Point, heading: memory.Point) -> bool:
+def _is_ground(grid: SurfaceGrid, start: memory.Point, heading: memory.Point) -> bool:
     """Return whether a heading leads to a free cell."""
     return grid.flat[grids.cell_at(grid, start.x + heading.x * SEEN_AHEAD, start.y + heading.y * SEEN_AHEAD)]
 

@@ -34,7 +34,8 @@ def _tick(world: World) -> None:
     """Run the rules of buffs whose period has come; a buff that another rule removes meanwhile does nothing more."""
     due = which(world.buffs.rows["due"] <= world.loop)
     for row in world.buffs.rows[due]:
-        slot, kind = int(row["slot"]), world.catalog.buffs[int(row["buff"])]
+        slot = int(row["slot"])
+        kind = world.catalog.buffs[int(row["buff"])]
         index = world.buffs.find(slot, kind.row)
         if index < 0:
             continue

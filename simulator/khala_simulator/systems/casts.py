@@ -76,7 +76,8 @@ def _begin(world: World, cast: Cast) -> None:
 
 
 def _take_effect(world: World, cast: Cast) -> None:
-    slot, skill = cast.slot, casting.skill_of(cast.ability)
+    slot = cast.slot
+    skill = casting.skill_of(cast.ability)
     why = ActionResult.SUCCESS
     if world.cast_begun[slot] < world.loop and not world.bound[slot]:  # it took time to prepare: look again
         why = casting.refusal(world, slot, cast.ability)

@@ -19,7 +19,7 @@ from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
     from khala_simulator.movement.contacts import Crowd
-    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.grids import SurfaceGrid
     from khala_simulator.movement.pathfinding import Surface
     from khala_simulator.native.columns import Columns
     from khala_simulator.native.memory import Cells
@@ -85,7 +85,7 @@ def _keep_on_surfaces(world: World, crowd: Crowd, c: Columns, slots: Cells) -> N
             crowd.after[i] = _free_or_back(grid, before, kept)
 
 
-def _off_walls(grid: Grid, at: memory.Point, cell: int, room: float) -> memory.Point:
+def _off_walls(grid: SurfaceGrid, at: memory.Point, cell: int, room: float) -> memory.Point:
     """Return where a body in a cell keeps its clearance away from blocked cells."""
     corner_x = math.floor(at.x + grid.shift) - grid.shift
     corner_y = math.floor(at.y + grid.shift) - grid.shift
@@ -107,7 +107,7 @@ def _off_walls(grid: Grid, at: memory.Point, cell: int, room: float) -> memory.P
     )
 
 
-def _free_or_back(grid: Grid, before: memory.Point, after: memory.Point) -> memory.Point:
+def _free_or_back(grid: SurfaceGrid, before: memory.Point, after: memory.Point) -> memory.Point:
     """Slide along one axis where the new place is blocked, else stay, else leave towards the nearest free cell."""
     if grid.flat[grids.cell_at(grid, after.x, after.y)]:
         return after
@@ -120,7 +120,7 @@ def _free_or_back(grid: Grid, before: memory.Point, after: memory.Point) -> memo
     return _leave_wall(grid, before, after)
 
 
-def _leave_wall(grid: Grid, before: memory.Point, after: memory.Point) -> memory.Point:
+def _leave_wall(grid: SurfaceGrid, before: memory.Point, after: memory.Point) -> memory.Point:
     """Return where a body goes that stood inside a wall; ``after`` when nothing is free."""
     surface: Surface = grid.surface
     free = surface.nearest_free(np.array((before.x, before.y)))

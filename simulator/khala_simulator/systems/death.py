@@ -12,7 +12,7 @@ from khala_simulator.world.world import Death
 
 if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
-    from khala_simulator.world.players import Spent
+    from khala_simulator.world.players import Spending
     from khala_simulator.world.world import World
 
 NO_KILLER = -1
@@ -66,7 +66,8 @@ def _last_of_buffs(world: World, slot: int) -> None:
 
 def _note(world: World, slot: int, killer: int) -> None:
     """Remember a death, and enter it into the scores unless it was a hallucination's."""
-    owner, unit = int(world.owner[slot]), world.unit_type(slot)
+    owner = int(world.owner[slot])
+    unit = world.unit_type(slot)
     world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, killer))
     if not world.hallucination[slot]:
         _count(world, unit, owner, killer)
@@ -94,7 +95,7 @@ def _count(world: World, unit: UnitType, owner: int, killer: int) -> None:
         won.killed_value_units += unit.score_kill
 
 
-def _add(spent: Spent, unit: UnitType) -> None:
+def _add(spent: Spending, unit: UnitType) -> None:
     """Add a unit's price to its category: workers and town halls are economy, other structures technology."""
     if unit.worker or (unit.structure and unit.provides > 0 and "structure" in unit.attributes):
         category = spent.economy

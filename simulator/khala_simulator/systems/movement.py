@@ -60,7 +60,7 @@ def _face_targets(world: World, c: Columns) -> None:
     for i in range(len(fighters)):
         slot = slots[i]
         if c.aim_cos[slot] > -1.0 and not c.turreted[slot] and not c.wants[slot]:
-            c.heading[slot] = turning.turned(
+            c.heading[slot] = turning.turn(
                 c.heading[slot], c.toward[slot], c.turn_still_cos[slot], c.turn_still_sin[slot]
             )
 
@@ -176,7 +176,7 @@ def _turn(c: Columns, walks: _Walks, i: int) -> None:
     late = walks.error_cos[i] < c.turn_cos[slot]
     cos_step = c.turn_still_cos[slot] if standing else c.turn_cos[slot]
     sin_step = c.turn_still_sin[slot] if standing else c.turn_sin[slot]
-    facing = turning.turned(c.heading[slot], way, cos_step, sin_step)
+    facing = turning.turn(c.heading[slot], way, cos_step, sin_step)
     swings = c.glides[slot] and walks.left[i] > TURNING_CIRCLES * walks.step[i]
     c.heading[slot] = facing
     if late and not swings:

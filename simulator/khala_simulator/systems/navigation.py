@@ -16,7 +16,7 @@ from khala_simulator.tables.layers import Layer
 from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
-    from khala_simulator.movement.grids import Grid
+    from khala_simulator.movement.grids import SurfaceGrid
     from khala_simulator.movement.ways import Way
     from khala_simulator.native.columns import Columns
     from khala_simulator.native.memory import Cells
@@ -120,7 +120,7 @@ def _stopping_point(c: Columns, slot: int) -> memory.Point:
     return memory.point(c.goal[slot].x + x * share, c.goal[slot].y + y * share)
 
 
-def _go_round(world: World, c: Columns, grid: Grid, slots: Cells, n: int) -> None:
+def _go_round(world: World, c: Columns, grid: SurfaceGrid, slots: Cells, n: int) -> None:
     """Send walkers whose straight line is not free to the next corners of their ways."""
     crooked = []
     for i in range(n):
@@ -140,7 +140,7 @@ def _go_round(world: World, c: Columns, grid: Grid, slots: Cells, n: int) -> Non
         _turn_corner(c, grid, way)
 
 
-def _turn_corner(c: Columns, grid: Grid, way: Way) -> None:
+def _turn_corner(c: Columns, grid: SurfaceGrid, way: Way) -> None:
     """Send a walker to the next corner of its way, or to the middle of the last cell."""
     slot = way.walker
     if grids.cell_at(grid, c.pos[slot].x, c.pos[slot].y) != way.goal:
@@ -153,7 +153,7 @@ def _turn_corner(c: Columns, grid: Grid, way: Way) -> None:
     c.nav_end[slot] = x * x + y * y < CORNER_REACHED * CORNER_REACHED
 
 
-def _nearest(grid: Grid, point: Floats, part: int, start: memory.Point) -> int:
+def _nearest(grid: SurfaceGrid, point: Floats, part: int, start: memory.Point) -> int:
     """Return the cell of a connected part nearest to a point; the side of the start decides near ties."""
     found, distance = grid.surface.around(point, part)
     cells = memory.ints(found)

@@ -2,7 +2,7 @@ cimport cython
 from libc.stdint cimport int64_t
 
 from khala_simulator.movement cimport arrival
-from khala_simulator.movement.arrival cimport Gathering
+from khala_simulator.movement.arrival cimport ArrivalCrowd
 from khala_simulator.native cimport columns
 from khala_simulator.native.columns cimport Columns
 
@@ -17,7 +17,7 @@ cpdef carry_out(object world)
 cdef list _find_lost(object world, Columns c)
 @cython.locals(target=int64_t)
 cdef bint _is_lost(Columns c, int64_t slot) noexcept
-@cython.locals(loop=int64_t, just_looked=bint, looks_at_crowds=bint, crowd=Gathering, slot=Py_ssize_t)
+@cython.locals(loop=int64_t, just_looked=bint, looks_at_crowds=bint, crowd=ArrivalCrowd, slot=Py_ssize_t)
 cdef _find_arrived(object world, Columns c, list found)
 cdef bint _goes_on(Columns c, int64_t slot, bint just_looked) noexcept
 cdef bint _is_there(Columns c, int64_t slot) noexcept

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import commands
 from khala_simulator.movement import arrival
-from khala_simulator.movement.arrival import Gathering
+from khala_simulator.movement.arrival import ArrivalCrowd
 from khala_simulator.native import columns
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
@@ -60,8 +60,8 @@ def _find_arrived(world: World, c: Columns, found: list[int]) -> None:
             found.append(slot)
         elif looks_at_crowds and (c.blocked[slot] > 0 or loop - c.nav_best_loop[slot] > CROWD_STALL):
             if crowd is None:
-                crowd = Gathering(world)
-            if arrival.packed(c, crowd, slot):
+                crowd = ArrivalCrowd(world)
+            if arrival.is_packed(c, crowd, slot):
                 found.append(slot)
 
 

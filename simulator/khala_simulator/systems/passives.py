@@ -25,7 +25,8 @@ def run(world: World) -> None:
 
 def _look_over(world: World) -> None:
     """List the units whose types have a rule, after a unit came or went."""
-    world.passive_units_at, world.passive_units = world.population, {}
+    world.passive_units_at = world.population
+    world.passive_units = {}
     slots = world.live[_has_rule(world.catalog).take(world.type.take(world.live))]
     for slot in slots.tolist():
         world.passive_units.setdefault(world.unit_type(slot).name, []).append(slot)

@@ -19,7 +19,7 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
-    from khala_simulator.world.jobs import Job
+    from khala_simulator.world.jobs import ProductionJob
     from khala_simulator.world.world import Rally, World
 
 DOORSTEP: Final = 0.25  # from a structure's edge to the body of the unit that comes out
@@ -45,7 +45,8 @@ def _works(world: World, slot: int) -> bool:
 def _advance(world: World, slot: int) -> None:
     rate = float(world.work_rate[slot])
     at_once = "fast_build" in world.players[int(world.owner[slot])].cheats
-    index, at_work = 0, production.parallel(world, slot)
+    index = 0
+    at_work = production.parallel(world, slot)
     while index < at_work and index < len(world.jobs.get(slot, ())):
         job = world.jobs[slot][index]
         if job.begun or _begin(world, slot, job):
@@ -56,36 +57,37 @@ def _advance(world: World, slot: int) -> None:
             index += 1
 
 
-def _is_done(world: World, job: Job) -> bool:
+def _is_done(world: World, job: ProductionJob) -> bool:
     if job.kind != "addon":
         return job.done >= job.loops
     site = world.slot_of(job.site)
     return site == NOBODY or bool(world.build_progress[site] >= 1.0)
 
 
-def _begin(world: World, slot: int, job: Job) -> bool:
+def _begin(world: World, slot: int, job: ProductionJob) -> bool:
     """Begin a job if supply allows; a waiting one holds up the queue."""
     owner = int(world.owner[slot])
     job.begun = supply.has_room(world, owner, job.supply)
     return job.begun
 
 
-def finish(world: World, slot: int, job: Job) -> None:
+def finish(world: World, slot: int, job: ProductionJob) -> None:
     """Put a job's product into the world."""
     production.drop(world, slot, job)
     FINISH.get(job.kind, _nothing)(world, slot, job)
 
 
-def _nothing(_: World, __: int, ___: Job) -> None:
+def _nothing(_: World, __: int, ___: ProductionJob) -> None:
     """Do nothing: the structure itself is the product."""
 
 
 # units ----------------------------------------------------------------------------------------------------------------
 
 
-def _born(world: World, slot: int, job: Job) -> None:
+def _hatch(world: World, slot: int, job: ProductionJob) -> None:
     unit = world.catalog.unit(job.makes)
-    parent, owner = world.unit_type(slot), int(world.owner[slot])
+    parent = world.unit_type(slot)
+    owner = int(world.owner[slot])
     rally = rally_of(world, slot, unit)
     born: list[int] = []
     if not parent.structure:
@@ -138,19 +140,20 @@ def _nearest_parent(world: World, slot: int) -> int:
 # everything else ------------------------------------------------------------------------------------------------------
 
 
-def _armed(world: World, slot: int, _: Job) -> None:
+def _add_interceptor(world: World, slot: int, _: ProductionJob) -> None:
     """Put a Carrier's new Interceptor into its hangar at once."""
     carrier.add_interceptor(world, slot)
 
 
-def _researched(world: World, slot: int, job: Job) -> None:
+def _grant_upgrade(world: World, slot: int, job: ProductionJob) -> None:
     owner = int(world.owner[slot])
     commands.grant_upgrade(world, owner, world.catalog.upgrade(job.makes).id)
     world.alert(owner, "ResearchComplete")
 
 
-def _changed(world: World, slot: int, job: Job) -> None:
-    unit, owner = world.catalog.unit(job.makes), int(world.owner[slot])
+def _morph(world: World, slot: int, job: ProductionJob) -> None:
+    unit = world.catalog.unit(job.makes)
+    owner = int(world.owner[slot])
     had_energy = bool(world.energy_max[slot])
     lifecycle.become(world, slot, unit)
     if not had_energy:
@@ -158,7 +161,7 @@ def _changed(world: World, slot: int, job: Job) -> None:
     world.alert(owner, "MorphComplete")
 
 
-def _added(world: World, slot: int, job: Job) -> None:
+def _connect_addon(world: World, slot: int, job: ProductionJob) -> None:
     site = world.slot_of(job.site)
     if site != NOBODY:
         world.addon[slot] = site
@@ -166,9 +169,9 @@ def _added(world: World, slot: int, job: Job) -> None:
 
 
 FINISH: Final = {
-    "addon": _added,
-    "arm": _armed,
-    "train": _born,
-    "research": _researched,
-    "structure_morph": _changed,
+    "addon": _connect_addon,
+    "arm": _add_interceptor,
+    "train": _hatch,
+    "research": _grant_upgrade,
+    "structure_morph": _morph,
 }

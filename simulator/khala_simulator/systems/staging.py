@@ -26,7 +26,7 @@ from khala_simulator.maps.script import (
     Regroup,
     Remove,
     Select,
-    Spawn,
+    SpawnGroups,
 )
 from khala_simulator.movement.placement import free_places
 from khala_simulator.world.players import NEUTRAL, GameResult
@@ -142,7 +142,8 @@ def _on_map(world: World, x: float, y: float) -> Point:
 def random_place(world: World, unit: UnitType, at: RandomPlace) -> Point:
     """Return a random point of the region on which the unit can stand, with the required distance to others."""
     region = world.map.scenario.regions[at.random_in]
-    best, best_slack = (0.0, 0.0), -math.inf
+    best = (0.0, 0.0)
+    best_slack = -math.inf
     for point in _points_in(world, region):
         if not _can_stand(world, unit, point):
             continue
@@ -210,14 +211,14 @@ def units_like(world: World, who: Who) -> Ints:
 
 
 def _order(world: World, spec: OrderSpec) -> None:
-    slots = _addressed(world, spec)
+    slots = _addressees(world, spec)
     before = {slot: world.orders_of(slot) for slot in slots} if spec.queue == "front" else {}
     _command(world, spec, slots, queue=spec.queue == "append")
     for slot, orders in before.items():
         world.queue[slot] = [order for order in orders if order.ability]
 
 
-def _addressed(world: World, spec: OrderSpec) -> list[int]:
+def _addressees(world: World, spec: OrderSpec) -> list[int]:
     slots = world.units_of(spec.player)
     if spec.inside is not None:
         slots = slots[world.map.scenario.regions[spec.inside].covers(world.pos[slots])]
@@ -313,7 +314,7 @@ def _give(world: World, given: dict[int, Any]) -> None:
 
 _ACTIONS: Final[dict[type, Callable[[World, Any], object]]] = {
     Create: lambda world, action: create(world, action.create),
-    Spawn: lambda world, action: _spawn(world, action.spawn),
+    SpawnGroups: lambda world, action: _spawn(world, action.spawn),
     Regroup: lambda world, action: _regroup(world, action.regroup),
     OrderUnits: lambda world, action: _order(world, action.order),
     Select: lambda world, action: _select(world, action.select),

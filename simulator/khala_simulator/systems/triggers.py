@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from khala_simulator.maps.game_map import GameMap
     from khala_simulator.maps.scenario import Scenario
-    from khala_simulator.maps.script import Comparison, Condition, EnterSpec, TouchSpec, Trigger, When, Who
+    from khala_simulator.maps.script import Condition, EnterSpec, NumberCondition, TouchSpec, Trigger, When, Who
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import Death, World
 
@@ -87,13 +87,13 @@ def _occasions(world: World, number: int, trigger: Trigger, deaths: list[Death])
     plain = False
     for when in trigger.when:
         if isinstance(when, Died):
-            yield from (NOBODY for death in deaths if _was(world, death, when.died))
+            yield from (NOBODY for death in deaths if _is_meant(world, death, when.died))
         elif isinstance(when, Made):
-            yield from _made(world, when.made)
+            yield from _note_made(world, when.made)
         elif isinstance(when, Touches):
-            yield from _touched(world, when.touches)
+            yield from _touched_units(world, when.touches)
         elif isinstance(when, Enters):
-            plain |= _entered(world, number, when.enters)
+            plain |= _note_entry(world, number, when.enters)
         else:
             plain |= _is_due(when, world.loop, bool(deaths))
     if plain:
@@ -108,12 +108,12 @@ def _is_due(when: When, loop: int, died: bool) -> bool:
     return when == "unit_died" and died
 
 
-def _was(world: World, death: Death, who: Who) -> bool:
+def _is_meant(world: World, death: Death, who: Who) -> bool:
     fits = who.player is None or death.owner == who.player
     return fits and (who.unit is None or death.type_id == world.catalog.unit(who.unit).id)
 
 
-def _made(world: World, who: Who) -> Iterator[int]:
+def _note_made(world: World, who: Who) -> Iterator[int]:
     slots = staging.units_like(world, who)
     finished = slots[world.build_progress[slots] >= FINISHED]
     for slot in finished.tolist():
@@ -133,13 +133,14 @@ def _inside(world: World, spec: EnterSpec) -> frozenset[int]:
     return frozenset(world.tag[slots[region.covers(world.pos[slots])]].tolist())
 
 
-def _entered(world: World, number: int, spec: EnterSpec) -> bool:
-    before, now = world.script.inside.get(number, frozenset()), _inside(world, spec)
+def _note_entry(world: World, number: int, spec: EnterSpec) -> bool:
+    before = world.script.inside.get(number, frozenset())
+    now = _inside(world, spec)
     world.script.inside[number] = now
     return not now <= before
 
 
-def _touched(world: World, spec: TouchSpec) -> Iterator[int]:
+def _touched_units(world: World, spec: TouchSpec) -> Iterator[int]:
     """Yield slots of the touched neutral units; each is checked again, because it may be gone by then."""
     row = world.catalog.unit(spec.unit).row
     mine = world.units_of(spec.player)
@@ -174,10 +175,10 @@ def _score(world: World, player: int) -> float:
     return world.players[player].score.curriculum if player < len(world.players) else 0.0
 
 
-def _counts(world: World, asked: Iterable[tuple[int, dict[str, Comparison]]], least: float) -> bool:
+def _counts(world: World, asked: Iterable[tuple[int, dict[str, NumberCondition]]], least: float) -> bool:
     """Return whether every number of units of a type fits, among those that are finished to at least ``least``."""
     for player, types in asked:
-        slots = _owned(world, player, least)
+        slots = _units_owned(world, player, least)
         rows = np.bincount(world.type[slots], minlength=len(world.catalog.units))
         for name, comparison in types.items():
             if not comparison.holds(int(rows[world.catalog.unit(name).row])):
@@ -185,7 +186,7 @@ def _counts(world: World, asked: Iterable[tuple[int, dict[str, Comparison]]], le
     return True
 
 
-def _owned(world: World, player: int, least: float) -> Ints:
+def _units_owned(world: World, player: int, least: float) -> Ints:
     """Return the slots of all of a player's units, with passengers, without hallucinations."""
     mine = world.alive & (world.owner == player) & (world.build_progress >= least) & ~world.hallucination
     slots: Ints = np.flatnonzero(mine)

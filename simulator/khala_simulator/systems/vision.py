@@ -88,7 +88,7 @@ def _hide(world: World, c: Columns, hidden: list[int]) -> None:
     """Take cloaked units from the sight of players that do not detect them."""
     slots = np.array(hidden, dtype=np.int64)
     for player in range(len(world.players)):
-        found = detected(world, player, slots)
+        found = are_detected(world, player, slots)
         is_found = memory.bools(found)
         for i in range(len(hidden)):
             slot = hidden[i]
@@ -96,7 +96,7 @@ def _hide(world: World, c: Columns, hidden: list[int]) -> None:
                 c.visible[player * c.capacity + slot] = False
 
 
-def detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
+def are_detected(world: World, player: int, slots: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return (k,) whether a detector or a scan of the player reaches each unit's edge."""
     eyes = world.units_of(player)
     eyes = eyes[world.detects[eyes] > 0.0]

@@ -92,7 +92,7 @@ def _start_attacks(world: World, c: Columns) -> None:
     for i in range(len(fighters)):
         slot = slots[i]
         if turrets and c.turreted[slot]:
-            c.turret[slot] = turning.turned(c.turret[slot], c.toward[slot], c.turret_cos[slot], c.turret_sin[slot])
+            c.turret[slot] = turning.turn(c.turret[slot], c.toward[slot], c.turret_cos[slot], c.turret_sin[slot])
         if not c.in_reach[slot] or c.cooldown[slot] > 0.0 or _is_under_way(c, slot) or not _is_aimed(c, slot):
             continue
         row = _choose_weapon(c, slot)

@@ -12,7 +12,7 @@ from enum import IntFlag
 from typing import Any, Final
 
 
-class Aim(IntFlag):
+class AbilityAim(IntFlag):
     """What an ability can be aimed at."""
 
     NONE = 1
@@ -21,11 +21,11 @@ class Aim(IntFlag):
 
 
 AIMS: Final = {
-    "none": Aim.NONE,
-    "point": Aim.POINT,
-    "unit": Aim.UNIT,
-    "point_or_unit": Aim.POINT | Aim.UNIT,
-    "point_or_none": Aim.POINT | Aim.NONE,
+    "none": AbilityAim.NONE,
+    "point": AbilityAim.POINT,
+    "unit": AbilityAim.UNIT,
+    "point_or_unit": AbilityAim.POINT | AbilityAim.UNIT,
+    "point_or_none": AbilityAim.POINT | AbilityAim.NONE,
 }
 
 
@@ -79,7 +79,7 @@ class Ability:
     effect: str = ""
     general: int = 0
     link: str = ""
-    aim: Aim = Aim.NONE
+    aim: AbilityAim = AbilityAim.NONE
     users: tuple[str, ...] = ()
     range: float = 0.0
     slop: float = 0.0
@@ -121,7 +121,7 @@ class Ability:
     @property
     def requires_point(self) -> bool:
         """Whether it must be aimed, in the terms of the API's list of available abilities."""
-        return Aim.NONE not in self.aim
+        return AbilityAim.NONE not in self.aim
 
     @property
     def timer(self) -> str:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from khala_simulator.tables.abilities import Ability, ability_from
 from khala_simulator.tables.buffs import Buff, buff_from
-from khala_simulator.tables.prices import priced
+from khala_simulator.tables.prices import add_price
 from khala_simulator.tables.records import (
     Affects,
     Area,
@@ -125,8 +125,9 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     weapon_of_id = {w.id: w for w in weapons}
     units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(_rows(name, "units"))))
     upgrades = tuple(_upgrade(raw) for raw in _rows(name, "upgrades"))
-    unpriced = (ability_from(raw) for raw in _rows(name, "abilities"))
-    abilities = priced(unpriced, {u.name: u for u in units}, {u.name: u for u in upgrades})
+    unit_of = {unit.name: unit for unit in units}
+    upgrade_of = {upgrade.name: upgrade for upgrade in upgrades}
+    abilities = tuple(add_price(ability_from(raw), unit_of, upgrade_of) for raw in _rows(name, "abilities"))
     cards = _cards(units, abilities)
     buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
     return Catalog(

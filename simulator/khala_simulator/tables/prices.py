@@ -1,6 +1,6 @@
 """Prices: what a player pays for the product of an ability.
 
-The tables keep most prices with the product (``made_by``); ``priced`` brings them to the abilities once, when a
+The tables keep most prices with the product (``made_by``); ``add_price`` brings them to the abilities once, when a
 catalog is loaded, so that one rule of affording holds for all. ``payments`` takes them and gives them back.
 """
 
@@ -10,7 +10,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.records import UnitType, Upgrade
@@ -23,19 +23,13 @@ BUILD_REACH: Final = 0.5
 """How far from a structure's body its builder may stand when it places it (an estimate)."""
 
 
-def priced(
-    abilities: Iterable[Ability], units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]
-) -> tuple[Ability, ...]:
-    """Return the abilities, with missing price, supply, time and builder's reach filled in from their products.
+def add_price(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]) -> Ability:
+    """Return an ability, with missing price, supply, time and builder's reach filled in from its product.
 
     An ability whose product is not in the version's tables does nothing.
     """
-    return tuple(_priced(ability, units, upgrades) for ability in abilities)
-
-
-def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[str, Upgrade]) -> Ability:
     if ability.effect == "research":
-        return _priced_research(ability, upgrades.get(ability.upgrade))
+        return _add_research_price(ability, upgrades.get(ability.upgrade))
     product = units.get(ability.unit)
     if ability.effect not in BY_PRODUCT:
         return ability
@@ -58,7 +52,7 @@ def _priced(ability: Ability, units: Mapping[str, UnitType], upgrades: Mapping[s
     )
 
 
-def _priced_research(ability: Ability, upgrade: Upgrade | None) -> Ability:
+def _add_research_price(ability: Ability, upgrade: Upgrade | None) -> Ability:
     if upgrade is None or not ability.loops:
         return dataclasses.replace(ability, effect="")
     if ability.minerals or ability.vespene:

@@ -157,7 +157,7 @@ class Stats:
         """Return the ability as a player has it now, with the range, cooldown and times that upgrades change."""
         return self._abilities[player].get(ability.id, ability)
 
-    def changed(self, player: int, catalog: str, entry: str, field: str, base: float) -> float:
+    def with_upgrades(self, player: int, catalog: str, entry: str, field: str, base: float) -> float:
         """Return a number of the game's data with the player's upgrades applied; in the data's own unit."""
         return self._changes[player].value(catalog, entry, field, base)
 

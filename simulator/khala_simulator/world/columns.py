@@ -26,7 +26,7 @@ DTYPES: Final[dict[type, type[np.generic]]] = {bool: np.bool_, int: np.int64, fl
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class ColumnSpec:
     """How one column is made: its dtype, the value of an unused slot, numbers per slot, and whether it is state."""
 
     dtype: type[np.generic]
@@ -41,12 +41,12 @@ class Column:
 
 def state(of: type, empty: float = 0, *, width: int = 0) -> Any:
     """Declare a column that decides the future."""
-    return Column(DTYPES[of], empty, width, is_state=True)
+    return ColumnSpec(DTYPES[of], empty, width, is_state=True)
 
 
 def trait(of: type, empty: float = 0, *, width: int = 0) -> Any:
     """Declare a column that follows from others."""
-    return Column(DTYPES[of], empty, width, is_state=False)
+    return ColumnSpec(DTYPES[of], empty, width, is_state=False)
 
 
 class Native(Protocol):
@@ -239,4 +239,4 @@ class UnitColumns:
         return b"".join(getattr(self, name)[:slots].tobytes() for name, column in COLUMNS.items() if column.is_state)
 
 
-COLUMNS: Final[dict[str, Column]] = {k: v for k, v in vars(UnitColumns).items() if isinstance(v, Column)}
+COLUMNS: Final[dict[str, ColumnSpec]] = {k: v for k, v in vars(UnitColumns).items() if isinstance(v, ColumnSpec)}

@@ -24,7 +24,7 @@ GENERATING: Final = "makeCreep2x2Overlord"
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.maps.game_map import Terrain
+    from khala_simulator.maps.game_map import MapTerrain
 
     Bools = NDArray[np.bool_]
     Ints = NDArray[np.int64]
@@ -90,7 +90,7 @@ class CreepSource:
 class Creep:
     """The creep of one game. ``covered`` is (h, w), replaced and never changed in place."""
 
-    def __init__(self, terrain: Terrain, version: str) -> None:
+    def __init__(self, terrain: MapTerrain, version: str) -> None:
         self.spreads = spreads(version)
         self.covered: Bools = terrain.creep
         self.anywhere = bool(terrain.creep.any())

@@ -26,9 +26,9 @@ from khala_simulator.world.active_buffs import ActiveBuffs
 from khala_simulator.world.caches import WorldCaches
 from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from khala_simulator.world.creep import Creep
-from khala_simulator.world.ground import Ground
+from khala_simulator.world.ground import BuiltGround
 from khala_simulator.world.orders import ATTACK, Order, OrderKind
-from khala_simulator.world.players import NEUTRAL, GameResult, Player, PlayerSetup
+from khala_simulator.world.players import NEUTRAL, GameResult, PlayerSetup, PlayerState
 from khala_simulator.world.script_memory import ScriptMemory
 from khala_simulator.world.snapshots import FogMemory
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from khala_simulator.tables.catalog import Catalog, UnitType
     from khala_simulator.world.area_effects import AreaEffect
     from khala_simulator.world.casts import Cast
-    from khala_simulator.world.jobs import Job
+    from khala_simulator.world.jobs import ProductionJob
     from khala_simulator.world.shots import Missile, PendingHit, Sweep
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
@@ -115,10 +115,10 @@ class World(UnitColumns, WorldCaches):
         self.seed = seed
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.loop = 0
-        self.players: list[Player] = [Player(NEUTRAL, "neutral", "none")]
-        self.players += [Player(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
+        self.players: list[PlayerState] = [PlayerState(NEUTRAL, "neutral", "none")]
+        self.players += [PlayerState(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
         self.stats = new_stats(self.catalog, len(self.players))
-        self.ground = Ground(game_map.terrain)
+        self.ground = BuiltGround(game_map.terrain)
         self.fog: bool = fog and game_map.scenario.visibility.fog
         self.visibility: NDArray[np.uint8]  # (players, h, w): 0 never seen, 1 seen before, 2 visible
         width, height = game_map.terrain.size
@@ -137,7 +137,7 @@ class World(UnitColumns, WorldCaches):
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
         self.alerts: list[PlayerAlert] = []
-        self.jobs: dict[int, list[Job]] = {}  # slot -> its products, in order
+        self.jobs: dict[int, list[ProductionJob]] = {}  # slot -> its products, in order
         self.invested: dict[int, tuple[float, float]] = {}  # slot -> the price paid for its construction
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []

@@ -13,7 +13,7 @@ from khala_simulator.abilities.terran import addons
 from khala_simulator.combat import buffs, lifecycle, targets
 from khala_simulator.combat.traits import refresh
 from khala_simulator.economy import harvesting, production
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tick import advance
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def _use(number: int, loops: int = 2, distance: float = 4.0) -> Preparation:
     def prepare(world: World, slot: int) -> None:
         ability = world.catalog.ability(number)
         x, y = world.pos[slot].tolist()
-        tag = world.tag_of(_foe(world, (x + distance, y))) if Aim.UNIT in ability.aim else 0
-        point = (x + distance, y) if Aim.POINT in ability.aim and not tag else None
+        tag = world.tag_of(_foe(world, (x + distance, y))) if AbilityAim.UNIT in ability.aim else 0
+        point = (x + distance, y) if AbilityAim.POINT in ability.aim and not tag else None
         assert casting.use(world, [slot], ability, target=tag, point=point)
         advance(world, loops)
 
@@ -84,7 +84,7 @@ def _begin(link: str, does: str) -> Preparation:
                 wanted = ability.effect in {"morph", "root"} and ability.loops + ability.prep_loops > 0
             if does == "cancel_growth" and before is None:
                 wanted = ability.effect == "grow"
-            point = (x, y) if Aim.POINT in ability.aim and Aim.NONE not in ability.aim else None
+            point = (x, y) if AbilityAim.POINT in ability.aim and AbilityAim.NONE not in ability.aim else None
             if wanted and casting.use(world, [slot], ability, point=point):
                 advance(world, 4 if does == "cancel" else 16)
                 return

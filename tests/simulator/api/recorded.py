@@ -21,7 +21,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.api import ui
 from khala_simulator.api.effects import seen_buffs
 from khala_simulator.api.layers import Frame
-from khala_simulator.api.raw import Units
+from khala_simulator.api.raw import PerceivedUnits
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.types import types_of
 from khala_simulator.combat import lifecycle
@@ -85,10 +85,12 @@ def seats_of(world: World) -> list[PlayerSeat]:
     ]
 
 
-def units_of(seat: PlayerSeat, sight: Sight) -> Units:
+def units_of(seat: PlayerSeat, sight: Sight) -> PerceivedUnits:
     """Return the units of a sight for raw data; every second one is selected."""
     half = np.arange(len(sight)) % 2 == 0
-    return Units(seat.world, seat.types, sight, half, ~half, (1.5, 2.25), seen_buffs(seat.world, sight), seat.player)
+    return PerceivedUnits(
+        seat.world, seat.types, sight, half, ~half, (1.5, 2.25), seen_buffs(seat.world, sight), seat.player
+    )
 
 
 def shown(seat: PlayerSeat, *, through_fog: bool) -> dict[str, bytes]:

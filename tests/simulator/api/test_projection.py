@@ -2,10 +2,10 @@
 
 import pytest
 
-from khala_simulator.api.projection import Minimap, Rect, Screen
+from khala_simulator.api.projection import Minimap, Rect, ScreenView
 
-SQUARE = Screen(128, 128, 24.0)
-WIDE = Screen(84, 64, 24.0)
+SQUARE = ScreenView(128, 128, 24.0)
+WIDE = ScreenView(84, 64, 24.0)
 MAP = Minimap(64, 64, Rect(0, 0, 32, 32))
 
 

@@ -173,7 +173,7 @@ def test_the_score_knows_what_was_collected_and_spent(table: Table) -> None:
     details = table.observe().score.score_details
     assert (details.collected_minerals, details.spent_minerals) == (5.0, 50.0)
     assert details.collection_rate_minerals == pytest.approx(5 * 60 * 22.4 / table.world.loop)
-    assert harvesting.assigned(table.world)[field] == 1
+    assert harvesting.workers_per_resource(table.world)[field] == 1
 
 
 def test_alerts_are_told_once(table: Table) -> None:

@@ -32,7 +32,7 @@ rows = st.tuples(st.integers(0, 2**64 - 1), st.integers(0, 20), st.floats(width=
 
 @given(st.lists(rows, max_size=5), st.integers(1, 60))
 def test_a_message_is_written_as_by_the_message_classes(units: list[tuple[int, int, float]], room: int) -> None:
-    raw, message, unit = raw_pb2.ObservationRaw(), wire.Message(room), wire.Message(room)
+    raw, message, unit = raw_pb2.ObservationRaw(), wire.MessageWriter(room), wire.MessageWriter(room)
     for tag, owner, number in units:
         point = common_pb2.Point(x=number, y=1.5, z=-number)
         raw.units.add(tag=tag, owner=owner, pos=point, facing=number)

@@ -19,7 +19,7 @@ from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.movement.placement import free_places
 from khala_simulator.systems.triggers import players_of
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.world import World
 
@@ -43,12 +43,12 @@ def give_orders(world: World, chance: random.Random) -> None:
 
 
 def _give(world: World, player: int, slot: int, ability: int, chance: random.Random) -> None:
-    aims = [aim for aim in Aim if aim & world.catalog.ability(ability).aim]
+    aims = [aim for aim in AbilityAim if aim & world.catalog.ability(ability).aim]
     aim = chance.choice(aims)
     target, point = 0, None
-    if aim is Aim.UNIT:
+    if aim is AbilityAim.UNIT:
         target = world.tag_of(chance.choice(world.live.tolist()))
-    elif aim is Aim.POINT:
+    elif aim is AbilityAim.POINT:
         x, y = world.pos[slot].tolist()
         point = (x + chance.uniform(-9, 9), y + chance.uniform(-9, 9))
     queue = chance.random() < 0.2

@@ -11,7 +11,7 @@ from khala_simulator.abilities import casting, commands
 from khala_simulator.abilities.registry import SKILLS
 from khala_simulator.abilities.skill import Skill
 from khala_simulator.combat import buffs
-from khala_simulator.tables.abilities import Aim, Filter, Need
+from khala_simulator.tables.abilities import AbilityAim, Filter, Need
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
@@ -121,12 +121,12 @@ def test_a_debug_state_takes_a_need_away(field: Any, cheat: str) -> None:
 @pytest.mark.usefixtures("trick")
 def test_whom_an_ability_may_be_aimed_at(field: Any, victim: str, owner: int, words: Filter, why: ActionResult) -> None:
     slot, target = caster(field), field.put(victim, owner, 12, 16)
-    made = ability(field, filters=words, aim=Aim.UNIT, range=9.0)
+    made = ability(field, filters=words, aim=AbilityAim.UNIT, range=9.0)
     assert casting.aim_refusal(field.world, Cast(slot, made, target)) is why
 
 
 def test_a_caster_walks_into_range_and_pays_when_it_takes_effect(field: Any, trick: Trick) -> None:
-    slot, made = caster(field), ability(field, aim=Aim.POINT, range=4.0, energy=60.0, cooldown_loops=32.0)
+    slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=4.0, energy=60.0, cooldown_loops=32.0)
     assert casting.use(field.world, [slot], made, point=(20.0, 16.0)) == [slot]
     world = field.world
     before = 0.0
@@ -141,7 +141,7 @@ def test_a_caster_walks_into_range_and_pays_when_it_takes_effect(field: Any, tri
 
 
 def test_preparation_delays_the_effect_and_a_new_order_drops_it(field: Any, trick: Trick) -> None:
-    slot, made = caster(field), ability(field, aim=Aim.POINT, range=9.0, prep_loops=20.0)
+    slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=9.0, prep_loops=20.0)
     casting.use(field.world, [slot], made, point=(14.0, 16.0))
     field.play(20)
     assert not trick.effects
@@ -160,7 +160,7 @@ def test_a_channel_ends_once_in_time_or_by_another_order(
 ) -> None:
     trick = Trick(lasts=10)
     monkeypatch.setitem(SKILLS, "trick", trick.skill())
-    slot, made = caster(field), ability(field, aim=Aim.POINT, range=9.0)
+    slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=9.0)
     casting.use(field.world, [slot], made, point=(14.0, 16.0))
     field.play(5)
     assert field.world.channels[slot]
@@ -182,7 +182,7 @@ def test_a_transient_ability_leaves_the_orders_alone(field: Any, trick: Trick) -
 
 def test_only_the_nearest_of_several_uses_a_solo_ability(field: Any, trick: Trick) -> None:
     near, far = caster(field, 10.0), caster(field, 8.0)
-    made = ability(field, aim=Aim.POINT, range=20.0, solo=True)
+    made = ability(field, aim=AbilityAim.POINT, range=20.0, solo=True)
     assert casting.use(field.world, [far, near], made, point=(16.0, 16.0)) == [near]
     assert casting.use(field.world, [far, near], made, point=(16.0, 16.0)) == [far], "the other one is busy"
     field.play(2)
@@ -190,7 +190,7 @@ def test_only_the_nearest_of_several_uses_a_solo_ability(field: Any, trick: Tric
 
 
 def test_an_ability_that_fails_on_the_way_is_told_to_the_player(field: Any, trick: Trick) -> None:
-    slot, made = caster(field), ability(field, aim=Aim.POINT, range=2.0, energy=60.0)
+    slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=2.0, energy=60.0)
     casting.use(field.world, [slot], made, point=(16.0, 16.0))
     field.play(5)
     field.world.energy[slot] = 0.0
@@ -200,7 +200,7 @@ def test_an_ability_that_fails_on_the_way_is_told_to_the_player(field: Any, tric
 
 
 def test_a_cast_waits_in_the_queue(field: Any, trick: Trick) -> None:
-    slot, made = caster(field), ability(field, aim=Aim.POINT, range=2.0)
+    slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=2.0)
     commands.move(field.world, [slot], (12.0, 16.0))
     casting.use(field.world, [slot], made, point=(13.0, 16.0), queue=True)
     commands.move(field.world, [slot], (12.0, 18.0), queue=True)

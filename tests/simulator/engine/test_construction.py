@@ -138,9 +138,9 @@ def test_a_drone_becomes_what_it_builds_and_comes_back_when_it_is_called_off(fie
     order(field, drone, BUILD["Extractor"], target=field.world.tag_of(geyser))
     extractor = placed(field, "Extractor")
     assert field.world.players[1].minerals == 2000.0 - 25.0
-    assert supply.used(field.world, 1) == 1.0
+    assert supply.in_use(field.world, 1) == 1.0
     order(field, extractor, CANCEL)
-    assert supply.used(field.world, 1) == 2.0
+    assert supply.in_use(field.world, 1) == 2.0
     assert field.world.players[1].minerals == 2000.0 - 25.0 + int(25 * 0.75)
     assert field.world.slot_of(tag) > 0
     assert field.world.occupant[geyser] < 0

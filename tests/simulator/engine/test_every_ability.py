@@ -19,7 +19,7 @@ from khala_simulator.combat.traits import refresh
 from khala_simulator.economy import harvesting, production
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.systems import creep
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
@@ -87,13 +87,13 @@ def casters(world: World, ability: Ability) -> Iterator[int]:
 
 def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point | None]]:
     """Yield everything that the ability could be aimed at here, the nearest first."""
-    if Aim.NONE in ability.aim:
+    if AbilityAim.NONE in ability.aim:
         yield NOBODY, None
-    if Aim.UNIT in ability.aim:
+    if AbilityAim.UNIT in ability.aim:
         for other in world.live.tolist():
             if other != slot:
                 yield other, None
-    if Aim.POINT in ability.aim:
+    if AbilityAim.POINT in ability.aim:
         x, y = world.pos[slot].tolist()
         for far in (3.0, 5.0, 7.0, 9.0):
             for dx, dy in ((far, 0.0), (0.0, far), (-far, 0.0), (0.0, -far), (far, far), (-far, far)):
@@ -115,8 +115,8 @@ def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], Non
     def prepare(world: World, slot: int) -> None:
         ability = world.catalog.ability(number)
         foe = next(s for s in world.units_of(2).tolist() if world.unit_type(s).name == "Roach")
-        tag = world.tag_of(foe) if Aim.UNIT in ability.aim else 0
-        casting.use(world, [slot], ability, target=tag, point=point if Aim.POINT in ability.aim else None)
+        tag = world.tag_of(foe) if AbilityAim.UNIT in ability.aim else 0
+        casting.use(world, [slot], ability, target=tag, point=point if AbilityAim.POINT in ability.aim else None)
         advance(world, 2)
 
     return prepare

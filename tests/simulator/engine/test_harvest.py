@@ -213,7 +213,7 @@ def opening() -> dict[int, float]:
     for loop in (160, 320, 480, 640, 1344):
         advance(world, loop - world.loop)
         collected[loop] = sum(player.score.collected[0] for player in world.players[1:]) / 2.0
-    assert harvesting.assigned(world).max() == 2  # two to a field at most
+    assert harvesting.workers_per_resource(world).max() == 2  # two to a field at most
     return collected
 
 

@@ -32,8 +32,8 @@ from khala_simulator.opponent.casts import rules
 from khala_simulator.opponent.economy import Staff
 from khala_simulator.opponent.enemy import Enemy
 from khala_simulator.opponent.levels import level_of, load_levels
-from khala_simulator.opponent.products import Outcome
-from khala_simulator.opponent.side import Side
+from khala_simulator.opponent.products import MakeOutcome
+from khala_simulator.opponent.side import OwnSide
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.orders import OrderKind
 from khala_simulator.world.players import GameResult, PlayerSetup
@@ -57,12 +57,12 @@ def game(
     return new_game(load_map(map_name), setups, seed=seed)
 
 
-def side_of(world: World, number: int = 1) -> Side:
+def side_of(world: World, number: int = 1) -> OwnSide:
     """Return what a computer player knows of its own side, with all the attention that it can have."""
     owner = world.players[number]
     owner.mind = owner.mind or player.begin(world, number)
     owner.mind.actions = 100.0
-    return Side(world, number)
+    return OwnSide(world, number)
 
 
 def put(world: World, owner: int, name: str, x: float, y: float, count: int = 1) -> list[int]:
@@ -189,7 +189,7 @@ def test_the_first_pylon_powers_room_for_three_structures(seed: int) -> None:
 def test_gateways_wait_for_a_pylon_and_stand_in_its_field() -> None:
     world = game()
     world.players[1].minerals = 1000.0
-    assert products.make(side_of(world), "Gateway") is Outcome.BLOCKED
+    assert products.make(side_of(world), "Gateway") is MakeOutcome.BLOCKED
     x, y = world.players[1].start or (0.0, 0.0)
     pylon = put(world, 1, "Pylon", x + 7.0 if x < 44 else x - 7.0, y)
     advance(world, 1)
@@ -214,8 +214,8 @@ def test_what_is_too_dear_is_put_aside() -> None:
     world = game(("terran", "zerg"))
     side = side_of(world)
     side.purse.minerals = 60.0
-    assert products.make(side, "SupplyDepot") is Outcome.SHORT
-    assert products.make(side, "SCV") is Outcome.SHORT
+    assert products.make(side, "SupplyDepot") is MakeOutcome.SHORT
+    assert products.make(side, "SCV") is MakeOutcome.SHORT
     assert world.players[1].minerals == 50.0
 
 
@@ -258,14 +258,14 @@ def test_idle_workers_go_where_there_is_room_and_gas_is_staffed() -> None:
         side = side_of(world)
         economy.mine(side, Staff(side))
         advance(world, 8)
-    assert harvesting.assigned(world)[refinery] == 3
+    assert harvesting.workers_per_resource(world)[refinery] == 3
     assert not [w for w in side_of(world).workers if world.order_kind[w] == OrderKind.IDLE]
 
 
 def test_a_structure_that_lost_its_builder_gets_another_one() -> None:
     world = game(("terran", "zerg"))
     world.players[1].minerals = 200.0
-    assert products.make(side_of(world), "SupplyDepot") is Outcome.DONE
+    assert products.make(side_of(world), "SupplyDepot") is MakeOutcome.DONE
     while not (site := side_of(world).begun.get("SupplyDepot")):
         advance(world, 8)
     builder = next(w for w in side_of(world).workers if world.order_kind[w] == OrderKind.FOLLOW)
@@ -346,10 +346,10 @@ def test_flyers_make_it_train_what_hits_them() -> None:
     side = side_of(world)
     side.mind.step = 99
     world.loop = 8000
-    usual = composition.wanted(side)
+    usual = composition.shares(side)
     row = world.catalog.unit("VoidRay").row
     side.mind.seen = dict.fromkeys(range(6), (row, world.loop))
-    answer = composition.wanted(side)
+    answer = composition.shares(side)
     assert answer["Roach"] / answer["Hydralisk"] < 0.5 * usual["Roach"] / usual["Hydralisk"]
 
 
@@ -472,7 +472,7 @@ def test_a_strong_player_has_a_larger_economy_after_a_minute_than_a_weak_one() -
     assert strong["Pylon"] >= 1
     assert strong["Gateway"] == 1
     assert strong["Probe"] > weak["Probe"] + 2
-    assert supply.used(world, 1) > supply.used(world, 2) >= 12.0
+    assert supply.in_use(world, 1) > supply.in_use(world, 2) >= 12.0
 
 
 @pytest.mark.slow

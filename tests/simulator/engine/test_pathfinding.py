@@ -11,7 +11,7 @@ from khala_simulator.maps.game_map import load_map
 from khala_simulator.movement import pathfinding, ways
 from khala_simulator.movement.pathfinding import NEIGHBOURS, Surface
 from khala_simulator.tables.layers import Layer
-from khala_simulator.world.ground import Ground
+from khala_simulator.world.ground import BuiltGround
 
 ROOM = """
 ..........
@@ -62,7 +62,7 @@ def test_a_line_does_not_pass_between_two_cells_that_touch_at_a_corner() -> None
 
 def test_structures_close_the_ground_and_open_it_again() -> None:
     terrain = load_map("llm_smac/3s_vs_3z").terrain
-    ground = Ground(terrain)
+    ground = BuiltGround(terrain)
     bare = pathfinding.surface(ground, Layer.WALK)
     wall = np.array([(16, y) for y in range(-2, 40)])
     ground.block(7, wall)
@@ -77,7 +77,9 @@ def test_structures_close_the_ground_and_open_it_again() -> None:
 
 def test_games_on_one_terrain_share_what_was_found() -> None:
     terrain = load_map("llm_smac/2c_vs_64zg").terrain
-    assert pathfinding.surface(Ground(terrain), Layer.WALK) is pathfinding.surface(Ground(terrain), Layer.WALK)
+    assert pathfinding.surface(BuiltGround(terrain), Layer.WALK) is pathfinding.surface(
+        BuiltGround(terrain), Layer.WALK
+    )
 
 
 @settings(max_examples=60)
@@ -85,7 +87,7 @@ def test_games_on_one_terrain_share_what_was_found() -> None:
 def test_distances_on_the_ledge_are_symmetric_and_no_shorter_than_the_line(
     x: float, y: float, to_x: float, to_y: float
 ) -> None:
-    ledge = pathfinding.surface(Ground(load_map("llm_smac/2c_vs_64zg").terrain), Layer.WALK)
+    ledge = pathfinding.surface(BuiltGround(load_map("llm_smac/2c_vs_64zg").terrain), Layer.WALK)
     a, b = at(x, y), at(to_x, to_y)
     there = ways.distance(ledge, a, b)
     back = ways.distance(ledge, b, a)

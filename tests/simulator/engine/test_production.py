@@ -118,7 +118,7 @@ def test_a_job_without_supply_waits_until_there_is_some(field: Field) -> None:
     order(field, [nexus], TRAIN["Probe"])
     field.play(400)
     assert [job.begun for job in field.world.jobs[nexus]] == [False]
-    assert (supply.used(field.world, 1), supply.cap(field.world, 1)) == (15.0, 15.0)
+    assert (supply.in_use(field.world, 1), supply.cap(field.world, 1)) == (15.0, 15.0)
     field.put("Pylon", 1, 24.0, 24.0)
     field.play(272)
     assert nexus not in field.world.jobs
@@ -172,7 +172,7 @@ def test_a_larva_becomes_an_egg_and_two_zerglings(rich: Field) -> None:
     assert rich.world.players[1].minerals == 950.0
     assert born(rich, "Zergling") == [1 + 384, 1 + 384]  # clients see the egg a loop after the order
     assert rich.world.tag_of(larva) == tag
-    assert supply.used(rich.world, 1) == 1.0
+    assert supply.in_use(rich.world, 1) == 1.0
 
 
 def test_an_egg_that_is_called_off_is_a_larva_again(rich: Field) -> None:

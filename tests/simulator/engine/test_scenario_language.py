@@ -13,7 +13,7 @@ from khala_simulator.maps.game_map import MapError, map_from
 from khala_simulator.maps.nodes import ScenarioError
 from khala_simulator.maps.places import PlaceGrid, Region, Span
 from khala_simulator.maps.scenario_file import parse_scenario, sheets
-from khala_simulator.maps.script import Comparison
+from khala_simulator.maps.script import NumberCondition
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.orders import OrderKind
 from khala_simulator.world.players import GameResult
@@ -167,7 +167,7 @@ def test_units_in_the_making_count_only_where_it_is_said_and_passengers_always()
 )
 def test_a_comparison_is_an_operator_and_a_number(text: str, value: int, holds: bool) -> None:
     operator, number = text.rstrip("0123456789 "), text.lstrip("<>= ")
-    assert Comparison(operator, int(number)).holds(value) == holds
+    assert NumberCondition(operator, int(number)).holds(value) == holds
 
 
 # actions --------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from khala_simulator.abilities import casting, commands
-from khala_simulator.tables.abilities import Aim
+from khala_simulator.tables.abilities import AbilityAim
 
 VERSIONS = ("4.10", "5.0.13")
 ARMY = (
@@ -38,8 +38,8 @@ def order_somebody(field: Any, rng: np.random.Generator) -> None:
     if ability.effect in casting.ORDINARY:
         commands.attack_move(world, [slot], (x, y), queue=queue)
         return
-    target = int(rng.choice(world.live)) if Aim.UNIT in ability.aim and rng.random() < 0.7 else -1
-    point = (x, y) if target < 0 and Aim.POINT in ability.aim else None
+    target = int(rng.choice(world.live)) if AbilityAim.UNIT in ability.aim and rng.random() < 0.7 else -1
+    point = (x, y) if target < 0 and AbilityAim.POINT in ability.aim else None
     casting.use(world, [slot], ability, target=world.tag_of(target), point=point, queue=queue)
 
 

@@ -255,11 +255,11 @@ def test_a_morph_needs_its_price(make_field: Callable[..., Any], version: str, a
 def test_a_cocoon_uses_the_supply_of_what_hatches(make_field: Callable[..., Any], version: str) -> None:
     field = ready(make_field, version)
     slot = field.put("Roach", 1, *CENTRE)
-    before = supply.used(field.world, 1)
+    before = supply.in_use(field.world, 1)
     assert field.order(slot, 2330)
     field.play(20)
     more = field.world.catalog.unit("Ravager").supply - field.world.catalog.unit("Roach").supply
-    assert supply.used(field.world, 1) == before + more
+    assert supply.in_use(field.world, 1) == before + more
 
 
 # crawlers -------------------------------------------------------------------------------------------------------------

@@ -26,4 +26,4 @@ def test_upgrades_of_one_game_are_not_those_of_the_next() -> None:
         if isinstance(part, np.ndarray):
             assert (getattr(second, name) == part).all(), name
     assert second.damage == plain.damage
-    assert second.changed(1, "unit", "Zealot", "LifeMax", 5.0) == 5.0
+    assert second.with_upgrades(1, "unit", "Zealot", "LifeMax", 5.0) == 5.0

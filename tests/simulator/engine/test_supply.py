@@ -21,7 +21,7 @@ def test_units_use_and_structures_provide_what_the_tables_say(field: Field) -> N
         field.put(name, 1, 10.0, 10.0)
     for name in ("Nexus", "Pylon", "Overlord", "Gateway"):
         field.put(name, 1, 20.0, 20.0)
-    assert supply.used(field.world, 1) == 2 + 6 + 0.5 + 1
+    assert supply.in_use(field.world, 1) == 2 + 6 + 0.5 + 1
     assert supply.cap(field.world, 1) == 15 + 8 + 8
 
 
@@ -35,7 +35,7 @@ def test_units_inside_others_count_and_hallucinations_do_not(field: Field) -> No
     prism, zealot = field.put("WarpPrism", 1, 10.0, 10.0), field.put("Zealot", 1, 10.0, 10.0)
     field.world.stow(zealot, prism)
     field.world.hallucination[field.put("Archon", 1, 12.0, 10.0)] = True
-    assert supply.used(field.world, 1) == 4.0
+    assert supply.in_use(field.world, 1) == 4.0
 
 
 @pytest.mark.parametrize(
@@ -61,5 +61,5 @@ def test_fast_build_makes_everything_at_once(field: Field) -> None:
     player.cheats.append("fast_build")
     casting.use(field.world, [nexus], CATALOG.ability(1006))
     field.play(1)
-    assert supply.used(field.world, 1) == 1.0
+    assert supply.in_use(field.world, 1) == 1.0
     assert field.world.jobs == {}

@@ -57,7 +57,7 @@ def test_a_unit_is_there_at_once_and_finished_later(gate: Gate, point: tuple[flo
     assert gate.world.unit_type(stalker).name == "Stalker"
     assert gate.world.pos[stalker].tolist() == list(point)
     assert (gate.player.minerals, gate.player.vespene) == (875.0, 950.0)
-    assert supply.used(gate.world, 1) == 2.0
+    assert supply.in_use(gate.world, 1) == 2.0
     gate.field.play(1)  # clients see it from now on; recorded games show 256 and 81 loops
     gate.field.play(loops - 1)
     assert gate.world.build_progress[stalker] < 1.0
@@ -116,4 +116,4 @@ def test_a_unit_that_is_being_warped_in_can_die_and_can_be_called_off(gate: Gate
     zealot = gate.newest()
     casting.use(gate.world, [zealot], CATALOG.ability(CANCEL))
     assert gate.player.minerals == 1000.0 - 100.0 + 75.0
-    assert supply.used(gate.world, 1) == 0.0
+    assert supply.in_use(gate.world, 1) == 0.0

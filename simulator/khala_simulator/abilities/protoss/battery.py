@@ -26,7 +26,8 @@ OVERCHARGE_ABILITY = 4107
 
 def _recharge(world: World, cast: Cast) -> bool:
     """Give one loop's shields; end when they are full, the energy is used up, or the unit has gone too far away."""
-    slot, target = cast.slot, int(world.order_target[cast.slot])
+    slot = cast.slot
+    target = int(world.order_target[slot])
     if target == NOBODY or not (world.can_cast[slot] and world.targetable[target]):
         return False
     if gap(world, slot, target) > cast.ability.range + cast.ability.slop + 1e-6:

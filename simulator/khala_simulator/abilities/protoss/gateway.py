@@ -160,7 +160,8 @@ def _shift(world: World, area: AreaEffect) -> None:
 
 def _arrive(world: World, adept: int, shade: int) -> None:
     x, y = world.pos[shade].tolist()
-    orders, heading = world.orders_of(shade), world.heading[shade].copy()
+    orders = world.orders_of(shade)
+    heading = world.heading[shade].copy()
     world.remove(shade)
     for name in (SHIFTING, *LEFT_BEHIND):
         buffs.remove(world, adept, name)

@@ -54,7 +54,8 @@ def _taken(world: World, cast: Cast) -> list[int]:
 
 def _recall(world: World, cast: Cast) -> None:
     """Mark the units; an area effect brings them to where the caster is now when the marks run out."""
-    name, taken = str(cast.ability.numbers["buff"]), _taken(world, cast)
+    name = str(cast.ability.numbers["buff"])
+    taken = _taken(world, cast)
     for slot in taken:
         buffs.apply(world, slot, name, source=cast.slot)
     x, y = world.pos[cast.slot].tolist()
@@ -69,14 +70,15 @@ def _bring(world: World, area: AreaEffect) -> None:
     if not lost and world.loop < area.end:
         return
     name = str(world.catalog.ability(area.ability).numbers["buff"])
-    for slot in _marked(world, name, area):
+    for slot in _bearers(world, name, area):
         buffs.remove(world, slot, name)
         if not lost:
             _arrive(world, slot, area)
     area.end = world.loop
 
 
-def _marked(world: World, name: str, area: AreaEffect) -> list[int]:
+def _bearers(world: World, name: str, area: AreaEffect) -> list[int]:
+    """Return the units that bear a recall's mark."""
     rows = world.buffs.rows
     mine = (rows["buff"] == world.catalog.buff(name).row) & (rows["begun"] == area.begun)
     mine &= (rows["source"] == world.slot_of(area.source)) | (rows["source"] == NOBODY)

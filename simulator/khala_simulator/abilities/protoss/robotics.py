@@ -39,7 +39,8 @@ BARRIER_ABILITY = 2328
 
 def _nova(world: World, cast: Cast) -> None:
     """Send out a ball that can be steered and bursts when its time is over."""
-    slot, lasts = cast.slot, number(cast, "duration_loops")
+    slot = cast.slot
+    lasts = number(cast, "duration_loops")
     x, y = world.pos[slot].tolist()
     nova = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), int(world.owner[slot]), (x, y))
     world.heading[nova] = world.heading[slot]
@@ -111,7 +112,9 @@ def _guard_raised(world: World, slot: int) -> None:
     if buffs.has(world, slot, BARRIER):
         if world.barrier[slot] <= 0.0:
             buffs.remove(world, slot, BARRIER)
-    elif world.timers.get(slot, {}).get(ability.timer, 0.0) <= world.loop and not _suppressed(world, slot):
+    elif world.timers.get(slot, {}).get(ability.timer, 0.0) <= world.loop and not buffs.has(
+        world, slot, "GravitonBeam"
+    ):
         world.timers.setdefault(slot, {})[ability.timer] = world.loop + ability.cooldown_loops
         _raise(world, slot)
 
@@ -125,10 +128,6 @@ def _guard_standing(world: World, slot: int) -> None:
         _lower(world, slot)
     elif not buffs.has(world, slot, BARRIER_SPENT):
         _raise(world, slot)
-
-
-def _suppressed(world: World, slot: int) -> bool:
-    return buffs.has(world, slot, "GravitonBeam")
 
 
 def _raise(world: World, slot: int) -> None:

@@ -170,7 +170,7 @@ def _set_trap(world: World, cast: Cast) -> None:
 
 def _trap_place(world: World, cast: Cast) -> Point:
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
-    return placement.snapped(place_of(world, cast), world.catalog.footprints[unit.footprint].size)
+    return placement.snap(place_of(world, cast), world.catalog.footprints[unit.footprint].size)
 
 
 def _cant_set_trap(world: World, cast: Cast) -> ActionResult:
@@ -219,14 +219,17 @@ def _spring(world: World, cast: Cast) -> None:
     delay = number(cast, "delay_loops")
     buffs.apply(world, slot, "OracleStasisTrapCaster", source=slot)
     teleport.live_until(world, slot, world.loop + number(cast, "gone_loops"))
-    owner, tag = int(world.owner[slot]), world.tag_of(slot)
+    owner = int(world.owner[slot])
+    tag = world.tag_of(slot)
     spot = AreaEffect(
         "trap_springs", owner, [(x, y)], number(cast, "radius"), world.loop, world.loop + delay, source=tag
     )
-    spot.due, spot.period = spot.end, delay
+    spot.due = spot.end
+    spot.period = delay
     sight_end = world.loop + number(cast, "sight_loops")
     seen = AreaEffect("sight", owner, [(x, y)], number(cast, "sight_radius"), world.loop, sight_end)
-    seen.due, seen.sights = sight_end, number(cast, "sight_radius")
+    seen.due = sight_end
+    seen.sights = number(cast, "sight_radius")
     world.area_effects += [spot, seen]
 
 

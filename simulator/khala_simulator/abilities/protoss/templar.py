@@ -91,17 +91,17 @@ def _pair(world: World, cast: Cast) -> None:
         return
     offset = world.pos[asked] - world.pos[slot]
     partner = int(asked[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
-    for one, other in ((slot, partner), (partner, slot)):
-        commands.begin(world, one, Order(OrderKind.CAST, MERGE_TARGET, target=world.tag_of(other)))
+    for templar, other in ((slot, partner), (partner, slot)):
+        commands.begin(world, templar, Order(OrderKind.CAST, MERGE_TARGET, target=world.tag_of(other)))
 
 
 def _fuse(world: World, cast: Cast) -> None:
     """Merge with another Templar beside it into an Archon, which takes its time to form."""
-    one, other, owner = cast.slot, cast.target, int(world.owner[cast.slot])
-    x, y = ((world.pos[one] + world.pos[other]) / 2.0).tolist()
+    owner = int(world.owner[cast.slot])
+    x, y = ((world.pos[cast.slot] + world.pos[cast.target]) / 2.0).tolist()
     archon = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
-    world.remove(one)
-    world.remove(other)
+    world.remove(cast.slot)
+    world.remove(cast.target)
     world.build_progress[archon] = 0.0
     refresh(world, archon)
     end = world.loop + cast.ability.loops

@@ -37,7 +37,8 @@ def _warp_in(world: World, slots: list[int], ability: Ability, _: int, point: Po
     if point is None:
         return []
     slot = slots[0]
-    owner, unit = int(world.owner[slot]), world.catalog.unit(ability.unit)
+    owner = int(world.owner[slot])
+    unit = world.catalog.unit(ability.unit)
     source = power.best(world, owner, point)
     if source is None or not _is_free(world, unit, point):
         return []
@@ -91,7 +92,8 @@ def _hurry(world: World, slots: list[int]) -> None:
     if not len(world.buffs):
         return
     for slot in slots:
-        waits, rate = world.timers.get(slot, {}), float(world.work_rate[slot])
+        waits = world.timers.get(slot, {})
+        rate = float(world.work_rate[slot])
         if rate != 1.0 and waits.get(TIMER, 0.0) > world.loop:
             waits[TIMER] -= rate - 1.0
 

@@ -32,10 +32,12 @@ IN_PROGRESS: Final = frozenset({"BuildInProgress", "BuildinProgressNydusCanal", 
 
 def _place(world: World, cast: Cast) -> None:
     """Begin a structure at the point of the cast."""
-    unit, slot = building_sites.product(world, cast.ability), cast.slot
+    unit = building_sites.product(world, cast.ability)
+    slot = cast.slot
     if unit is None:
         return
-    owner, race = int(world.owner[slot]), world.unit_type(slot).race
+    owner = int(world.owner[slot])
+    race = world.unit_type(slot).race
     paid = (0.0, 0.0) if "free" in world.players[owner].cheats else prices.cost_of(cast.ability)
     geyser = cast.target
     if geyser != NOBODY:

@@ -28,7 +28,7 @@ def _grow(world: World, cast: Cast) -> None:
     world.cast_begun[cast.slot], world.cast_at[cast.slot] = world.loop, world.loop + cast.ability.loops
     cocoon = str(cast.ability.numbers.get("cocoon", ""))
     if cocoon:
-        _renewed(world, cast.slot, world.catalog.unit(cocoon))
+        _renew(world, cast.slot, world.catalog.unit(cocoon))
 
 
 def _grows(world: World, cast: Cast) -> bool:
@@ -36,14 +36,14 @@ def _grows(world: World, cast: Cast) -> bool:
         return True
     unit = world.catalog.unit(cast.ability.unit)
     if cast.ability.numbers.get("cocoon"):
-        _renewed(world, cast.slot, unit)
+        _renew(world, cast.slot, unit)
     else:
         lifecycle.become(world, cast.slot, unit)
     world.alert(int(world.owner[cast.slot]), "MorphComplete")
     return False
 
 
-def _renewed(world: World, slot: int, unit: UnitType) -> None:
+def _renew(world: World, slot: int, unit: UnitType) -> None:
     """Become another type with full life, as when a unit enters or leaves a cocoon."""
     lifecycle.become(world, slot, unit)
     world.life[slot] = world.life_max[slot]
@@ -67,7 +67,7 @@ def call_off(world: World, slot: int) -> None:
     growing = world.channelling[slot]
     was = world.catalog.units[growing.was]
     if world.type[slot] != was.row:
-        _renewed(world, slot, was)
+        _renew(world, slot, was)
     payments.refund(world, int(world.owner[slot]), prices.cost_of(growing.ability), payments.CANCELLED)
     commands.begin_next(world, slot)
 

@@ -31,7 +31,8 @@ WORKERS: Final = 3690  # the general ability that sets a rally point for workers
 
 def _train(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
     """Put a unit into the queue of a structure, or into an egg."""
-    slot, loops = min(slots, key=lambda s: (_length(world, s), s)), ability.loops
+    slot = min(slots, key=lambda s: (_length(world, s), s))
+    loops = ability.loops
     if world.unit_type(slot).name in COCOONS:
         lifecycle.become(world, slot, world.catalog.unit(COCOONS[world.unit_type(slot).name]))
         world.life[slot] = world.life_max[slot]

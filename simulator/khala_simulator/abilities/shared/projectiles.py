@@ -120,7 +120,8 @@ def throw(world: World, cast: Cast, rule: str, *, radius: float = 0.0, delay_loo
     """Send something to where a cast is aimed; its ``rule`` runs once, when it arrives."""
     due = world.loop + flight_loops(world, cast) + delay_loops
     item = lay(world, cast, rule, end=due, due=due)
-    item.radius, item.target = radius, world.tag_of(cast.target)
+    item.radius = radius
+    item.target = world.tag_of(cast.target)
     return item
 
 

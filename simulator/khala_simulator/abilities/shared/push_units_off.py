@@ -33,7 +33,8 @@ def _on(world: World, cells: Ints) -> Ints:
     slots = world.live
     solid = (world.plane_bits[slots] & GROUND_PLANE != 0) & (world.layer_bits[slots] != 0)
     slots = slots[solid & ~world.walled[slots]]
-    low, high = cells.min(axis=0), cells.max(axis=0) + 1
+    low = cells.min(axis=0)
+    high = cells.max(axis=0) + 1
     offset = world.pos[slots] - np.clip(world.pos[slots], low, high)
     inside = offset[:, 0] ** 2 + offset[:, 1] ** 2 < world.separation[slots] ** 2 - JUST_TOUCHING
     found: Ints = slots[inside]

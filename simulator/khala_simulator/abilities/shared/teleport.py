@@ -55,7 +55,8 @@ def spot_near(
         reach: How far from where it is now the place may be, centre to centre.
         seen_by: The place must be in this player's sight.
     """
-    unit, here = world.unit_type(slot), world.pos[slot]
+    unit = world.unit_type(slot)
+    here = world.pos[slot]
     for radius in SEARCH_RADII:
         at = placement.candidates(world, unit, point, radius, ignoring=slot)
         if math.isfinite(reach):
@@ -84,7 +85,8 @@ def within(world: World, slot: int, point: Point, reach: float) -> Point:
 def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int]:
     """Put new units of the maker's owner where they fit around it; return their slots."""
     x, y = world.pos[maker].tolist()
-    owner, facing = int(world.owner[maker]), float(geometry.facing(world.heading[maker : maker + 1])[0])
+    owner = int(world.owner[maker])
+    facing = float(geometry.facing(world.heading[maker : maker + 1])[0])
     return [
         lifecycle.spawn(world, unit, owner, place, facing)
         for place in placement.free_places(world, unit, (x, y), count)

@@ -109,7 +109,7 @@ def take_in(world: World, carrier: int, passenger: int) -> None:
     world.timers.get(carrier, {}).pop(UNLOADING, None)
 
 
-def _told_to_load(
+def _order_to_load(
     world: World, slots: list[int], ability: Ability, target: int, point: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
     """Send the nearest carrier with room, or to one that can't move its passenger."""
@@ -163,7 +163,7 @@ def _unload_there(world: World, cast: Cast) -> bool:
     return UNLOADING in world.timers.get(cast.slot, {}) and cast.target != cast.slot
 
 
-def _told_to_unload(
+def _order_to_unload(
     world: World, slots: list[int], ability: Ability, target: int, point: Point | None, queue: bool
 ) -> list[int]:  # fmt: skip
     """Unload on the way if the target is the carrier itself, else at the point or beside the unit."""
@@ -189,7 +189,7 @@ def _is_empty(world: World, slot: int, _: Ability) -> ActionResult:
     return ActionResult.SUCCESS if inside(world, slot) else ActionResult.NO_CARGO_TO_UNLOAD
 
 
-def unload_one(world: World, carrier: int, passenger: int) -> bool:
+def unload_passenger(world: World, carrier: int, passenger: int) -> bool:
     """Unload one unit from a carrier now; return whether there was a place for it."""
     x, y = world.pos[carrier].tolist()
     unit = world.unit_type(passenger)
@@ -208,7 +208,7 @@ def _unload_unit(world: World, cast: Cast) -> None:
     """Unload the named passenger, or the first one."""
     found = inside(world, cast.slot)
     if found:
-        unload_one(world, cast.slot, cast.target if cast.target in found else found[0])
+        unload_passenger(world, cast.slot, cast.target if cast.target in found else found[0])
 
 
 # in every loop --------------------------------------------------------------------------------------------------------
@@ -247,7 +247,7 @@ def _let_out(world: World, carrier: int) -> None:
     period = world.unit_type(carrier).unload_period_n * LOOPS_PER_NORMAL_SECOND
     timers = world.timers[carrier]
     for passenger in inside(world, carrier):
-        if not unload_one(world, carrier, passenger):
+        if not unload_passenger(world, carrier, passenger):
             timers[UNLOADING] = world.loop + 1
             return
         if period:
@@ -264,7 +264,7 @@ def _let_out(world: World, carrier: int) -> None:
 def _spill(world: World, slot: int) -> None:
     """Put every passenger beside a carrier that dies."""
     for passenger in world.passengers(slot):
-        if not unload_one(world, slot, passenger):
+        if not unload_passenger(world, slot, passenger):
             x, y = world.pos[slot].tolist()
             world.unstow(passenger, (x, y))
 
@@ -288,13 +288,13 @@ def load_by_click(
     del point
     if target == NOBODY or world.carrier[target] != NOBODY:
         return []
-    load = _load_of(world, target)
+    load = _load_ability(world, target)
     if load is not None:
         slots = [slot for slot in slots if _may_board(world, slot, target)]
         return _board(world, slots, target, load, queue=queue)
     taken: list[int] = []
     for slot in slots:
-        own = _load_of(world, slot)
+        own = _load_ability(world, slot)
         if own is not None and world.step_max[slot] > 0.0 and cant_carry(world, slot, target) is ActionResult.SUCCESS:
             order = Order(OrderKind.CAST, own.id, target=world.tag_of(target))
             taken += commands.give(world, [slot], order, queue=queue)
@@ -307,7 +307,7 @@ def _may_board(world: World, slot: int, carrier: int) -> bool:
     return not damaged and cant_carry(world, carrier, slot) is ActionResult.SUCCESS
 
 
-def _load_of(world: World, slot: int) -> Ability | None:
+def _load_ability(world: World, slot: int) -> Ability | None:
     card = world.catalog.abilities_of(int(world.type[slot]))
     return next((ability for ability in card if ability.effect == "load"), None)
 
@@ -315,7 +315,7 @@ def _load_of(world: World, slot: int) -> Ability | None:
 SKILLS: Final = {
     "load": Skill(
         _load,
-        give=_told_to_load,
+        give=_order_to_load,
         refuse=_cant_load,
         estimates=(
             "A unit that walks to a carrier gets in when it is within 1.1 of it, or within its pickup range.",
@@ -324,7 +324,7 @@ SKILLS: Final = {
     ),
     "load_all": Skill(_load_all, refuse=_nobody_to_load),
     "unload_all": Skill(_unload_all, ready=_is_empty),
-    "unload_all_at": Skill(_unload_all, give=_told_to_unload, refuse=_no_place, ready=_is_empty, hold=_unload_there),
+    "unload_all_at": Skill(_unload_all, give=_order_to_unload, refuse=_no_place, ready=_is_empty, hold=_unload_there),
     "unload_unit": Skill(_unload_unit, ready=_is_empty),
 }
 PASSIVES: Final[dict[str, UnitRule]] = dict.fromkeys(CARRIERS, _carry)

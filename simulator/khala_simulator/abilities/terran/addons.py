@@ -30,13 +30,16 @@ def place_of(world: World, slot: int) -> Point:
 def _build(world: World, slots: list[int], ability: Ability, _: int, __: Point | None, ___: bool) -> list[int]:
     """Begin an add-on at the side of one structure."""
     slot = slots[0]
-    owner, unit = int(world.owner[slot]), world.catalog.unit(ability.unit)
+    owner = int(world.owner[slot])
+    unit = world.catalog.unit(ability.unit)
     if building_sites.refusal(world, owner, unit, place_of(world, slot), on_site=True) is not ActionResult.SUCCESS:
         return []
     loops = ability.loops + construction.SEEN_LATER
     job = production.enqueue(world, slot, ability, makes=ability.unit, loops=loops)
     made = construction.begin(world, unit, owner, place_of(world, slot), loops=loops, paid=job.paid)
-    job.kind, job.site, job.paid = "addon", world.tag_of(made), (0.0, 0.0)
+    job.kind = "addon"
+    job.site = world.tag_of(made)
+    job.paid = (0.0, 0.0)
     return [slot]
 
 

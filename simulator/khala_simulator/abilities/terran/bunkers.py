@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 
-def _armed(world: World, slot: int) -> list[int]:
+def _armed_passengers(world: World, slot: int) -> list[int]:
     return [s for s in world.passengers(slot) if world.ground_weapon[s] >= 0 or world.air_weapon[s] >= 0]
 
 
 def _anybody_armed(world: World, slot: int, _: Ability) -> ActionResult:
-    return ActionResult.SUCCESS if _armed(world, slot) else ActionResult.CANT_ATTACK_WEAPONS_DISABLED
+    return ActionResult.SUCCESS if _armed_passengers(world, slot) else ActionResult.CANT_ATTACK_WEAPONS_DISABLED
 
 
 # targets --------------------------------------------------------------------------------------------------------------
@@ -33,7 +33,7 @@ def _anybody_armed(world: World, slot: int, _: Ability) -> ActionResult:
 
 def _shoot(world: World, cast: Cast) -> None:
     """Make the passengers shoot at a unit in reach; at a point they choose for themselves."""
-    for slot in _armed(world, cast.slot):
+    for slot in _armed_passengers(world, cast.slot):
         if cast.target != NOBODY and _reaches(world, slot, cast.target):
             targets.engage(world, slot, cast.target)
 
@@ -50,11 +50,11 @@ def _reaches(world: World, slot: int, target: int) -> bool:
 
 def _nobody_reaches(world: World, cast: Cast) -> ActionResult:
     aimed = cast.target != NOBODY
-    reached = any(_reaches(world, slot, cast.target) for slot in _armed(world, cast.slot)) if aimed else True
+    reached = any(_reaches(world, slot, cast.target) for slot in _armed_passengers(world, cast.slot)) if aimed else True
     return ActionResult.SUCCESS if reached else ActionResult.TARGET_IS_OUT_OF_RANGE
 
 
-def _told_to_shoot(
+def _order_shot(
     world: World, slots: list[int], ability: Ability, target: int, point: Point | None, queue: bool
 ) -> list[int]:
     del queue
@@ -65,7 +65,7 @@ def _told_to_shoot(
 
 def _cease(world: World, cast: Cast) -> None:
     """Make the passengers drop their target."""
-    for slot in _armed(world, cast.slot):
+    for slot in _armed_passengers(world, cast.slot):
         targets.disengage(world, slot)
 
 
@@ -100,7 +100,7 @@ def _anybody_fit(world: World, slot: int, ability: Ability) -> ActionResult:
 SKILLS: Final = {
     "redirect_attack": Skill(
         _shoot,
-        give=_told_to_shoot,
+        give=_order_shot,
         refuse=_nobody_reaches,
         ready=_anybody_armed,
         estimates=("A Bunker refuses a target that no unit in it reaches.",),

@@ -93,9 +93,10 @@ def _shoot(world: World, ability: Ability, slot: int, target: int) -> None:
 
 
 def _hit(world: World, missile: AreaEffect, target: int) -> None:
-    ability, owner = world.catalog.ability(missile.ability), missile.owner
+    ability = world.catalog.ability(missile.ability)
+    owner = missile.owner
     armored = world.stats.attribute_bits[world.type[target]] & 1 << ATTRIBUTES.index("armored")
-    more = world.stats.changed(owner, "effect", TICK, UPGRADE_FIELD, 0.0) if armored else 0.0
+    more = world.stats.with_upgrades(owner, "effect", TICK, UPGRADE_FIELD, 0.0) if armored else 0.0
     source = world.slot_of(missile.source)
     apply_damage(world, source, owner, target, number(ability, "damage_per_tick") + more)
 

@@ -73,7 +73,8 @@ def _fire_emp(world: World, cast: Cast) -> None:
 
 def _burst(world: World, missile: AreaEffect, _: int) -> None:
     """Take shields and energy from every unit around, friends as well, and uncover cloaked ones."""
-    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
+    ability = world.catalog.ability(missile.ability)
+    source = world.slot_of(missile.source)
     for slot in around(world, missile.at, number(ability, "radius")):
         apply_damage(world, source, missile.owner, slot, 0.0, shield_bonus=number(ability, "shields_removed"))
         world.energy[slot] = max(float(world.energy[slot]) - number(ability, "energy_removed"), 0.0)
@@ -97,7 +98,7 @@ def _free_weapons(world: World, cast: Cast) -> None:
     buffs.remove(world, cast.slot, "GhostHoldFireB")
 
 
-def _fire_when_told(world: World, slot: int, _: np.void) -> None:
+def _fire_on_order(world: World, slot: int, _: np.void) -> None:
     """End holding fire for a Ghost with an attack order."""
     if OrderKind(int(world.order_kind[slot])) in ATTACKING:
         buffs.remove(world, slot, "GhostHoldFireB")
@@ -115,6 +116,6 @@ SKILLS: Final = {
     "ghost_hold_fire": Skill(_hold_fire),
     "ghost_weapons_free": Skill(_free_weapons),
 }
-TICKS: Final[dict[str, BuffRule]] = {"GhostHoldFireB": _fire_when_told}
+TICKS: Final[dict[str, BuffRule]] = {"GhostHoldFireB": _fire_on_order}
 
 projectiles.ARRIVALS["emp"] = _burst

@@ -67,7 +67,8 @@ STEP_TESTED: Final = 0.25
 
 def _throw_charge(world: World, cast: Cast) -> None:
     """Throw a charge that goes off after its fuse, hurts all ground units around it and throws them outwards."""
-    point, fuse = place_of(world, cast), number(cast, "fuse_loops")
+    point = place_of(world, cast)
+    fuse = number(cast, "fuse_loops")
     owner = int(world.owner[cast.slot])
     charge = lifecycle.spawn(world, world.catalog.unit("KD8Charge"), owner, point)
     lay(world, cast, "kd8_charge", end=world.loop + fuse, due=world.loop + fuse).target = world.tag_of(charge)
@@ -75,7 +76,8 @@ def _throw_charge(world: World, cast: Cast) -> None:
 
 def _explode(world: World, charge: AreaEffect) -> None:
     """Hurt every ground unit around a charge, friends as well, and throw them outwards."""
-    ability, source = world.catalog.ability(charge.ability), world.slot_of(charge.source)
+    ability = world.catalog.ability(charge.ability)
+    source = world.slot_of(charge.source)
     body = world.slot_of(charge.target)
     for slot in around(world, charge.at, charge.radius, plane="ground"):
         if world.unit_type(slot).name not in UNTOUCHED:

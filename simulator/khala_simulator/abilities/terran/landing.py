@@ -41,14 +41,16 @@ def _can_lift(world: World, cast: Cast) -> ActionResult:
 def _can_land(world: World, cast: Cast) -> ActionResult:
     if cast.point is None:
         return ActionResult.CANT_LAND_LOCATION_INVALID
-    owner, unit = int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit)
+    owner = int(world.owner[cast.slot])
+    unit = world.catalog.unit(cast.ability.unit)
     why = building_sites.refusal(world, owner, unit, cast.point, on_site=cast.is_carried_out)
     return ActionResult.SUCCESS if why is ActionResult.SUCCESS else ActionResult.CANT_LAND_LOCATION_INVALID
 
 
 def _settle(world: World, cast: Cast) -> None:
     """Land, unless something is under it by now, and take up an add-on at the right place."""
-    slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
+    slot = cast.slot
+    unit = world.catalog.unit(cast.ability.unit)
     if cast.point is None or _can_land(world, cast) is not ActionResult.SUCCESS:
         return
     teleport.to(world, slot, building_sites.centre(world, unit, cast.point))

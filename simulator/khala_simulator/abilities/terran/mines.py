@@ -46,7 +46,8 @@ def _fire(world: World, cast: Cast) -> None:
 
 def _explode(world: World, missile: AreaEffect, target: int) -> None:
     """Hurt the target, and every unit around it, friends as well, but no structure and no mine of the owner's."""
-    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
+    ability = world.catalog.ability(missile.ability)
+    source = world.slot_of(missile.source)
     owner = missile.owner
     apply_damage(
         world, source, owner, target, number(ability, "damage"), shield_bonus=number(ability, "bonus_vs_shields")

@@ -25,7 +25,8 @@ PAINTED: Final = 7  # the API's NukePersistent
 
 def _call(world: World, cast: Cast) -> None:
     """Take one of the owner's Nukes and paint the place until it is down; it explodes a moment later."""
-    owner, point = int(world.owner[cast.slot]), cast.point
+    owner = int(world.owner[cast.slot])
+    point = cast.point
     assert point is not None
     nuke = world.catalog.unit("Nuke").row
     armed = np.flatnonzero(world.alive & (world.owner == owner) & (world.type == nuke))
@@ -69,7 +70,8 @@ def _fall(world: World, strike: AreaEffect) -> None:
 
 def _detonate(world: World, strike: AreaEffect) -> None:
     """Hurt everything around, by its ring, friend and foe, on the ground and in the air."""
-    ability, source = world.catalog.ability(strike.ability), world.slot_of(strike.source)
+    ability = world.catalog.ability(strike.ability)
+    source = world.slot_of(strike.source)
     struck: set[int] = set()
     for ring in ability.numbers["area"]:
         for slot in around(world, strike.at, ring["radius"]):

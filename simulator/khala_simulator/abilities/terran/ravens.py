@@ -40,7 +40,7 @@ def _place_turret(world: World, cast: Cast) -> None:
     unit = world.catalog.unit(str(cast.ability.numbers["unit"]))
     turret = lifecycle.spawn(world, unit, int(world.owner[cast.slot]), building_sites.centre(world, unit, cast.point))
     push_units_off(world, turret)
-    more = world.stats.changed(int(world.owner[turret]), "behavior", "AutoTurretTimedLife", "Duration", 0.0)
+    more = world.stats.with_upgrades(int(world.owner[turret]), "behavior", "AutoTurretTimedLife", "Duration", 0.0)
     lasts = number(cast, "duration_loops") + more * LOOPS_PER_NORMAL_SECOND
     lasts += world.rng.random() * number(cast, "duration_random_loops")
     teleport.live_until(world, turret, world.loop + lasts)
@@ -70,7 +70,7 @@ def _jam(world: World, cast: Cast) -> None:
     projectiles.launch(world, cast, MECHANICS.matrix_speed_n)
 
 
-def _jammed(world: World, missile: AreaEffect, target: int) -> None:
+def _apply_matrix(world: World, missile: AreaEffect, target: int) -> None:
     carrier = world.unit_type(target).name == "Carrier" and MATRIX[1] in world.catalog.buff_of_name
     loops = number(world.catalog.ability(missile.ability), "duration_loops")
     source = world.slot_of(missile.source)
@@ -110,8 +110,9 @@ def _chase(world: World, missile: AreaEffect) -> None:
 
 def _shred(world: World, missile: AreaEffect, _: int) -> None:
     """Weaken the armor of every unit around, friends as well, but of no structure."""
-    ability, source = world.catalog.ability(missile.ability), world.slot_of(missile.source)
-    radius = world.stats.changed(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
+    ability = world.catalog.ability(missile.ability)
+    source = world.slot_of(missile.source)
+    radius = world.stats.with_upgrades(missile.owner, *RESEARCHED_RADIUS, number(ability, "radius"))
     loops = number(ability, "duration_loops")
     for slot in around(world, missile.at, radius, structures=False):
         for name in SHREDS:
@@ -130,5 +131,5 @@ SKILLS: Final = {
 }
 AREA_EFFECTS: Final[dict[str, AreaEffectRule]] = {"shredder": _chase}
 
-projectiles.ARRIVALS["raven_scrambler_missile"] = _jammed
+projectiles.ARRIVALS["raven_scrambler_missile"] = _apply_matrix
 projectiles.ARRIVALS["raven_shredder_missile"] = _shred

@@ -24,7 +24,8 @@ def _sprays(world: World, cast: Cast) -> bool:
     slot, target, ability = cast.slot, cast.target, cast.ability
     if world.order_target[slot] != target or gap(world, slot, target) > ability.range + ability.slop:
         return False
-    period, first = number(cast, "period_loops"), int(number(cast, "first_ticks"))
+    period = number(cast, "period_loops")
+    first = int(number(cast, "first_ticks"))
     before, ticks = ((world.loop - cast.begun - ago) / period for ago in (1, 0))
     for tick in range(int(before) + 1, int(ticks) + 1):
         damage = number(cast, "damage_per_tick_first" if tick <= first else "damage_per_tick_after")

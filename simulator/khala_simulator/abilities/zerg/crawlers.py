@@ -27,7 +27,8 @@ def _root(world: World, cast: Cast) -> None:
 
 
 def _room(world: World, cast: Cast) -> ActionResult:
-    owner, unit = int(world.owner[cast.slot]), world.catalog.unit(cast.ability.unit)
+    owner = int(world.owner[cast.slot])
+    unit = world.catalog.unit(cast.ability.unit)
     return building_sites.refusal(world, owner, unit, place_of(world, cast), on_site=cast.is_carried_out)
 
 

@@ -63,7 +63,7 @@ def _reach_out(world: World, cast: Cast) -> None:
 
 def _can_reach(world: World, cast: Cast) -> ActionResult:
     target = cast.target
-    free = not (buffs.frenzied(world, target) or buffs.has(world, target, NEURAL) or world.passengers(target))
+    free = not (buffs.is_frenzied(world, target) or buffs.has(world, target, NEURAL) or world.passengers(target))
     return ActionResult.SUCCESS if free else ActionResult.CANT_TARGET_THAT_UNIT
 
 
@@ -71,7 +71,8 @@ def _arrives(world: World, item: AreaEffect) -> None:
     slot, target = world.slot_of(item.source), world.slot_of(item.target)
     if NOBODY in (slot, target) or not world.channels[slot] or world.order_target[slot] != target:
         return
-    kind, was = world.catalog.buff(NEURAL), int(world.owner[target])
+    kind = world.catalog.buff(NEURAL)
+    was = int(world.owner[target])
     loops = number(world.catalog.ability(item.ability), "duration_loops")
     buffs.apply(world, target, NEURAL, source=slot, loops=loops)
     world.buffs.rows[world.buffs.find(target, kind.row)]["count"] = was
@@ -166,7 +167,8 @@ def _hatches(world: World, item: AreaEffect) -> None:
 
 def _shroud(world: World, cast: Cast) -> None:
     """Place a cloud in which ground units take half of the damage of flyers."""
-    end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
+    end = world.loop + number(cast, "duration_loops")
+    period = number(cast, "period_loops")
     lay(world, cast, "microbial_shroud", end=end, due=world.loop, period=period)
 
 

@@ -109,7 +109,8 @@ def _injection_is_over(world: World, slot: int, row: np.void) -> None:
     """Hatch the larvae one after the other, and begin the next injection."""
     world.alert(int(world.owner[slot]), "LarvaHatched")
     numbers = world.catalog.ability(INJECT)
-    count, gap = int(number(numbers, "larva")), MECHANICS.injected_larva_loops
+    count = int(number(numbers, "larva"))
+    gap = MECHANICS.injected_larva_loops
     world.area_effects.append(
         AreaEffect("injected_larvae", int(row["owner"]), [(0.0, 0.0)], 0.0, world.loop, world.loop + count * gap,
               due=world.loop + gap, period=gap, target=world.tag_of(slot))

@@ -73,7 +73,8 @@ def _disguise(world: World, slots: list[int]) -> None:
 
 def _enemy_near(world: World, slot: int) -> int:
     """Return the slot of an enemy unit within sight that a changeling could look like, or NOBODY."""
-    slots, owner = world.live, int(world.owner[slot])
+    slots = world.live
+    owner = int(world.owner[slot])
     offset = world.pos[slots] - world.pos[slot]
     near = offset[:, 0] ** 2 + offset[:, 1] ** 2 <= (SEARCH_RADIUS + world.radius[slots]) ** 2
     near &= world.visible[owner, slots]

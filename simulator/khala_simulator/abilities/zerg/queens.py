@@ -47,7 +47,8 @@ def _heal_tick(world: World, slot: int, _: np.void) -> None:
 
 def _plant(world: World, cast: Cast) -> None:
     """Plant a creep tumor, which grows by itself and then burrows."""
-    slot, unit = cast.slot, world.catalog.unit(cast.ability.unit)
+    slot = cast.slot
+    unit = world.catalog.unit(cast.ability.unit)
     place = building_sites.centre(world, unit, place_of(world, cast))
     loops = cast.ability.loops
     if cast.ability.id == PLANT:

@@ -38,7 +38,8 @@ DRAINED = "ViperConsumeStructure"
 
 def _cloud(world: World, cast: Cast) -> None:
     """Place a cloud in which ground units shoot no farther than melee range, and structures detect nothing."""
-    end, period = world.loop + number(cast, "duration_loops"), number(cast, "period_loops")
+    end = world.loop + number(cast, "duration_loops")
+    period = number(cast, "period_loops")
     lay(world, cast, "blinding_cloud", end=end, due=world.loop, effect=CLOUD_EFFECT, period=period)
 
 
@@ -59,7 +60,7 @@ def _reach_out(world: World, cast: Cast) -> None:
 
 
 def _can_pull(world: World, cast: Cast) -> ActionResult:
-    held = buffs.frenzied(world, cast.target) or buffs.has(world, cast.target, PULLED)
+    held = buffs.is_frenzied(world, cast.target) or buffs.has(world, cast.target, PULLED)
     return ActionResult.CANT_TARGET_THAT_UNIT if held else ActionResult.SUCCESS
 
 
@@ -121,7 +122,8 @@ def _spreads(world: World, slot: int, row: np.void) -> None:
     if world.loop - int(row["begun"]) <= delay:
         return
     x, y = world.pos[slot].tolist()
-    radius, owner = number(world.catalog.ability(PARASITIC_BOMB), "radius"), int(row["owner"])
+    radius = number(world.catalog.ability(PARASITIC_BOMB), "radius")
+    owner = int(row["owner"])
     for other in foes(world, around(world, (x, y), radius, plane="air", structures=False), owner):
         buffs.apply(world, other, INFECTED, source=int(row["source"]), owner=owner)
 

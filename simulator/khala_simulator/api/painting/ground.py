@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.projection import Rect
-    from khala_simulator.maps.game_map import Terrain
+    from khala_simulator.maps.game_map import MapTerrain
     from khala_simulator.world.world import World
 
     Image = NDArray[np.uint8]
@@ -53,18 +53,22 @@ class PaintedGround:
 
     def paint(self, world: World, player: int, view: Rect, *, fog: bool) -> Image:
         """Return a new image of this part of the map; with `fog` dark where the player does not see."""
-        height, creep = world.map.terrain.size[1], world.creep
+        height = world.map.terrain.size[1]
+        creep = world.creep
         if view != self._view:
-            self._bare, self._view, self._creep = self._cut(world.map.terrain, view), view, None
+            self._bare = self._cut(world.map.terrain, view)
+            self._view = view
+            self._creep = None
         if creep is not self._creep:
-            self._covered, self._creep = self._cover(creep, view), creep
+            self._covered = self._cover(creep, view)
+            self._creep = creep
         if not fog:
             return self._covered.copy()
         light = cut(_LIGHT[world.visibility[player, ::-1]], (0, height), 1, view, self._size)
         shade = cv2.cvtColor(light, cv2.COLOR_GRAY2RGB)
         return np.asarray(cv2.multiply(self._covered, shade, scale=1 / 255), np.uint8)
 
-    def _cut(self, terrain: Terrain, view: Rect) -> Image:
+    def _cut(self, terrain: MapTerrain, view: Rect) -> Image:
         tiles = _tiles(terrain, view)
         if tiles is None:
             return np.zeros((self._size[1], self._size[0], 3), np.uint8)
@@ -87,7 +91,7 @@ class PaintedGround:
         return image
 
 
-def _tiles(terrain: Terrain, view: Rect) -> Cells | None:
+def _tiles(terrain: MapTerrain, view: Rect) -> Cells | None:
     """Return the tiles of the map that a view overlaps, counted in tiles; None if it overlaps none."""
     columns, rows = (math.ceil(cells / TILE) for cells in terrain.size)
     x0, y0 = max(0, math.floor(view.x0 / TILE)), max(0, math.floor(view.y0 / TILE))
@@ -95,7 +99,7 @@ def _tiles(terrain: Terrain, view: Rect) -> Cells | None:
     return Cells(x0, y0, x1, y1) if x0 < x1 and y0 < y1 else None
 
 
-def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
+def _mosaic(terrain: MapTerrain, tiles: Cells, density: int) -> Image:
     """Return tiles side by side as one image."""
     rows = [
         np.concatenate([_tile(terrain, x, y, density) for x in range(tiles.x0, tiles.x1)], axis=1)
@@ -105,7 +109,7 @@ def _mosaic(terrain: Terrain, tiles: Cells, density: int) -> Image:
 
 
 @functools.lru_cache(maxsize=128)
-def _tile(terrain: Terrain, x: int, y: int, density: int) -> Image:
+def _tile(terrain: MapTerrain, x: int, y: int, density: int) -> Image:
     image = paint_block(terrain, Cells(x * TILE, y * TILE, (x + 1) * TILE, (y + 1) * TILE), density)
     image.setflags(write=False)
     return image

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 SHIFT = 4
 """OpenCV takes fractions of pixels as whole numbers of sixteenths."""
-_ONE = 1 << SHIFT
+_PIXEL = 1 << SHIFT
 BEAM_OPACITY = 0.62
 
 
-def fixed(value: float) -> int:
-    """Return a coordinate as OpenCV takes it with `SHIFT`, where whole numbers are the middles of pixels."""
-    return round((value - 0.5) * _ONE)
+def fixed_point(point: Point) -> tuple[int, int]:
+    """Return a point as OpenCV takes it with `SHIFT`, where whole numbers are the middles of pixels."""
+    return round((point[0] - 0.5) * _PIXEL), round((point[1] - 0.5) * _PIXEL)
 
 
 def health_colour(share: float) -> Colour:
@@ -45,7 +45,8 @@ def bars(
     width, height = size
     rows, columns = image.shape[:2]
     left, top = middle - width // 2, bottom - height * len(shares)
-    x0, x1 = max(0, left), min(columns, left + width)
+    x0 = max(0, left)
+    x1 = min(columns, left + width)
     if x0 >= x1 or bottom <= 0 or top >= rows:
         return
     image[max(0, top - border) : bottom + border, max(0, left - border) : x1 + border] = palette.BAR
@@ -70,20 +71,17 @@ def pips(image: Image, left: int, top: int, size: int, colours: Sequence[Colour]
 
 def ring(image: Image, centre: Point, radius: float, colour: Colour, width: int = 1) -> None:
     """Draw a circle with soft edges."""
-    at = (fixed(centre[0]), fixed(centre[1]))
-    cv2.circle(image, at, round(radius * _ONE), colour, width, cv2.LINE_AA, SHIFT)
+    cv2.circle(image, fixed_point(centre), round(radius * _PIXEL), colour, width, cv2.LINE_AA, SHIFT)
 
 
 def dot(image: Image, centre: Point, radius: float, colour: Colour) -> None:
     """Draw a disc with soft edges."""
-    at = (fixed(centre[0]), fixed(centre[1]))
-    cv2.circle(image, at, round(radius * _ONE), colour, -1, cv2.LINE_AA, SHIFT)
+    cv2.circle(image, fixed_point(centre), round(radius * _PIXEL), colour, -1, cv2.LINE_AA, SHIFT)
 
 
 def line(image: Image, start: Point, end: Point, colour: Colour, width: int = 1) -> None:
     """Draw a line with soft edges."""
-    one, other = (fixed(start[0]), fixed(start[1])), (fixed(end[0]), fixed(end[1]))
-    cv2.line(image, one, other, colour, width, cv2.LINE_AA, SHIFT)
+    cv2.line(image, fixed_point(start), fixed_point(end), colour, width, cv2.LINE_AA, SHIFT)
 
 
 def beams(image: Image, shots: Sequence[tuple[Point, Point, Colour]], width: int) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.layers import Frame
-    from khala_simulator.api.projection import Minimap, Screen
+    from khala_simulator.api.projection import Minimap, ScreenView
     from khala_simulator.api.types import Types
 
     Image = NDArray[np.uint8]
@@ -32,7 +32,7 @@ LEAST = 1.4
 class OverviewPainter:
     """Paints the minimap of one client."""
 
-    def __init__(self, minimap: Minimap, screen: Screen, types: Types) -> None:
+    def __init__(self, minimap: Minimap, screen: ScreenView, types: Types) -> None:
         self._minimap, self._screen, self._types = minimap, screen, types
         area, scale = minimap.area, minimap.scale
         self._shown = Rect(area.x0, area.y1 - minimap.rows * scale, area.x0 + minimap.columns * scale, area.y1)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from khala_simulator.api.layers import Frame
     from khala_simulator.api.painting.marks import Point
     from khala_simulator.api.painting.palette import Colour
-    from khala_simulator.api.projection import Screen
+    from khala_simulator.api.projection import ScreenView
     from khala_simulator.api.types import Types
     from khala_simulator.tables.records import UnitType
 
@@ -56,7 +56,7 @@ class DrawnUnit(NamedTuple):
 class ScenePainter:
     """Paints the screen of one client; keeps the ground under the camera and the sprites it has used."""
 
-    def __init__(self, screen: Screen, types: Types) -> None:
+    def __init__(self, screen: ScreenView, types: Types) -> None:
         self._screen, self._types = screen, types
         self._scale = 1 / screen.scale
         self._wardrobe = wardrobe(types.catalog.version, self._scale)
@@ -94,7 +94,8 @@ class ScenePainter:
     # units ------------------------------------------------------------------------------------------------------------
 
     def _units(self, image: Image, frame: Frame, actors: list[DrawnUnit]) -> None:
-        looks, selected = self._looks(frame), frame.selected.tolist()
+        looks = self._looks(frame)
+        selected = frame.selected.tolist()
         for actor in actors:
             if selected[actor.row]:
                 width = 1 + (actor.radius > TALL)
@@ -147,14 +148,14 @@ class ScenePainter:
         sight = frame.sight
         sides = palette.sides(sight.owner, sight.alliance, frame.player)
         shots: list[tuple[Point, Point, Colour]] = []
-        for one, other in zip(attacker.tolist(), target.tolist(), strict=True):
-            way = sight.pos[other] - sight.pos[one]
+        for shooter, victim in zip(attacker.tolist(), target.tolist(), strict=True):
+            way = sight.pos[victim] - sight.pos[shooter]
             ahead = way / max(math.hypot(*way), 1e-6)
             start, end = (
-                sight.pos[one] + ahead * sight.radius[one],
-                sight.pos[other] - ahead * sight.radius[other] * 0.7,
+                sight.pos[shooter] + ahead * sight.radius[shooter],
+                sight.pos[victim] - ahead * sight.radius[victim] * 0.7,
             )
-            beam = palette.LIVERIES[int(sides[one])].beam
+            beam = palette.LIVERIES[int(sides[shooter])].beam
             shots.append((self._pixel(frame, start), self._pixel(frame, end), beam))
         if shots:
             marks.beams(image, shots, 1 + (self._scale > 14))

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
 DIRECTIONS = 16
 """Directions in which a unit is drawn facing."""
-FINER, LARGE = 2, 24.0
+FINER = 2
+LARGE = 24.0
 """How many times larger a body is drawn than it is shown, unless its radius in pixels is large."""
 MAX_RADIUS = 320.0
 """Pixels; on larger images units are drawn smaller than they are."""
@@ -79,7 +80,10 @@ class Sprite:
         """Put the sprite over an image, the unit at this pixel; clip what is outside."""
         left, top = column + self.left, row + self.top
         (rows, columns), (height, width) = image.shape[:2], self.paint.shape[:2]
-        x0, y0, x1, y1 = max(0, left), max(0, top), min(columns, left + width), min(rows, top + height)
+        x0 = max(0, left)
+        y0 = max(0, top)
+        x1 = min(columns, left + width)
+        y1 = min(rows, top + height)
         if x0 >= x1 or y0 >= y1:
             return
         inside = (slice(y0 - top, y1 - top), slice(x0 - left, x1 - left))
@@ -104,12 +108,15 @@ class Wardrobe:
             sprite = self._sprites[look] = self._make(look)
             self._bytes += 2 * sprite.paint.nbytes
             if self._bytes > MAX_BYTES:
-                self._sprites, self._bodies, self._bytes = {look: sprite}, {}, 0
+                self._sprites = {look: sprite}
+                self._bodies = {}
+                self._bytes = 0
         return sprite
 
     def _make(self, look: SpriteLook) -> Sprite:
         unit = self._units[look.row]
-        livery, radius = palette.livery_of(unit, look.side), max(unit.radius_shown, 0.1) * self._scale
+        livery = palette.livery_of(unit, look.side)
+        radius = max(unit.radius_shown, 0.1) * self._scale
         radius = min(radius, MAX_RADIUS)
         key = (look.row, look.side, look.unfinished)
         body = self._bodies.get(key)
@@ -117,7 +124,7 @@ class Wardrobe:
             body = self._bodies[key] = draw_body(unit, livery, radius, unfinished=look.unfinished)
             self._bytes += body.nbytes
         upright = class_of(unit) in UPRIGHT
-        image = _turned(body, 0.0 if upright else 2 * math.pi * look.direction / DIRECTIONS, _finer(radius))
+        image = _turn(body, 0.0 if upright else 2 * math.pi * look.direction / DIRECTIONS, _finer(radius))
         image[..., :3] *= _light(len(image))
         if unit.flying:
             image = _over(_shadow(image[..., 3], radius), image)
@@ -139,7 +146,8 @@ def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
 
 def draw_body(unit: UnitType, livery: PlayerColors, radius: float, *, unfinished: bool) -> Floats:
     """Return a unit facing right, `_finer` times larger than it is shown: its rim, its body, and its details."""
-    kind, easel = class_of(unit), _Easel(radius)
+    kind = class_of(unit)
+    easel = _Easel(radius)
     body = easel.outline(outline_of(unit))
     easel.lay(cv2.dilate(body, _disc(max(1, round(easel.radius * 0.1)))), livery.rim)
     easel.lay(body, livery.body)
@@ -200,7 +208,7 @@ def _half(radius: float) -> int:
     return math.ceil(radius * REACH) + 2
 
 
-def _turned(body: Floats, angle: float, finer: int) -> Floats:
+def _turn(body: Floats, angle: float, finer: int) -> Floats:
     """Return a body turned counter-clockwise and shrunk to the size in which it is shown."""
     side, cos, sin = len(body) // finer, math.cos(angle) * finer, math.sin(angle) * finer
     middle, large = (side - 1) / 2, (len(body) - 1) / 2
@@ -246,7 +254,8 @@ def _letters(code: str, radius: float, side: int, livery: PlayerColors) -> Float
 
 def _text(text: str, size: int, height: float, width: float) -> Mask:
     """Return a square mask with capitals in its middle, no larger than this."""
-    font, mask = cv2.FONT_HERSHEY_SIMPLEX, np.zeros((size, size), np.uint8)
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    mask = np.zeros((size, size), np.uint8)
     (wide, tall), _ = cv2.getTextSize(text, font, 1.0, 1)
     scale = min(height / tall, width / wide)
     thickness = max(1, round(width * 0.09))

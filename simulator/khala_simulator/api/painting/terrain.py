@@ -17,7 +17,7 @@ from khala_simulator.api.painting import palette
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from khala_simulator.maps.game_map import Terrain
+    from khala_simulator.maps.game_map import MapTerrain
 
     Image = NDArray[np.uint8]
     Floats = NDArray[np.float32]
@@ -48,7 +48,7 @@ class Cells(NamedTuple):
     y1: int
 
 
-def paint_block(terrain: Terrain, cells: Cells, density: int) -> Image:
+def paint_block(terrain: MapTerrain, cells: Cells, density: int) -> Image:
     """Return the ground of some cells with `density` pixels per cell, north at the top; void outside of the map."""
     near = Cells(cells.x0 - MARGIN, cells.y0 - MARGIN, cells.x1 + MARGIN, cells.y1 + MARGIN)
     walk = _smooth(_window(terrain.walk, near), density)
@@ -75,7 +75,8 @@ def blend(colour: Floats, paint: palette.Colour, part: NDArray[np.floating[Any]]
 
 def _window(grid: NDArray[Any], cells: Cells, more: int = 0) -> Floats:
     """Return part of a grid, its northernmost row first; beyond the map as at its border, masks false."""
-    rows, columns = np.arange(cells.y0, cells.y1 + more)[::-1], np.arange(cells.x0, cells.x1 + more)
+    rows = np.arange(cells.y0, cells.y1 + more)[::-1]
+    columns = np.arange(cells.x0, cells.x1 + more)
     inside = ((rows >= 0) & (rows < grid.shape[0]))[:, None] & ((columns >= 0) & (columns < grid.shape[1]))
     rows, columns = np.clip(rows, 0, grid.shape[0] - 1), np.clip(columns, 0, grid.shape[1] - 1)
     part = grid[rows[:, None], columns].astype(np.float32)
@@ -89,7 +90,7 @@ def _smooth(part: Floats, density: int) -> Mask:
     return result
 
 
-def _heights(terrain: Terrain, cells: Cells, density: int) -> Floats:
+def _heights(terrain: MapTerrain, cells: Cells, density: int) -> Floats:
     """Return the ground z of every pixel, interpolated between the corners of its cell."""
     corners = _window(terrain.vertices, cells, more=1)
     size = ((cells.x1 - cells.x0) * density, (cells.y1 - cells.y0) * density)
@@ -99,7 +100,7 @@ def _heights(terrain: Terrain, cells: Cells, density: int) -> Floats:
 
 
 @functools.lru_cache(maxsize=16)
-def _floor(terrain: Terrain) -> tuple[float, float]:
+def _floor(terrain: MapTerrain) -> tuple[float, float]:
     """Return the lowest and the highest usable ground, except for rare extremes."""
     floor = terrain.vertices[:-1, :-1][terrain.cliff > 0]
     if not floor.size:
@@ -108,7 +109,7 @@ def _floor(terrain: Terrain) -> tuple[float, float]:
     return low, max(high, low + 4.0)
 
 
-def _tint(terrain: Terrain, height: Floats) -> Floats:
+def _tint(terrain: MapTerrain, height: Floats) -> Floats:
     low, high = _floor(terrain)
     part = np.clip((height - low) / (high - low), -0.25, 1.0)[..., None].astype(np.float32)
     result: Floats = np.array(palette.LOW, np.float32) * (1 - part) + np.array(palette.HIGH, np.float32) * part
@@ -138,13 +139,13 @@ def _hatch(colour: Floats, rock: Mask, density: int) -> None:
 
 
 @functools.lru_cache(maxsize=4)
-def _noise(terrain: Terrain) -> Floats:
+def _noise(terrain: MapTerrain) -> Floats:
     """Return two random values per cell, always the same."""
     width, height = terrain.size
     return np.random.default_rng(7).standard_normal((2 * height, 2 * width)).astype(np.float32)
 
 
-def _grain(colour: Floats, terrain: Terrain, cells: Cells) -> None:
+def _grain(colour: Floats, terrain: MapTerrain, cells: Cells) -> None:
     rows, columns = colour.shape[:2]
     coarse = _window(_noise(terrain), Cells(2 * cells.x0, 2 * cells.y0, 2 * cells.x1, 2 * cells.y1))
     fine = np.random.default_rng(cells.x0 % 997 + 1000 * (cells.y0 % 997)).standard_normal((rows // 2, columns // 2))
@@ -166,7 +167,7 @@ def _edges(colour: Floats, walk: Mask, height: Floats, density: int) -> None:
     blend(colour, palette.EDGE, 0.85 * outer)
 
 
-def _playable(terrain: Terrain) -> Mask:
+def _playable(terrain: MapTerrain) -> Mask:
     x0, y0, x1, y1 = terrain.playable
     inside = np.zeros(terrain.walk.shape, np.bool_)
     inside[y0:y1, x0:x1] = True

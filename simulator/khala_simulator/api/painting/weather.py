@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from khala_simulator.api.layers import Frame
     from khala_simulator.api.painting.palette import Colour
-    from khala_simulator.api.projection import Screen
+    from khala_simulator.api.projection import ScreenView
     from khala_simulator.world.area_effects import AreaEffect
 
     Image = NDArray[np.uint8]
@@ -58,8 +58,8 @@ def _bolts(image: Image, centre: Point, radius: float, colour: Colour, age: int)
             (centre[0] + radius * far * math.cos(start + turn), centre[1] + radius * far * math.sin(start + turn))
             for far, turn in ((far, 0.5 * math.sin(7.0 * k + 3.0 * age + 11.0 * far)) for far in (0.12, 0.36, 0.6, 0.9))
         ]
-        for one, other in itertools.pairwise(points):
-            marks.line(image, one, other, glare, 1 + (radius > 60))
+        for before, after in itertools.pairwise(points):
+            marks.line(image, before, after, glare, 1 + (radius > 60))
 
 
 def _rings(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
@@ -79,9 +79,10 @@ def _cross(image: Image, centre: Point, radius: float, colour: Colour, age: int)
 def _teeth(image: Image, centre: Point, radius: float, colour: Colour, age: int) -> None:
     """Draw teeth around the edge, pointing inward."""
     for k in range(12):
-        cos, sin = math.cos(k * math.pi / 6 + age * 0.01), math.sin(k * math.pi / 6 + age * 0.01)
-        one = (centre[0] + radius * cos, centre[1] + radius * sin)
-        marks.line(image, one, (centre[0] + radius * 0.88 * cos, centre[1] + radius * 0.88 * sin), colour)
+        cos = math.cos(k * math.pi / 6 + age * 0.01)
+        sin = math.sin(k * math.pi / 6 + age * 0.01)
+        start = (centre[0] + radius * cos, centre[1] + radius * sin)
+        marks.line(image, start, (centre[0] + radius * 0.88 * cos, centre[1] + radius * 0.88 * sin), colour)
 
 
 MANNERS: dict[int, Manner] = {
@@ -103,7 +104,7 @@ OTHER = Manner((240, 240, 240), 0.2, above=False)
 """How an effect is painted that has no manner of its own."""
 
 
-def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
+def paint_below(image: Image, frame: Frame, screen: ScreenView) -> list[AreaEffect]:
     """Paint the effects on the ground, and return those that hang above."""
     if not frame.world.area_effects:
         return []
@@ -113,15 +114,16 @@ def paint_below(image: Image, frame: Frame, screen: Screen) -> list[AreaEffect]:
     return above
 
 
-def paint_above(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) -> None:
+def paint_above(image: Image, frame: Frame, screen: ScreenView, areas: list[AreaEffect]) -> None:
     """Paint the effects that hang over the units."""
     if areas:
         _paint(image, frame, screen, areas)
 
 
-def _paint(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) -> None:
+def _paint(image: Image, frame: Frame, screen: ScreenView, areas: list[AreaEffect]) -> None:
     for area in areas:
-        manner, age = MANNERS.get(area.effect, OTHER), frame.world.loop - area.begun
+        manner = MANNERS.get(area.effect, OTHER)
+        age = frame.world.loop - area.begun
         edge = palette.mix(manner.colour, palette.LIVERIES[_side(area, frame)].dot, EDGE_SIDE)
         radius = max(area.radius / screen.scale, 2.0)
         for point in area.points:
@@ -132,7 +134,7 @@ def _paint(image: Image, frame: Frame, screen: Screen, areas: list[AreaEffect]) 
                     manner.figure(image, centre, radius, manner.colour, age)
 
 
-def _in_view(centre: Point, reach: float, screen: Screen) -> bool:
+def _in_view(centre: Point, reach: float, screen: ScreenView) -> bool:
     x, y = centre
     return -reach < x < screen.columns + reach and -reach < y < screen.rows + reach
 
@@ -151,7 +153,7 @@ def _disc(image: Image, centre: Point, radius: float, manner: Manner, edge: Colo
     if not region.size:
         return
     over = region.copy()
-    at = (marks.fixed(centre[0] - x0), marks.fixed(centre[1] - y0))
+    at = marks.fixed_point((centre[0] - x0, centre[1] - y0))
     cv2.circle(over, at, round(radius * (1 << marks.SHIFT)), manner.colour, -1, cv2.LINE_AA, marks.SHIFT)
     region[...] = cv2.addWeighted(over, manner.fill, region, 1 - manner.fill, 0)
     marks.ring(image, centre, radius, edge, 1 + (radius > 30))
