@@ -2,18 +2,29 @@
 
 A look-up for ``movement.pushing``, which acts on it.
 
-Which pairs: two bodies that share a layer, and whose distance is less than the one they keep and a ``SKIN``, as what is
-pushed off one body may come upon the next. Nothing is to be done unless two of a pair overlap by more than
-``OVERLAP_ALLOWED``. What stands on a footprint is a wall and no body.
+Which pairs: two bodies that share a layer and whose distance is less than the one that they keep plus a ``SKIN``,
+because a body that is pushed off one neighbour may come upon the next. There is nothing to do unless two of a pair
+overlap by more than ``OVERLAP_ALLOWED``. A structure on its footprint is a wall and no body.
 
-How they are found: among ``FEW`` units every pair is measured. Many are sorted along the axis on which they spread
-wider, and each is measured with those that follow it within the reach of the two widest, so that the cost grows with
-the crowd and not with its square. The sort begins with the order of the last loop, of which little has changed.
+The steps of one look, and why they come in this order:
+
+1. List the bodies, in the order of their slots.
+2. If they are more than ``FEW``, rank them along the axis on which they spread wider: recall the order of the last
+   look, of which little has changed, then sort by insertion, which costs little where little is out of place.
+3. Copy what is measured side by side, in that order, so that the inner loop reads memory in a line.
+4. Measure each body with those that follow it: with all among few; among many with those within the reach of the two
+   widest, so that the cost grows with the crowd and not with its square. This filter has no branch; the second pass
+   over the few that are left looks at layers and notes the pairs.
 
 In which order: sums of pushes are rounded, so their order decides the last bit of a position, and it must follow from
 the state of the world alone. The bodies stand in the order of their slots among few, and along the axis among many,
 where equal ones follow their slots. Each forms its pairs with those that follow it, in that order. Of the pushes that a
 body gets, those as the second of a pair are summed up first among few, those as the first of it among many.
+
+To be kept in step by hand: the recalled order may save time but never decide: the sort has one result, whatever it
+begins with. ``pushing`` follows ``by_slots`` in the order of its sums. ``_place`` is -1 everywhere between two looks.
+A new column of pairs that a look itself writes belongs to the first three of ``arrays`` in ``_reserve_pairs``: they
+survive when the room grows in the middle of the look.
 """
 
 from __future__ import annotations

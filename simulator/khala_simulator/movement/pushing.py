@@ -1,9 +1,27 @@
 """Pushing: bodies that overlap are pushed apart along the line between their centres, a few times over.
 
-A walker gives way to a unit that fights, and an idle unit to a friend that comes through. No unit gives way to an
-enemy, and one that holds its place gives way to none. Flyers pass through each other and drift apart where they stop.
-How much is an estimate (see ``data/mechanics.yaml``). In one round every pair pushes from where all stood before it;
-``contacts`` has the order in which these pushes are summed up.
+The rules: a walker gives way to a unit that fights, and an idle unit to a friend that comes through. No unit gives way
+to an enemy, and a unit that holds its place gives way to none. Of two walkers the one that is nearer to its next corner
+goes first. Flyers pass through each other and drift apart where they stop. How much is an estimate (see
+``data/mechanics.yaml``).
+
+The steps of one loop, and why they come in this order:
+
+1. ``contacts`` finds the pairs that touch or nearly do. If no two touch, nothing moves.
+2. Bodies on the very same point are stirred: they have no line between their centres to part along.
+3. The place of each body is kept as ``start``, from which step 7 measures.
+4. Flyers that hover drift apart once, by a little, and their pairs are forgotten: they take no part in the rounds.
+5. Walkers share out the overlap of each pair, and are pushed in at most ``PUSH_ROUNDS`` rounds, until no overlap is
+   left. In one round every pair pushes from where all stood before the round, so no pair gains by its number.
+6. Where two are still deep in each other (``OVERLAP_PRESSED``), the one that yields more, or both if they are equal,
+   takes its step back; then come one round fewer. Otherwise a crowd with one goal presses itself together.
+7. Pushes beyond ``PUSH_LIMIT`` are shortened, so no body jumps.
+
+``share`` and ``rest`` of a pair add up to 1: one round parts a lonely pair, more rounds serve bodies in a row.
+
+To be kept in step by hand: sums of pushes are rounded, so their order decides the last bit of a position. Both places
+that add up pushes, the drift and the rounds, choose it by ``crowd.by_slots`` (seconds before firsts among few, firsts
+before seconds among many), as ``contacts`` explains.
 """
 
 from __future__ import annotations

@@ -1,7 +1,30 @@
-"""Collision: bodies are pushed apart and kept off cliffs, structures and the edge of the map.
+"""Collision: bodies take their steps, push each other apart, and stay off cliffs, structures and the edge of the map.
 
-All bodies take their intended step, those that overlap are pushed apart (see ``movement.pushing``), and finally every
-body is put where its layer allows: no body ever ends inside a wall. Walkers that make no headway look for a way around.
+The rules: no body ends a loop inside a wall; bodies of one layer keep their distance as far as one loop can restore
+it; a walker that makes no headway looks for a way around. Flyers know no walls but the edge of the playable area.
+
+The steps of one loop, and why they come in this order:
+
+1. Every body takes the step that ``systems.movement`` intends. All step before any is pushed, so no body gains by its
+   slot.
+2. ``movement.pushing`` pushes overlapping bodies apart. It knows no walls and may push a body into one.
+3. Every body that moved is put where its layer allows. This comes last because it may undo a push, never the reverse:
+   two bodies may still overlap at a wall, but neither stands in it.
+4. The positions are written, once. Until then all steps work on copies (``Crowd.before`` and ``Crowd.after``), so the
+   whole way, ``after - before``, is known in the end.
+5. A walker that went less than ``BLOCKED_SHARE`` of its intended step counts this loop as blocked; at every
+   ``DETOUR_AFTER``-th such loop ``systems.avoidance`` begins a detour. A loop with headway takes two off the count.
+
+How a body is kept off a wall: most cells are open, that is, they and all their neighbours are free, and a body there is
+let be. Elsewhere the body keeps its ``clearance`` from blocked sides, then from corners at which only the diagonal
+neighbour is blocked (``spikes``). If it still ends in a blocked cell, it moves along x alone, else along y alone, else
+it stays; if it already stood in a wall, as when a structure lands on it, it leaves towards the nearest free cell.
+
+There is nothing to do while no unit moves, if the last look found no two bodies that touch and no unit came or went
+since (``resting_version``).
+
+To be kept in step by hand: code that moves a body without an intended step, such as a teleport, sets
+``resting_version`` to -1, or this system does not look.
 """
 
 from __future__ import annotations

@@ -1,8 +1,26 @@
 """Vision: what each player sees, where the map has a fog of war.
 
-A cell is visible when its centre is within the sight of a unit of the player's and not above the unit's own cliff
-level, unless the unit flies. On maps whose script removes the fog every player sees everything. Units that are cloaked
-or burrowed are seen where a detector of the player, a scan, or a revealing buff covers them.
+The rules: a cell is visible when its centre is within the sight of a unit of the player's and not above the unit's own
+cliff level, unless the unit flies. On maps whose script removes the fog every player sees everything. Units that are
+cloaked or burrowed are seen where a detector of the player, a scan, or a revealing buff covers them.
+
+The steps of one look, and why they come in this order:
+
+1. ``Eyes.light`` redraws the visibility of cells, every ``VISION_PERIOD`` loops and when a unit came or went.
+2. ``_see_units`` writes which units stand on visible cells. Where there is fog it runs in every loop, as units walk in
+   and out of the light between two redraws.
+3. ``_hide`` takes cloaked units away again from players that do not detect them. It comes after the light, because
+   detection can only keep a unit in sight and never shows a dark cell.
+4. ``_reveal`` shows units under a revealing buff to the player that applied it, whatever came before.
+5. ``fog.remember`` notes structures that went out of sight, after the light of this look.
+
+How cells are counted: ``Eyes`` keeps for each player how many eyes see each cell, and an ``Eye`` of each slot as it was
+at the last look. A look takes away the eyes that changed and adds what they are now, so that a unit that stands costs
+nothing. Eyes that are no units, such as scans, are a set; its differences are added and taken away in the same way.
+
+To be kept in step by hand: each eye is taken away with the very numbers with which it was added, so these are kept and
+never computed again. ``NUMBERS`` is the length of an ``Eye``; ``_write``, ``_differ`` and ``_watch`` each name its five
+numbers. Owner 0 is an unused slot or a neutral unit, and counts nothing. ``api.sight`` reads ``cell_at`` as well.
 """
 
 from __future__ import annotations
