@@ -181,7 +181,7 @@ class Battle:
         advance(self._world, loops)
 
     def forget_past(self) -> None:
-        """Drop the lists of what has happened, which grow in a long game and which nobody reads here."""
+        """Drop the lists of past events, which grow in a long game and have no reader here."""
         world = self._world
         world.deaths, world.deaths_seen = world.deaths[world.deaths_seen :], 0
         world.mishaps, world.alerts = [], []

@@ -57,7 +57,7 @@ def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = Fal
 
 
 def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
-    """Walk to a point and fight what is met; a unit without a weapon scan-moves."""
+    """Walk to a point and fight enemies on the way; a unit without a weapon scan-moves."""
     taken: list[int] = []
     for slot in slots:
         if can_attack(world, slot):
@@ -80,7 +80,7 @@ def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool 
 
 
 def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
-    """Go back and forth between here and a point, fighting what is met."""
+    """Go back and forth between here and a point, fighting enemies on the way."""
     taken: list[int] = []
     for slot in slots:
         if can_move(world, slot):
@@ -102,7 +102,7 @@ def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int
 
 
 def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
-    """Stay on the spot and fight only what is in reach."""
+    """Stay on the spot and fight only enemies in reach."""
     takers = [s for s in slots if can_move(world, s)]
     return give(world, takers, Order(OrderKind.HOLD, HOLD_POSITION), queue=queue)
 
@@ -136,7 +136,7 @@ def gather(world: World, slots: Iterable[int], target: int, *, queue: bool = Fal
 
 
 def return_cargo(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
-    """Carry what is loaded to the nearest town hall, and go on harvesting."""
+    """Carry the load to the nearest town hall, and go on harvesting."""
     taken: list[int] = []
     for slot in slots:
         ability = harvesting.harvesters(world.catalog)[int(world.type[slot])][1]
@@ -146,7 +146,7 @@ def return_cargo(world: World, slots: Iterable[int], *, queue: bool = False) -> 
 
 
 def surrender(world: World, player: int) -> None:
-    """Give up: defeat for the player, and victory for the last one who has not given up."""
+    """Give up: defeat for the player, and victory for the last player that has not given up."""
     world.players[player].surrendered = True
     playing = [p for p in world.players[1:] if not p.surrendered]
     if len(playing) <= 1:

@@ -1,1 +1,1 @@
-"""What a client of the SC2 API is told of a world, and what its requests do to it."""
+"""The SC2 API of a world: what its clients observe, and what their requests do."""

@@ -170,7 +170,7 @@ def _encode(units: PerceivedUnits) -> bytes:
 
 
 def _put_known(unit: wire.MessageWriter, view: _View, i: int, is_here: bool) -> None:
-    """Write what is known of remembered and planned units too."""
+    """Write the fields that remembered and planned units have as well."""
     unit.put_number(fields.DISPLAY_TYPE, view.display[i])
     unit.put_number(fields.ALLIANCE, view.alliance[i])
     unit.put_number(fields.TAG, view.tag[i])

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.types import Types
-    from khala_simulator.world.players import PlayerState, Spending, Vitals
+    from khala_simulator.world.players import SpentResources, Vitals, WorldPlayer
     from khala_simulator.world.world import World
 
 RATE_LOOPS = 240
@@ -40,7 +40,7 @@ class Holdings:
     """The property of a player at this loop."""
 
     def __init__(self, world: World, types: Types, player: int) -> None:
-        self.player: PlayerState = world.players[player]
+        self.player: WorldPlayer = world.players[player]
         self.kind = world.map.scenario.score
         slots = which(world.alive & (world.owner == player) & ~world.hallucination)  # passengers count, too
         rows = world.type[slots]
@@ -148,7 +148,7 @@ def _columns(types: Types) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     return tuple(columns), np.stack(list(columns.values()), axis=1)
 
 
-def _spent(spent: Spending, resource: int) -> score_pb2.CategoryScoreDetails:
+def _spent(spent: SpentResources, resource: int) -> score_pb2.CategoryScoreDetails:
     return score_pb2.CategoryScoreDetails(
         none=0,
         army=spent.army[resource],

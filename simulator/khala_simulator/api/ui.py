@@ -89,7 +89,7 @@ def _unit(world: World, types: Types, slot: int, player: int) -> ui_pb2.UnitInfo
 
 
 class _Infos:
-    """What a panel says of units, one after the other."""
+    """The entries of a panel, written one unit after the other."""
 
     def __init__(self, world: World, types: Types, player: int) -> None:
         self.c = columns.columns_of(world)

@@ -1,4 +1,4 @@
-"""Healing: life that a unit gets back; what has none left stays dead.
+"""Healing: life that a unit gets back; a unit with none left stays dead.
 
 The counterpart of ``damage``. A unit that loses its life in a loop is in the world until ``systems.death`` runs, and
 whatever would heal it until then comes too late. Above: everything that heals or repairs.

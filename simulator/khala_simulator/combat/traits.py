@@ -199,7 +199,7 @@ def _unground(world: World, slot: int, flags: frozenset[str]) -> None:
 
 
 def _restrain(world: World, slot: int, flags: frozenset[str]) -> None:
-    """Apply what buffs, being under construction or being without power forbid or hide."""
+    """Apply the limits that buffs, construction and a lack of power put on a unit."""
     unfinished = world.build_progress[slot] < 1.0
     helpless = unfinished or not world.powered[slot] or bool(flags & {"stunned", "stasis"})
     world.can_act[slot] = not (helpless or "uncommandable" in flags)

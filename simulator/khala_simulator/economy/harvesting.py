@@ -100,7 +100,7 @@ def _nearest(world: World, slot: int, candidates: Ints) -> int:
     return int(candidates[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
 
 
-# who is where ---------------------------------------------------------------------------------------------------------
+# where workers are ----------------------------------------------------------------------------------------------------
 
 
 def workers_per_resource(world: World) -> Ints:

@@ -18,7 +18,7 @@ CANCELLED: Final = 0.75
 
 
 def charge(world: World, player: int, cost: Cost) -> Cost:
-    """Charge a player a price; return what was taken, nothing from one that plays for free."""
+    """Charge a player a price; return the price taken, nothing from a player that plays for free."""
     purse = world.players[player]
     if "free" in purse.cheats:
         return 0.0, 0.0

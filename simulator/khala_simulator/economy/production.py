@@ -1,7 +1,7 @@
 """Production: the queues of structures and eggs, and how something gets into one and out of it again.
 
 A ``ProductionJob`` is one product in a queue; ``systems.production`` works on the first one, with a reactor on the
-first two. What an ability means for a queue is in ``skills.production`` and ``skills.research``.
+first two. What an ability means for a queue is in ``abilities.shared.production`` and ``research``.
 """
 
 from __future__ import annotations

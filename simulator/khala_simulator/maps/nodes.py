@@ -109,7 +109,7 @@ def _check_depth(text: str, source: str) -> None:
 
 
 def _check_values(root: yaml.MappingNode) -> None:
-    """Refuse nodes that nobody could read; an alias is walked wherever it stands, so the limits hold for it too."""
+    """Refuse nodes beyond the limits; an alias is walked wherever it stands, so the limits hold for it too."""
     left: list[tuple[yaml.Node, str, int]] = [(root, "", 0)]
     seen = 0
     while left:

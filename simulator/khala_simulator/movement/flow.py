@@ -280,7 +280,7 @@ def flow_around(grid: SurfaceGrid, walkers: list[Walker]) -> Flow:
 
 
 def _settle(walkers: list[Walker], width: float) -> int:
-    """Write who arrives where none who is nearer to its place does; return how many do."""
+    """Write which walkers arrive where no walker nearer to its place does; return how many do."""
     settled = 0
     for walker in walkers:
         walker.settled = walker.arrives

@@ -1,4 +1,4 @@
-"""Attack: when it begins, where it goes, who waits for the others, and when it is called off."""
+"""Attack: when it begins, where it goes, which units wait for the others, and when it is called off."""
 
 from __future__ import annotations
 

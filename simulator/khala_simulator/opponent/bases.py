@@ -102,7 +102,7 @@ def _site(world: World, player: int, hall: UnitType, group: Floats, starts: list
 
 
 def next_place(side: OwnSide, enemy: Enemy) -> Point | None:
-    """Return the nearest base that nobody has and still has minerals; on the enemy's half as a last resort."""
+    """Return the nearest free base that still has minerals; on the enemy's half as a last resort."""
     world = side.world
     halls = [s for s in side.slots.tolist() if harvesting.kinds(world.catalog)[2][world.type[s]]]
     foes = enemy.places()

@@ -54,7 +54,7 @@ def _mule(side: OwnSide) -> None:
 
 
 def _chrono(side: OwnSide) -> None:
-    """Speed up what is busy: research first, then whatever the producers make, then workers."""
+    """Speed up busy structures: research first, then producers, then workers."""
     world = side.world
     ability = world.catalog.ability(CHRONO)
     for nexus in side.of_type("Nexus"):

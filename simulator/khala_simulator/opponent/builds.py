@@ -31,7 +31,7 @@ class OpeningStep(NamedTuple):
 
 
 class BuildStage(Data):
-    """What is wanted from a time on; what earlier stages wanted stays wanted, except the army and the workers.
+    """The wishes of a build from a time on; those of earlier stages stay, except the army and the workers.
 
     ``army`` has shares, ``units`` numbers of single units, ``gas`` is the number of gas structures. ``workers`` is a
     limit below that of the level, 0 for none.

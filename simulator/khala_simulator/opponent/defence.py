@@ -1,4 +1,4 @@
-"""Defence: what threatens the own bases, and who goes there: the army at home, and workers where it is too weak."""
+"""Defence: enemies that threaten the own bases, and the units sent against them: the army, workers if it is weak."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _nearest_home(side: OwnSide, threat: Ints) -> int:
 
 
 def defend(side: OwnSide, army: list[int], threat: Ints) -> list[int]:
-    """Send the army at home against enemies at the bases, and workers; return who goes on with the attack.
+    """Send the army at home against enemies at the bases, and workers; return the units that go on with the attack.
 
     An attack is called off where the army at home is too weak, unless the threat is small beside the whole army. An
     army that is too weak alone waits at its front until the enemies are between its workers.

@@ -1,4 +1,4 @@
-"""The economy: who mines where, supply ahead of what is made, and new workers."""
+"""The economy: which workers mine where, supply ahead of production, and new workers."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ WORKER_VALUE: Final = 18.0
 VESPENE: Final = 1.2
 """A unit of vespene counts as so many minerals."""
 A_BUNKER: Final = 250.0
-"""With the Marines in it, which nobody sees."""
+"""With the Marines in it, which no enemy sees."""
 
 
 class Enemy:

@@ -66,7 +66,7 @@ def grow(side: OwnSide, enemy: Enemy, staff: Staff) -> None:
 
 
 def _before_the_army(side: OwnSide, staff: Staff) -> None:
-    """Spend on what pays even while the army is too small, as long as nobody attacks."""
+    """Spend on the economy even while the army is too small, as long as no enemy attacks."""
     if side.owner.vespene >= IDLE_GAS:
         research(side)
     if not side.build.saves:
@@ -231,7 +231,7 @@ def _train_first_possible(side: OwnSide, names: list[str]) -> bool:
 
 
 def _worth_waiting(side: OwnSide, name: str) -> bool:
-    """Return whether a unit can be paid, or only minerals are missing: who lacks vespene does not stop the others."""
+    """Return whether a unit can be paid, or lacks only minerals: a unit that lacks vespene does not stop the others."""
     vespene = products.ways(side.world.catalog, name)[0].vespene
     return not vespene or vespene <= side.purse.vespene
 

@@ -36,7 +36,7 @@ MAKES: Final = frozenset({"train", "build", "build_addon", "warp_in", "structure
 
 
 class MakeOutcome(Enum):
-    """What came of making something."""
+    """How an attempt to make something ended."""
 
     DONE = "ordered"
     SHORT = "the money is put aside"

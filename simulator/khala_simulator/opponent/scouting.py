@@ -55,7 +55,7 @@ def _place(side: OwnSide) -> Point:
 
 
 def _chosen(side: OwnSide) -> int:
-    """Return who scouts: early an Overlord or a worker, later the cheapest unit of the army."""
+    """Return the unit that scouts: early an Overlord or a worker, later the cheapest of the army."""
     if side.clock_s < WORKERS_UNTIL_S:
         overlords = side.of_type("Overlord")
         return overlords[0] if overlords else products.free_worker(side, side.mind.enemy_start)

@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class SidePurse:
-    """What is left to spend in this thought; it is less than nothing once more is put aside than there is."""
+    """The money left to spend in this thought; it is negative once more is put aside than there is."""
 
     minerals: float
     vespene: float
     room: float
 
     def affords(self, ability: Ability) -> bool:
-        """Return whether the price of an ability is there; what is put aside does not hinder what is free."""
+        """Return whether a player can pay an ability now; money put aside never hinders a free one."""
         enough = self.minerals >= ability.minerals or not ability.minerals
         return enough and (self.vespene >= ability.vespene or not ability.vespene)
 
@@ -50,7 +50,7 @@ class SidePurse:
         self.room -= ability.supply
 
     def put_aside(self, ability: Ability) -> None:
-        """Keep the price of an ability for later; minerals only if they are what is missing."""
+        """Keep the price of an ability for later; of minerals only if minerals are missing."""
         if self.minerals < ability.minerals:
             self.minerals -= ability.minerals
         self.vespene -= ability.vespene
@@ -109,7 +109,7 @@ class OwnSide:
         return self.of_type(*names_of(self.world.catalog, name))
 
     def count(self, name: str) -> int:
-        """Return how many of a type, or of what counts as it, exist, are being made, or are ordered."""
+        """Return how many of a type, or of types that count as it, exist, are being made, or are ordered."""
         names = names_of(self.world.catalog, name)
         exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) for n in names)
         return exist + sum(self.underway[n] for n in names if n not in self.begun) + self.ordered[name]

@@ -1,4 +1,4 @@
-"""Stance: where the army waits, who is where, and the way home; shared by ``defence`` and ``attack``."""
+"""Stance: where the army waits, where its units are, and the way home; shared by ``defence`` and ``attack``."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 PARENT = "KHALA_PARENT"
-"""The variable with the process id of a parent without which nobody wants the game."""
+"""The variable with the process id of the parent; without that parent no client needs the game."""
 PARENT_LOOK_S = 0.25
 LOOK_S = 5.0
 PATIENCE_LOOKS = 12

@@ -63,7 +63,7 @@ def find_headings(world: World) -> None:
             turning.append(slot)
     if not turning:
         return
-    # in the middle of the usual step of 8 loops: who gets a new order at every step is led for the rest of it
+    # in the middle of the usual step of 8 loops: a unit with a new order at every step is led for the rest of it
     if (loop - DETOUR_PERIOD) % FLANK_PERIOD == 0:
         for slot in turning:
             if _flows(c, slot):
@@ -265,5 +265,5 @@ class _Crowd:
 
 
 def _is_body(c: Columns, slot: int) -> bool:
-    """Return whether a unit is a body to go round; what stands on a footprint is a wall."""
+    """Return whether a unit is a body to go round; a structure on its footprint is a wall."""
     return c.layer_bits[slot] != 0 and not c.walled[slot]

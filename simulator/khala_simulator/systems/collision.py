@@ -152,7 +152,7 @@ def _leave_wall(grid: SurfaceGrid, before: memory.Point, after: memory.Point) ->
     x, y = surface.centre(np.array(free)).tolist()
     if grid.shift == 0.0:
         return memory.point(x, y)
-    x -= before.x  # what is too near to a wall for its body leaves it little by little
+    x -= before.x  # a body too wide for its distance to a wall leaves it little by little
     y -= before.y
     part = min(1.0, PUSH_LIMIT / max(memory.length(x, y), SAME_POINT))
     return memory.point(before.x + x * part, before.y + y * part)

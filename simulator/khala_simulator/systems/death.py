@@ -12,7 +12,7 @@ from khala_simulator.world.world import Death
 
 if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
-    from khala_simulator.world.players import Spending
+    from khala_simulator.world.players import SpentResources
     from khala_simulator.world.world import World
 
 NO_KILLER = -1
@@ -95,7 +95,7 @@ def _count(world: World, unit: UnitType, owner: int, killer: int) -> None:
         won.killed_value_units += unit.score_kill
 
 
-def _add(spent: Spending, unit: UnitType) -> None:
+def _add(spent: SpentResources, unit: UnitType) -> None:
     """Add a unit's price to its category: workers and town halls are economy, other structures technology."""
     if unit.worker or (unit.structure and unit.provides > 0 and "structure" in unit.attributes):
         category = spent.economy

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 CROWD_PERIOD: Final = 2
-"""How often the density of the crowd at a goal is checked; of those who look for targets, whenever they have looked."""
+"""How often the density of the crowd at a goal is checked; units that look for targets check after each look."""
 CROWD_STALL: Final = MECHANICS.crowd_stall
 SCAN_PERIOD: Final = MECHANICS.scan_period
 ARRIVAL_RADIUS_SQUARED: Final = MECHANICS.arrival_radius**2

@@ -35,7 +35,7 @@ class Vitals:
 
 
 @dataclass(slots=True)
-class Spending:
+class SpentResources:
     """Minerals and vespene by the score's categories: army, economy, technology."""
 
     army: list[float] = field(default_factory=lambda: [0.0, 0.0])
@@ -53,8 +53,8 @@ class ScoreCounters:
     killed_structures: int = 0
     lost_units: int = 0
     lost_structures: int = 0
-    killed: Spending = field(default_factory=Spending)
-    lost: Spending = field(default_factory=Spending)
+    killed: SpentResources = field(default_factory=SpentResources)
+    lost: SpentResources = field(default_factory=SpentResources)
     damage_dealt: Vitals = field(default_factory=Vitals)
     damage_taken: Vitals = field(default_factory=Vitals)
     healed: Vitals = field(default_factory=Vitals)
@@ -79,7 +79,7 @@ class PlayerSetup:
 
 
 @dataclass(slots=True)
-class PlayerState:
+class WorldPlayer:
     """One player during a game; player 0 is the neutral one (the API says 16)."""
 
     id: int

@@ -28,7 +28,7 @@ from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColum
 from khala_simulator.world.creep import Creep
 from khala_simulator.world.ground import BuiltGround
 from khala_simulator.world.orders import ATTACK, Order, OrderKind
-from khala_simulator.world.players import NEUTRAL, GameResult, PlayerSetup, PlayerState
+from khala_simulator.world.players import NEUTRAL, GameResult, PlayerSetup, WorldPlayer
 from khala_simulator.world.script_memory import ScriptMemory
 from khala_simulator.world.snapshots import FogMemory
 
@@ -115,8 +115,8 @@ class World(UnitColumns, WorldCaches):
         self.seed = seed
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.loop = 0
-        self.players: list[PlayerState] = [PlayerState(NEUTRAL, "neutral", "none")]
-        self.players += [PlayerState(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
+        self.players: list[WorldPlayer] = [WorldPlayer(NEUTRAL, "neutral", "none")]
+        self.players += [WorldPlayer(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
         self.stats = new_stats(self.catalog, len(self.players))
         self.ground = BuiltGround(game_map.terrain)
         self.fog: bool = fog and game_map.scenario.visibility.fog

@@ -24,7 +24,7 @@ def _gather(world: World, slots: list[int], _: Ability, target: int, __: Point |
 
 
 def _return(world: World, slots: list[int], _: Ability, __: int, ___: Point | None, queue: bool) -> list[int]:
-    """Carry what is loaded to the nearest town hall, and go on harvesting."""
+    """Carry the load to the nearest town hall, and go on harvesting."""
     return commands.return_cargo(world, slots, queue=queue)
 
 
