@@ -122,14 +122,14 @@ def fork(
     if model == "recorded" or (model is None and not changed and at is not None):
         if changed or at is None:
             what = ", ".join(changed) or "--scan"
-            raise ConfigError(f"a recorded future has nothing but what was recorded: leave out {what}, or say --model")
+            raise ConfigError(f"the recorded future cannot be changed: leave out {what}, or say --model")
         commands.repeat(trunk, at, game, as_json=as_json)
         return
     common = None
     if model or policy:
         common = Minds(model or "scripted", model_name, base_url, policy, budget_usd, latency, fallback)
     elif about_a_model := [option for option in ("--model-name", "--base-url", "--fallback") if option in changed]:
-        raise ConfigError(f"{about_a_model[0]} is about a model: name it with --model")
+        raise ConfigError(f"{about_a_model[0]} is for a model: name the model with --model")
     trust_named(policy, fallback, *sides.values(), *(said.partition("=")[2] for said in agent or ()))
     plan = commands.planned(trunk, out, common, sides, agent or (), advise or (), memory)
     if at is not None:
