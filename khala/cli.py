@@ -147,7 +147,7 @@ def advise(
     agent: Annotated[
         str | None, typer.Option(help="Write to this agent.", show_default="to all of the side", metavar="NAME")
     ] = None,
-    name: Annotated[str, typer.Option(help="Who writes: an adviser that the task names.")] = "Adviser",
+    name: Annotated[str, typer.Option(help="Adviser who writes, as the task names it.")] = "Adviser",
     side: Annotated[str, typer.Option(help="Side whose agents are advised.")] = "blue",
     connect: Annotated[
         list[str] | None,
@@ -162,8 +162,8 @@ def advise(
 ) -> None:
     """Read the reports of a running match, and write to its agents.
 
-    Each line of stdin is a message, which agents read in their next observation; `@Stalkers fall back` is for one of
-    them. The recording marks it as human, and the result counts it.
+    Each line of stdin is a message that agents read in their next observation; `@Stalkers fall back` is for one
+    agent. The recording marks each message as human, and the result counts it.
     """
     from khala.commands.advise import Adviser, run_advise  # noqa: PLC0415  # loads the native library of the bus
     from khala_orchestrator.words.mailbox import EVERYONE  # noqa: PLC0415
@@ -186,7 +186,7 @@ def doctor(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Look at this machine as a match would, and say what to do."""
+    """Check whether this machine can play matches, and say what to fix."""
     from khala.commands import host as commands  # noqa: PLC0415  # see there
 
     commands.doctor(tls, game, as_json=as_json)

@@ -211,7 +211,7 @@ def load_policy(name: str) -> Policy:
         return Player(name)
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
-        raise ConfigError(f"'{name}' is no policy: write {', '.join(PLAYERS)} or module:name, such as my_agent:decide")
+        raise ConfigError(f"'{name}' is not a policy: write {', '.join(PLAYERS)} or module:name, as my_agent:decide")
     found = load_attribute(module_name, attribute, source=f"policy {name}")
     try:
         return as_policy(found() if isinstance(found, type) else found)

@@ -85,20 +85,20 @@ def agent(
     memory: Annotated[
         str | None,
         typer.Option(
-            help="Past steps in the prompt: a number, or such as steps=4,summary=20 or steps=2,whole=true.",
+            help="Past steps in the prompt: a number, or a rule such as steps=4,summary=20 or steps=2,whole=true.",
             show_default="as the task says",
             metavar="RULE",
         ),
     ] = None,
     budget_usd: Annotated[
         float | None,
-        typer.Option(min=0.0, help="Limit of these agents in US dollars; no request is made that could exceed it."),
+        typer.Option(min=0.0, help="Limit for these agents, in US dollars; no request is sent that could exceed it."),
     ] = None,
     ledger: Annotated[
         Path | None,
         typer.Option(
             envvar="KHALA_LEDGER",
-            help="File of what was spent, for processes that share a budget, or are started again.",
+            help="File with the money spent, for processes that share a budget or start again.",
             show_default="in memory",
             metavar="FILE",
         ),
@@ -106,7 +106,7 @@ def agent(
     fallback: Annotated[
         str | None,
         typer.Option(
-            help="Policy where the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
+            help="Policy for when the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
             metavar="NAME",
         ),
     ] = None,
@@ -118,7 +118,7 @@ def agent(
     An agent gets observations from the host, asks its model or policy, and answers before the deadline. It may
     start before or after the host, and be started again in the middle of a run.
 
-    Keys of models are taken from the environment only; the model file says which variable.
+    API keys come from the environment only; the model file names the variable.
     """
     from khala_agents import commands  # noqa: PLC0415  # see there
 
@@ -144,7 +144,7 @@ def llm(
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            help="Part of the requests that fail: an HTTP status, or quota, garbage, nonsense, half, reset, "
+            help="Share of the requests that fail like this: an HTTP status, or quota, garbage, nonsense, half, reset, "
             "drip, stall. May be given several times.",
             metavar="KIND=RATE",
         ),
@@ -152,7 +152,7 @@ def llm(
     retry_after: Annotated[float, typer.Option(min=0.0, help="Seconds in Retry-After of 429 and 503.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of faults and of random players.")] = 0,
     ready_file: Annotated[
-        Path | None, typer.Option(help="File to write the base URL to, as JSON, once it listens.")
+        Path | None, typer.Option(help="File that gets the base URL, as JSON, once the server listens.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the base URL as a JSON object on stdout.")] = False,
 ) -> None:

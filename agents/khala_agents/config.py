@@ -63,9 +63,9 @@ class SentValue(Frozen):
     @model_validator(mode="after")
     def _words_or_variable(self) -> Self:
         if bool(self.text) == (self.env is not None) or (self.prefix and self.env is None):
-            raise ValueError("either words, or {env: NAME} of an environment variable with or without a prefix")
+            raise ValueError("write text, or {env: NAME} of an environment variable, with or without a prefix")
         if "${" in self.text or (self.env is not None and not _VARIABLE.fullmatch(self.env)):
-            raise ValueError("the name of an environment variable is wanted here, such as {env: GATEWAY_TOKEN}")
+            raise ValueError("write the name of an environment variable here, such as {env: GATEWAY_TOKEN}")
         return self
 
 
@@ -138,14 +138,14 @@ class ModelConfig(Frozen):
     @classmethod
     def _address_variable(cls, value: str | None) -> str | None:
         if value is not None and not _VARIABLE.fullmatch(value):
-            raise ValueError("the name of an environment variable is wanted here, such as VLLM_BASE_URL")
+            raise ValueError("write the name of an environment variable here, such as VLLM_BASE_URL")
         return value
 
     @field_validator("api_key_env", mode="before")
     @classmethod
     def _variable(cls, value: object) -> object:
         if isinstance(value, str) and not _VARIABLE.fullmatch(value):  # not quoted: it may be the key itself
-            raise ValueError("the name of an environment variable is wanted here, such as OPENAI_API_KEY, not a key")
+            raise ValueError("write the name of an environment variable here, such as OPENAI_API_KEY, not a key")
         return value
 
     @field_validator("extra")
@@ -155,7 +155,7 @@ class ModelConfig(Frozen):
             if _KEY_LIKE.search(name):
                 raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
             if name in _LIMITS and not (isinstance(sent, int) and sent > 0):
-                raise ValueError(f"'{name}' is a number of tokens: without it nobody can tell what an answer may cost")
+                raise ValueError(f"'{name}' must be a number of tokens above 0: it limits what an answer may cost")
             if name in _OWN_FIELDS and sent != _OWN_FIELDS[name][0]:
                 raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name][1]}")
         return value
@@ -165,7 +165,7 @@ class ModelConfig(Frozen):
     def _no_open_keys(cls, value: dict[str, SentValue]) -> dict[str, SentValue]:
         for name, sent in value.items():
             if _KEY_LIKE.search(name) and sent.env is None:
-                raise ValueError(f"'{name}' looks like a key, which no file holds: write {{env: NAME}} of a variable")
+                raise ValueError(f"'{name}' looks like a key; keep it in a variable and write {{env: NAME}}")
         return value
 
     @field_validator("headers")
@@ -173,14 +173,14 @@ class ModelConfig(Frozen):
     def _header_names(cls, value: dict[str, SentValue]) -> dict[str, SentValue]:
         for name in value:
             if not re.fullmatch(_HEADER, name) or name.lower() in _OWN_HEADERS:
-                raise ValueError(f"'{name}' is no header that can be set here")
+                raise ValueError(f"'{name}' is a header that cannot be set here")
         return value
 
     @model_validator(mode="after")
     def _has_what_it_needs(self) -> Self:
         needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
         if needs_key and self.api_key_env is None:
-            raise ValueError(f"{self.profile} wants a key: name the environment variable that holds it in api_key_env")
+            raise ValueError(f"{self.profile} needs a key: name the environment variable that holds it in api_key_env")
         if self.profile == "anthropic" and self.system_role is not None:
             raise ValueError("system_role is for chat completions: Anthropic's messages have a field for it")
         return self
@@ -230,9 +230,9 @@ class WorkerSpec(Frozen):
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
         if (self.model is None) == (self.policy is None):
-            raise ValueError("either a model or a policy is wanted")
+            raise ValueError("give either a model or a policy")
         if self.fallback is not None and self.model is None:
-            raise ValueError("fallback is for an agent with a model; a policy has none")
+            raise ValueError("fallback is for an agent with a model; this one has a policy")
         return self
 
 

@@ -102,7 +102,7 @@ class Fallback(Policy):
         why = failure.detail or failure.status
         if why not in self._complaints:
             self._complaints.add(why)
-            log.error("agent %s: no reply of the model, %s decides: %s", agent, self._name, failure.reason or why)
+            log.error("agent %s: no reply from the model, %s decides: %s", agent, self._name, failure.reason or why)
 
 
 def _reserve_s(time_s: float | None) -> float:

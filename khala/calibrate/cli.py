@@ -21,16 +21,16 @@ Examples:\n
 def calibrate(
     *,
     game: Game = "simulator",
-    out: Annotated[Path, typer.Option(help="File for what was measured.", metavar="FILE.json")] = Path(
+    out: Annotated[Path, typer.Option(help="File for the measurements.", metavar="FILE.json")] = Path(
         "calibration.json"
     ),
-    seed: Annotated[int, typer.Option(min=1, help="Seed of the game's chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=1, help="Random seed of the game.")] = 1,
     only: Annotated[
         list[str] | None,
         typer.Option(help="Only these probes; may be given several times.", metavar="GLOB", show_default="all"),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the file: play what it lacks, and what failed.")
+        bool, typer.Option("--resume", help="Continue the file: play the probes that are missing or failed.")
     ] = False,
     list_probes: Annotated[bool, typer.Option("--list", help="Show every probe and what it settles, and end.")] = False,
     compare: Annotated[
@@ -39,10 +39,10 @@ def calibrate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure a game: a fixed set of probes through its raw API, each with its numbers, in one file.
+    """Measure a game with a fixed set of probes through its raw API, and write the numbers into one file.
 
-    Two files tell where two games differ: the real one and the simulator, or two versions. An interrupted run keeps
-    what it has measured. See docs/how-to/real-game.md for what to send.
+    Compare two files to see where two games differ: the real one and the simulator, or two versions. An interrupted
+    run keeps what it has measured. See docs/how-to/real-game.md for what to send.
     """
     from khala.calibrate import commands  # noqa: PLC0415  # PySC2 and the game, for which --help need not wait
 

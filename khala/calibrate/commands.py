@@ -106,7 +106,7 @@ def _earlier(out: Path, *, resume: bool) -> Calibration | None:
     if resume:
         return load(out)
     if out.exists():
-        raise ConfigError(f"{out} is there already: --resume goes on with it, --out names another file")
+        raise ConfigError(f"{out} exists already: --resume continues it, --out names another file")
     return None
 
 

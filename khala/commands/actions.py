@@ -32,11 +32,11 @@ def actions(
 ) -> None:
     """List what agents can say, with arguments, meaning and an example call.
 
-    Without an option: the groups, and how many actions are in them. A task gives an agent single actions or whole
-    groups, as `group:skill` or, for the actions of a side, `group:train/protoss`.
+    Without an option, it lists the groups, and how many actions each group has. A task gives an agent single actions
+    or whole groups, as `group:skill` or, for the actions of a side, `group:train/protoss`.
 
-    `generated` are those that follow from PySC2's functions: one for every function that no other action stands for,
-    and `Select_Unit_<name>`, which gives one unit an order that a whole team can get.
+    `generated` actions follow from PySC2's functions: one for every function that has no other action, and
+    `Select_Unit_<name>`, which gives one unit an order that a whole team can get.
     """
     from khala.commands.action_list import print_actions  # noqa: PLC0415  # the catalogue is not for --help
 

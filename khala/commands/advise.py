@@ -176,7 +176,7 @@ class Advising:
         except TimeoutError:
             raise MatchGone(
                 f"the match {card.run!r} is gone: its host went away without a result, and was not back within "
-                f"{away_s:g} s; `khala run --resume` or `khala host --resume` goes on with its recording"
+                f"{away_s:g} s; `khala run --resume` or `khala host --resume` continues it from its recording"
             ) from None
 
     async def _read_results(self, results: Subscription[Sample], card: Run) -> None:

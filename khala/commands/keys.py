@@ -20,7 +20,7 @@ Examples:\n
 """
 
 app = typer.Typer(
-    help="Make keys and certificates, with which hosts, agents and routers know each other.",
+    help="Make keys and certificates, by which hosts, agents and routers identify each other.",
     no_args_is_help=True,
     add_completion=False,
 )
@@ -37,7 +37,7 @@ def init(
         list[str] | None,
         typer.Option(
             help="Name or address at which the router can be reached; may be given several times.",
-            show_default="those of the last time, or of this machine",
+            show_default="as the last time, or those of this machine",
             metavar="NAME",
         ),
     ] = None,
@@ -45,7 +45,7 @@ def init(
 ) -> None:
     """Make an authority, and certificates for a router and for the host.
 
-    An authority that is there already stays, and the two get new certificates; copies of the old ones stay good. The
+    An existing authority stays; router and host get new certificates, and copies of the old ones stay valid. The
     folder `ca` should not leave this machine: anyone who holds its key can
     impersonate any agent.
     """
@@ -62,7 +62,7 @@ def agent(
     side: Annotated[str, typer.Option(help="Side of the agent, as the task file names it.")] = "blue",
     days: Days = 365,
 ) -> None:
-    """Make a certificate for one agent, in a folder that can be copied to its machine alone."""
+    """Make a certificate for one agent, in a folder of its own to copy to the agent's machine."""
     from khala_protocol.certificates import certify_agent  # noqa: PLC0415
 
     _make(directory, lambda: [certify_agent(directory, side, name, days=days)])

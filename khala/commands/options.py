@@ -20,7 +20,7 @@ Task = Annotated[
 Resume = Annotated[
     Path | None,
     typer.Option(
-        help="Instead of a task: go on with a match whose host was lost; its recording, or the directory of its run.",
+        help="Instead of a task: resume a match whose host was lost, from its recording or the directory of its run.",
         metavar="RUN",
     ),
 ]
@@ -59,7 +59,7 @@ Rule = Annotated[
 ThinkingLoops = Annotated[
     int | None, typer.Option(min=0, help="Clock budget: game loops that each decision costs; 22.4 are a second.")
 ]
-Speed = Annotated[float | None, typer.Option(min=0.01, help="Clock realtime: speed of the game; 1 is that of ladders.")]
+Speed = Annotated[float | None, typer.Option(min=0.01, help="Clock realtime: speed of the game; 1 is ladder speed.")]
 Grace = Annotated[
     float | None,
     typer.Option("--grace", min=0, help="How long a required agent may be away before the match ends, in seconds."),
@@ -87,7 +87,7 @@ Opponent = Annotated[
 Memory = Annotated[
     str | None,
     typer.Option(
-        help="What agents know of the steps before: a number of steps, or such as steps=4,summary=20,notes=8.",
+        help="What agents know of earlier steps: a number of steps, or a rule such as steps=4,summary=20,notes=8.",
         show_default="as the task says",
         metavar="RULE",
     ),
@@ -102,7 +102,7 @@ Model = Annotated[
 ModelName = Annotated[
     str | None,
     typer.Option(
-        help="Another model of the endpoint; the scripted model plays skilled, focus-fire, random-legal or silent."
+        help="Another model at the endpoint; the scripted model plays skilled, focus-fire, random-legal or silent."
     ),
 ]
 BaseUrl = Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")]
@@ -112,24 +112,24 @@ PolicyName = Annotated[
 Fallback = Annotated[
     str | None,
     typer.Option(
-        help="Policy where the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
+        help="Policy for when the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
         metavar="NAME",
     ),
 ]
 Mind = Annotated[
     str | None,
     typer.Option(
-        help="Model of this side instead of --model, in a match of two: openai, scripted/skilled, a file, a policy.",
+        help="Model of this side, instead of --model: openai, scripted/skilled, a file, a policy.",
         metavar="MODEL",
     ),
 ]
 SideModel = Annotated[
     list[str] | None,
-    typer.Option(help="The same for a side of any name; may be given several times.", metavar="SIDE=MODEL"),
+    typer.Option(help="Model of a side of any name; may be given several times.", metavar="SIDE=MODEL"),
 ]
 BudgetUsd = Annotated[
     float | None,
-    typer.Option(min=0, help="Limit of all agents together in US dollars; two sides may spend half of it each."),
+    typer.Option(min=0, help="Limit for all agents together, in US dollars; each of two sides may spend half."),
 ]
 Latency = Annotated[float, typer.Option("--latency", min=0, help="Seconds that the scripted model takes to answer.")]
 

@@ -77,7 +77,7 @@ class Split:
             shares = ()
         if len(shares) not in _NAMES or min(shares) <= 0 or not math.isclose(sum(shares), 1.0, abs_tol=1e-6):
             raise ConfigError(
-                f"'{text[:40]}' is no split: write one, two or three shares above 0 that sum up to 1, such as "
+                f"'{text[:40]}' is not a split: write one, two or three shares above 0 that sum up to 1, such as "
                 "0.8,0.1,0.1 for train, validation and test",
                 source="--split",
             )

@@ -28,7 +28,7 @@ def group() -> None:
 @app.command(epilog=EXPORT_EPILOG)
 def export(
     sources: Annotated[
-        list[Path], typer.Argument(help="Recordings, and directories in which they are searched for.", metavar="SOURCE")
+        list[Path], typer.Argument(help="Recordings, or directories to search for recordings.", metavar="SOURCE")
     ],
     *,
     out: Annotated[Path, typer.Option(help="Directory of the data set, new or empty.", metavar="DIR")],
@@ -36,7 +36,7 @@ def export(
         list[Form] | None,
         typer.Option(
             "--format",
-            help="Form of the rows; may be given several times.",
+            help="Format of the rows; may be given several times.",
             show_default="parquet, openai and sharegpt",
         ),
     ] = None,
@@ -44,7 +44,7 @@ def export(
         list[Only] | None,
         typer.Option(
             help="Only decisions of won episodes, of valid ones, with all actions accepted, or made by the "
-            "agent itself; all that are given hold."
+            "agent itself; a decision must pass all given filters."
         ),
     ] = None,
     agent: Annotated[
@@ -54,16 +54,16 @@ def export(
     split: Annotated[
         str, typer.Option(help="Shares of train and test, or of train, validation and test.", metavar="SHARES")
     ] = "1",
-    split_by: Annotated[SplitBy, typer.Option(help="What is never in two splits.")] = "seed",
+    split_by: Annotated[SplitBy, typer.Option(help="Unit that is never divided between splits.")] = "seed",
     images: Annotated[bool, typer.Option(help="Export the pictures that were sent with prompts.")] = True,
     gamma: Annotated[float, typer.Option(min=0.0, max=1.0, help="Discount of the reward-to-go for each decision.")] = (
         0.99
     ),
     as_json: Annotated[bool, typer.Option("--json", help="Print what was exported as one JSON object.")] = False,
 ) -> None:
-    """Export the decisions of recorded agents: a row has prompt, reply, actions, their fate and what they were worth.
+    """Export recorded decisions: each row has a prompt, a reply, its actions, their fate and their reward.
 
-    The directory holds a folder for each form, with a file for each split and a README for the Hugging Face hub. Each
+    The directory holds a folder for each format, with a file for each split and a README for the Hugging Face hub. Each
     folder is a data set that `datasets.load_dataset` reads.
     """
     from khala.dataset.card import Recipe  # noqa: PLC0415

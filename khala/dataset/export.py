@@ -112,7 +112,7 @@ def _recording(path: Path, *, named: bool) -> Recording | None:
 def _match(path: Path) -> Recording:
     recording = Recording.open(path)
     if recording.run is None:
-        raise RecordingError(f"{path} has no run card: it was ended before the match began")
+        raise RecordingError(f"{path} has no run card: the run ended before the match began")
     return recording
 
 
@@ -124,7 +124,7 @@ def _has_pictures(recordings: Sequence[Recording], recipe: Recipe) -> bool:
 
 def _require_empty(out: Path) -> None:
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ConfigError("is there already, and is not empty: name another directory", source=str(out))
+        raise ConfigError("exists already, and is not empty: name another directory", source=str(out))
 
 
 def _nothing(contents: Contents) -> str:

@@ -151,7 +151,7 @@ class Parquet:
         try:
             table = self._pa.Table.from_pylist(rows, schema=self._schema)
         except (OverflowError, ValueError) as error:  # a recording may be anyone's, and hold any number
-            raise RecordingError(f"a number of these recordings is too large for Parquet: {error}") from None
+            raise RecordingError(f"a number in these recordings is too large for Parquet: {error}") from None
         if rows:
             self._writer.write_table(table)
 

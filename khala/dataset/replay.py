@@ -141,7 +141,7 @@ def replies_of(path: Path) -> Replies:
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", source=str(path)) from None
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise ConfigError(f"is no file of `khala dataset export`: {error!r}", source=str(path)) from None
+        raise ConfigError(f"is not a file of `khala dataset export`: {error!r}", source=str(path)) from None
     return replies
 
 

@@ -39,19 +39,21 @@ File = Annotated[
 On = Annotated[str, typer.Option(help="Where matches are played: local, or ray for a Ray cluster.", metavar="ENGINE")]
 Jobs = Annotated[
     int | None,
-    typer.Option(min=1, help="Matches at the same time.", show_default="cores, as far as memory lasts", metavar="N"),
+    typer.Option(min=1, help="Matches at the same time.", show_default="by cores and memory", metavar="N"),
 ]
 BudgetUsd = Annotated[
     float | None, typer.Option(min=0, help="Most that all matches may cost.", show_default="as the file says")
 ]
 Pilot = Annotated[
-    int, typer.Option(min=0, help="First play so many matches of each cell, and estimate the rest.", metavar="N")
+    int, typer.Option(min=0, help="First play this many matches of each cell, and estimate the rest.", metavar="N")
 ]
-Yes = Annotated[bool, typer.Option("--yes", help="Go on after the pilot without a question.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Continue after the pilot without asking.")]
 Processes = Annotated[
     bool, typer.Option("--processes", help="Give agents processes of their own, for policies that compute or block.")
 ]
-Address = Annotated[str | None, typer.Option(help="Of the Ray cluster.", show_default="a local one", metavar="HOST")]
+Address = Annotated[
+    str | None, typer.Option(help="Address of the Ray cluster.", show_default="a local one", metavar="HOST")
+]
 Url = Annotated[
     str | None, typer.Option("--recordings", help="With --on ray: where nodes write recordings, an fsspec URL.")
 ]
@@ -60,16 +62,14 @@ One = Annotated[str, typer.Argument(help="DIR, or DIR:factor=value,factor=value.
 Allow = Annotated[
     list[str] | None, typer.Option(help="A field in which the two may differ, such as clock.", metavar="FIELD")
 ]
-Measure = Annotated[list[str], typer.Option(help="What is compared: win, or a column of the export.", metavar="NAME")]
-Format = Annotated[
-    Literal["markdown", "latex", "html", "all"], typer.Option("--format", help="In what the report is written.")
-]
+Measure = Annotated[list[str], typer.Option(help="Measure to compare: win, or a column of the export.", metavar="NAME")]
+Format = Annotated[Literal["markdown", "latex", "html", "all"], typer.Option("--format", help="Format of the report.")]
 Into = Annotated[
     Path | None,
-    typer.Option("--into", help="Directory of the report.", show_default="report, in that of the experiment"),
+    typer.Option("--into", help="Directory of the report.", show_default="report, in the experiment's directory"),
 ]
 By = Annotated[
-    str, typer.Option(help="Factors whose values get a line each, with commas between.", show_default="all factors")
+    str, typer.Option(help="Factors whose values get a line each, separated by commas.", show_default="all factors")
 ]
 Parquet = Annotated[Path | None, typer.Option(help="File to write; needs the extra `data`.", metavar="FILE")]
 Csv = Annotated[Path | None, typer.Option(help="File to write.", metavar="FILE")]
@@ -94,8 +94,8 @@ def run(
 ) -> None:
     """Play the matches of an experiment that were not played yet.
 
-    A match is known by the hash of what it plays: started again, or with a larger grid, this plays only what is
-    missing. Ctrl-C and SIGKILL lose the matches that are being played.
+    A hash of its settings identifies each match: started again, or with a larger grid, this plays only the missing
+    matches. Ctrl-C and SIGKILL lose only the matches that are being played.
     """
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
@@ -119,7 +119,7 @@ def resume(
     recordings: Url = None,
     as_json: Json = False,
 ) -> None:
-    """Go on with an experiment, as its directory has it: play what is missing, crashed or not valid."""
+    """Continue the experiment in a directory: play the matches that are missing, crashed or not valid."""
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
     options = {"on": on, "jobs": jobs, "budget_usd": budget_usd, "pilot": 0, "yes": True, "processes": processes,
@@ -145,7 +145,7 @@ def show(file: File, *, game: Game = "simulator", out: Out = OUT, as_json: Json 
 
 @app.command()
 def status(directory: Directory, *, game: Game = "simulator", out: Out = OUT, as_json: Json = False) -> None:
-    """Show how far an experiment is, what it has cost, and what is not valid or crashed."""
+    """Show the progress and cost of an experiment, and which matches crashed or are not valid."""
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
     commands.status(directory, game=game, out=out, as_json=as_json)
@@ -153,7 +153,7 @@ def status(directory: Directory, *, game: Game = "simulator", out: Out = OUT, as
 
 @app.command()
 def index(directory: Directory, *, out: Out = OUT) -> None:
-    """Make the index of an experiment anew of its recordings."""
+    """Rebuild the index of an experiment from its recordings."""
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
     commands.index(directory, out=out)
@@ -169,7 +169,7 @@ def compare(
     out: Out = OUT,
     as_json: Json = False,
 ) -> None:
-    """Compare two selections of matches, paired by seed. Unlike runs are refused, with the fields that differ."""
+    """Compare two selections of matches, paired by seed. Refuse unlike matches, and name the fields that differ."""
     from khala.experiment import results  # noqa: PLC0415  # see `commands`
 
     results.compare(a, b, allow=allow or (), measures=measure, out=out, as_json=as_json)
@@ -185,7 +185,7 @@ def report(
     out: Out = OUT,
     as_json: Json = False,
 ) -> None:
-    """Make tables and figures of an experiment, with how it was played."""
+    """Make the tables and figures of an experiment, and say how it was played."""
     from khala.experiment import results  # noqa: PLC0415  # see `commands`
 
     results.report(directory, formats=formats, into=into, by=by, out=out, as_json=as_json)

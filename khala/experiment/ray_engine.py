@@ -62,8 +62,8 @@ class Ray:
         self.slots = self.slots or _room_of_the_cluster()
         if not self.slots:
             ray.shutdown()
-            raise ConfigError(f"no node of the cluster has a core and {MATCH_MB} MB: --jobs says how many matches to "
-                              "play at a time once it has", source=f"Ray at {self._address}")  # fmt: skip
+            raise ConfigError(f"no node of the cluster has a core and {MATCH_MB} MB: give --jobs to say how many "
+                              "matches to play at a time once one has", source=f"Ray at {self._address}")  # fmt: skip
         self._endpoints = endpoints()
         return self
 

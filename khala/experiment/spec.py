@@ -46,7 +46,7 @@ def _seeds(value: object) -> object:
     if isinstance(value, str):
         first, dash, last = value.partition("-")
         if not (dash and first.strip().isdecimal() and last.strip().isdecimal() and int(first) <= int(last)):
-            raise ValueError(f"{value!r} is no range of seeds: write it as 1-20")
+            raise ValueError(f"{value!r} is not a range of seeds: write it as 1-20")
         if int(last) - int(first) >= MOST_SEEDS:
             raise ValueError(f"there are at most {MOST_SEEDS} seeds")
         return list(range(int(first), int(last) + 1))

@@ -128,9 +128,7 @@ class Store:
     def _remade(self, error: Exception | None) -> sqlite3.Connection:
         """Return the index after it was made again; in memory, where the directory takes nothing."""
         path = self.directory / INDEX
-        log.warning(
-            "%s %s: it is made again of the recordings", path, f"is broken ({error})" if error else "is missing"
-        )
+        log.warning("%s %s: it is rebuilt from the recordings", path, f"is broken ({error})" if error else "is missing")
         try:
             with contextlib.nullcontext() if self._is_locked else self.locked():
                 return self._written()

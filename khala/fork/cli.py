@@ -26,7 +26,10 @@ def fork(
     recording: Annotated[Path, typer.Argument(help="A recording, or the directory of its run.", metavar="RECORDING")],
     *,
     at: Annotated[
-        int | None, typer.Option(min=0, help="The first step that others decide; see `khala replay`.", metavar="STEP")
+        int | None,
+        typer.Option(
+            min=0, help="First step that the other agents decide; `khala replay` shows the steps.", metavar="STEP"
+        ),
     ] = None,
     scan: Annotated[
         bool, typer.Option("--scan", help="Fork at many steps, and rank them by how much the outcome differs.")
@@ -61,20 +64,21 @@ def fork(
     advise: Annotated[
         list[str] | None,
         typer.Option(
-            help="What an adviser says before the step: 'Commander: attack', 'everyone: attack'; several times.",
+            help="What an adviser says before the step: 'Commander: attack', 'everyone: attack'; may be repeated.",
             metavar="WHO: TEXT",
         ),
     ] = None,
     memory: Annotated[
         str | None,
         typer.Option(
-            help="Past steps in the prompt, recorded ones too: a number, or such as steps=4,summary=20.",
+            help="Past steps in the prompt, recorded ones too: a number, or a rule such as steps=4,summary=20.",
             show_default="as recorded",
             metavar="RULE",
         ),
     ] = None,
     budget_usd: Annotated[
-        float | None, typer.Option(min=0, help="Limit of all forks together in US dollars, in equal parts.")
+        float | None,
+        typer.Option(min=0, help="Limit for all forks together, in US dollars; each fork gets an equal part."),
     ] = None,
     latency: Latency = 0.0,
     game: Game = "simulator",
@@ -92,13 +96,13 @@ def fork(
 ) -> None:
     """Replay a recorded match up to a step, and let other agents play on from there.
 
-    The match is played again with its recorded decisions up to the step, where each observation must be the recorded
-    one; then others decide, to the end, in this many forks. Each is recorded like any match. A table sets what became
-    of them against the recorded future.
+    The match is played again with its recorded decisions up to the step; each observation must match the recorded
+    one. From the step to the end other agents decide, in --times forks. Each fork is recorded like any match. A table
+    compares the forks with the recorded future.
 
-    The game is deterministic: forks differ only by what is decided in them. A model that chooses among its words by
-    chance (temperature) makes each fork another; a scripted player, or any policy that answers the same to the same
-    text, makes them all alike, and --times 1 is enough.
+    The game is deterministic, so forks differ only by their decisions. A model that chooses its words by chance
+    (temperature) makes each fork different. A scripted player, or any policy that answers the same text the same way,
+    makes all forks alike, and --times 1 is enough.
 
     Only matches on the simulator can be forked, and none with the clock realtime.
     """
@@ -118,14 +122,14 @@ def fork(
     if model == "recorded" or (model is None and not changed and at is not None):
         if changed or at is None:
             what = ", ".join(changed) or "--scan"
-            raise ConfigError(f"a recorded future has nothing but what was recorded: leave out {what}, or say --model")
+            raise ConfigError(f"the recorded future cannot be changed: leave out {what}, or say --model")
         commands.repeat(trunk, at, game, as_json=as_json)
         return
     common = None
     if model or policy:
         common = Minds(model or "scripted", model_name, base_url, policy, budget_usd, latency, fallback)
     elif about_a_model := [option for option in ("--model-name", "--base-url", "--fallback") if option in changed]:
-        raise ConfigError(f"{about_a_model[0]} is about a model: name it with --model")
+        raise ConfigError(f"{about_a_model[0]} is for a model: name the model with --model")
     trust_named(policy, fallback, *sides.values(), *(said.partition("=")[2] for said in agent or ()))
     plan = commands.planned(trunk, out, common, sides, agent or (), advise or (), memory)
     if at is not None:

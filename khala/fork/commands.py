@@ -62,10 +62,10 @@ def repeat(trunk: Trunk, step: int, game: str, *, as_json: bool) -> None:
         again = _until_interrupted(repeated(trunk, Path(directory), game=game), "nothing is left of it")
     if again.differences:
         raise RecordingError(
-            f"the recorded future does not come about again: {again.differences[0]}; is it the same version of Khala?"
+            f"the recorded future could not be repeated: {again.differences[0]}; is this the same version of Khala?"
         )
     if not again.same:
-        raise RecordingError(f"{trunk.recording.path} has another result than its game has when it is played again")
+        raise RecordingError(f"{trunk.recording.path} has another result than its game gives when it is played again")
     stderr_console().print("played again with the recorded decisions: no observation differs, and the end is the same")
     _print(plain(trunk, step, []) | _origin(trunk), outcomes(trunk, step, [], ""), as_json=as_json)
 

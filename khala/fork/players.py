@@ -46,11 +46,11 @@ def _named(task: TaskConfig, single: Iterable[str]) -> dict[str, dict[str, str]]
     for text in single:
         whom, equals, model = text.partition("=")
         if not (whom and equals and model):
-            raise ConfigError(f"{text!r} names no agent and its model: write Commander=openai", source="--agent")
+            raise ConfigError(f"{text!r} names no agent with its model: write Commander=openai", source="--agent")
         found = [(side, name) for side, name in seats if whom in (name, f"{side}/{name}")]
         if len(found) != 1:
             there_are = ", ".join(f"{side}/{name}" for side, name in found or seats)
-            raise ConfigError(f"{whom!r} names no single agent: there are {there_are}", source="--agent")
+            raise ConfigError(f"{whom!r} is not the name of one agent: there are {there_are}", source="--agent")
         ((side, name),) = found
         named[side][name] = model
     return named
@@ -65,6 +65,6 @@ def _check_all_are_named(task: TaskConfig, sides: Mapping[str, str], named: Mapp
     ]
     if rest:
         raise ConfigError(
-            f"nobody decides for {', '.join(rest)} after the step, where recorded decisions answer what is no longer "
-            "seen: say --model for all agents, or name a model for each side or agent"
+            f"nobody decides for {', '.join(rest)} after the step, where recorded decisions no longer hold: "
+            "give --model for all agents, or a model for each side or agent"
         )

@@ -51,9 +51,7 @@ def steps_of(trunk: Trunk, every: int | None, *, advised: bool = False) -> list[
         ForkError: the episode was not played to its end, so that there is nothing to compare with.
     """
     if not trunk.results:
-        raise ForkError(
-            f"{trunk.recording.path} has no end of episode {trunk.episode} that forks could be compared with"
-        )
+        raise ForkError(f"{trunk.recording.path} has no end of episode {trunk.episode} to compare forks with")
     steps = len(trunk.loops)
     every = every or math.ceil(steps / POINTS)
     return [step for step in range(0, steps, every) if step or not advised]

@@ -79,9 +79,9 @@ def mcp(
 ) -> None:
     """Let MCP clients, such as Claude Code or an IDE, play agents of a match.
 
-    A client starts this command and talks to it over stdio, or connects to one of the addresses that it prints with
-    --port: each seat has its own. Its tools are observe, act, message and look_up. The match begins when a client
-    observes for the first time, is recorded like any other, and can be watched with khala view.
+    A client starts this command and talks to it over stdio. With --port, the command prints an address for each seat,
+    and clients connect to these. The tools are observe, act, message and look_up. The match begins when a client
+    first observes. It is recorded like any other, and khala view shows it.
     """
     from khala.mcp.commands import Wanted, run_mcp  # noqa: PLC0415  # the match and the SDK, which --help can do without
 

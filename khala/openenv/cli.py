@@ -22,12 +22,12 @@ def openenv(
     task: Annotated[
         str,
         typer.Argument(
-            help="What is played if a client names no task: one of `khala tasks`, or a file.", metavar="TASK"
+            help="Task to play if a client names none, see `khala tasks`, or a path to a .yaml file.", metavar="TASK"
         ),
     ] = "2s3z_pair",
     *,
     host: Annotated[
-        str, typer.Option(help="Address to serve on; 0.0.0.0 is all of this machine.", metavar="ADDRESS")
+        str, typer.Option(help="Address to serve on; 0.0.0.0 means all addresses of this machine.", metavar="ADDRESS")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; 0 takes a free one.")] = 8000,
     is_open: Annotated[
@@ -36,10 +36,8 @@ def openenv(
             "--open", envvar="KHALA_OPENENV_OPEN", help="Let everybody who reaches the port play, without a token."
         ),
     ] = False,
-    sessions: Annotated[
-        int, typer.Option(min=1, help="Most sessions that play at a time; each has a game of its own.")
-    ] = 8,
-    idle: Annotated[float, typer.Option(min=1, help="End a session that does nothing for so many seconds.")] = 3600.0,
+    sessions: Annotated[int, typer.Option(min=1, help="Most sessions at a time; each has its own game.")] = 8,
+    idle: Annotated[float, typer.Option(min=1, help="End a session that does nothing for this many seconds.")] = 3600.0,
     others: Annotated[
         str,
         typer.Option(
@@ -49,7 +47,7 @@ def openenv(
     allow: Annotated[
         list[str] | None,
         typer.Option(
-            help="Another model or policy that clients may choose for them; may be given several times.",
+            help="Another model or policy that clients may choose for those agents; may be given several times.",
             metavar="MODEL",
             show_default="the scripted players",
         ),
@@ -69,9 +67,9 @@ def openenv(
 ) -> None:
     """Serve OpenEnv: clients such as TRL play agents of matches, with rewards.
 
-    Each session is a match of its own; with reset, a client chooses task, agents, seed and pictures. It plays one agent
-    or all of a side, over a websocket or HTTP. On other addresses than this machine's clients need a token: that of
-    KHALA_OPENENV_TOKEN, or a new one that stands in the address that is printed.
+    Each session is a match of its own; with reset, a client chooses task, agents, seed and pictures. The client plays
+    one agent or all agents of a side, over a websocket or HTTP. On an address that other machines reach, clients need
+    a token: the one in KHALA_OPENENV_TOKEN, or a new one that the printed address contains.
     """
     from khala.openenv.commands import Wanted, run_openenv  # noqa: PLC0415  # the server, which --help can do without
 

@@ -85,7 +85,7 @@ class KhalaObservation(Observation):
             ValueError: there are several.
         """
         if len(self.agents) > 1:
-            raise ValueError(f"{', '.join(self.agents)} are asked: read `agents`, which has what each of them sees")
+            raise ValueError(f"{', '.join(self.agents)} are asked: read `agents`, which has the observation of each")
         return "".join(view.text for view in self.agents.values())
 
 

@@ -87,7 +87,7 @@ class Settings:
     def _config(self, options: ResetOptions) -> MatchConfig:
         name = options.task or self.task
         if name != self.task and not name.replace("_", "").replace("-", "").isalnum():
-            raise ConfigError(f"{name!r} is no name of a task: `khala tasks` lists them", source="task")
+            raise ConfigError(f"{name!r} is not the name of a task: `khala tasks` lists them", source="task")
         given = {
             "seed": secrets.randbelow(_MOST_SEED) if options.seed is None else options.seed,
             "episodes": EPISODES,

@@ -217,6 +217,6 @@ def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:
     for name, equals, text in split:
         if not (name and equals and text):
             raise ConfigError(
-                f"'{name}{equals}{text}' names no side and its model: write red=openai", source="--side-model"
+                f"'{name}{equals}{text}' does not name a side and its model: write red=openai", source="--side-model"
             )
     return {name: text for name, _, text in split} | {name: text for name, text in others.items() if text}

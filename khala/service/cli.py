@@ -49,7 +49,7 @@ def serve(
         typer.Option(min=0.1, help="Memory of all matches together.", show_default="80 % of the machine", metavar="X"),
     ] = None,
     warm: Annotated[int, typer.Option(min=0, help="Workers that wait, ready to play at once.", metavar="N")] = 1,
-    spares: Annotated[int, typer.Option(min=0, help="Processes for agents in each of them.", metavar="N")] = 1,
+    spares: Annotated[int, typer.Option(min=0, help="Processes for agents in each worker.", metavar="N")] = 1,
     queue: Annotated[int, typer.Option(min=0, help="Matches that may wait; more are refused.", metavar="N")] = 100,
     game: Game = "simulator",
     out: Out = Path("runs"),
@@ -69,10 +69,10 @@ def serve(
     log_json: Annotated[bool, typer.Option("--log-json", help="Log JSON, one object a line.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Play matches on order, several at once, until SIGTERM: then those that run come to their end.
+    """Play matches on request, several at once, until SIGTERM; running matches then play to their end.
 
-    `khala submit` orders a match, `khala matches` lists them, `khala watch` shows one, `khala stop` ends one. With
-    --tls only the certificate of a host may order and stop; one of an observer lists and watches.
+    `khala submit` requests a match, `khala matches` lists all, `khala watch` shows one, `khala stop` ends one. With
+    --tls, only a host's certificate may submit and stop matches; an observer's certificate may list and watch them.
     """
     from khala.service import commands  # noqa: PLC0415  # see there
 
@@ -89,7 +89,7 @@ def submit(
     *,
     resume: Annotated[
         str | None,
-        typer.Option(help="Instead of a task: go on with a match that the service has a recording of.", metavar="RUN"),
+        typer.Option(help="Instead of a task: resume a match that the service has recorded.", metavar="RUN"),
     ] = None,
     connect: Connect = None,
     tls: Tls = None,
@@ -100,9 +100,9 @@ def submit(
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Json = False,
 ) -> None:
-    """Have a service play a task, see `khala serve`, and print the name of the match.
+    """Ask a service to play a task, see `khala serve`, and print the name of the match.
 
-    Options are those of `khala run`; keys, policies and model files are those of the service's machine.
+    The options are those of `khala run`; keys, policies and model files come from the service's machine.
     """
     from khala.playing.matches import new, refuse_others  # noqa: PLC0415
     from khala.playing.minds import Minds  # noqa: PLC0415
@@ -128,7 +128,7 @@ def submit(
 
 
 def matches(*, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False) -> None:
-    """List the matches of a service: those that wait, those that run, and the last that are over."""
+    """List the matches of a service: waiting, running, and recently ended."""
     from khala.service import commands  # noqa: PLC0415  # see there
 
     commands.matches(connect, tls=tls, insecure=insecure, as_json=as_json)
@@ -146,7 +146,7 @@ def watch(
 def stop(
     run: Name, *, connect: Connect = None, tls: Tls = None, insecure: Insecure = False, as_json: Json = False
 ) -> None:
-    """Stop a match of a service; its recording stays, and `khala submit --resume` goes on with it."""
+    """Stop a match of a service; its recording stays, and `khala submit --resume` continues it."""
     from khala.service import client, commands  # noqa: PLC0415  # see there
     from khala_protocol.service import Stop  # noqa: PLC0415
 

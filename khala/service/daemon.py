@@ -129,7 +129,7 @@ class Service:
                 if sample.key == order_key(order.number):
                     await self._obey(order)
             except PeerError as error:
-                log.warning("an order that is none: %s", error)
+                log.warning("an invalid order: %s", error)
             self._changed.set()
 
     async def _obey(self, order: Order) -> None:

@@ -46,7 +46,7 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
         first = error.errors(include_url=False, include_input=False)[0]
         raise ConfigError(f"{'.'.join(map(str, first['loc']))}: {words_of(first)}", source="match") from None
     if unknown := sorted(order.minds.keys() - {field.name for field in dataclasses.fields(Minds)}):
-        raise ConfigError(f"there is no option {unknown[0]!r}; is the service of the same version?", source="match")
+        raise ConfigError(f"there is no option {unknown[0]!r}; does the service have the same version?", source="match")
     minds = minds_of([side.side for side in config.task.per_side()], common, order.sides)
     alike = [mind for _, mind, _ in groups_of(config.task, minds)]
     needs = (what for mind in alike for what in _needs_trust(config, mind))
@@ -67,7 +67,7 @@ def _new(order: Submit) -> MatchConfig:
 def _resumed(run: str, out: Path) -> MatchConfig:
     """Return the match of the newest recording of a run."""
     if not (out / run).is_dir():
-        raise ConfigError(f"the service has no run {run!r} to go on with: it looks for its recording in {out / run}")
+        raise ConfigError(f"the service has no run {run!r} to resume: it looks for its recording in {out / run}")
     config, _ = resumed(out / run, out, assemble_s=ASSEMBLE_S)
     if config.run != run:
         raise ConfigError(f"the recording in {out / run} is of the run {config.run!r}: give its directory that name")

@@ -38,7 +38,7 @@ def view(
         str | None, typer.Option(help="Let the page write to agents, as this adviser of the task.", metavar="NAME")
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address to serve on. One that other machines reach needs --password or --https.")
+        str, typer.Option(help="Address to serve on; an address that other machines reach needs --password or --https.")
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to serve on.", show_default="a free one")
@@ -59,16 +59,16 @@ def view(
     export: Annotated[
         Path | None, typer.Option(help="Write one file that opens without a server, and end.", metavar="FILE.html")
     ] = None,
-    steps: Annotated[str | None, typer.Option(help="Of an export: 10-20, 10- or -20.", show_default="all")] = None,
+    steps: Annotated[str | None, typer.Option(help="Steps to export: 10-20, 10- or -20.", show_default="all")] = None,
     agents: Annotated[
         list[str] | None,
-        typer.Option(help="Of an export: agents whose long texts it holds.", show_default="all", metavar="NAME"),
+        typer.Option(help="Agents whose long texts an export contains.", show_default="all", metavar="NAME"),
     ] = None,
 ) -> None:  # fmt: skip
     """Look at matches in the browser: the map, what each agent saw, said and did, and what became of it.
 
-    A match that is being played is followed. The page is served on this machine alone, behind a token in its address,
-    and asks nobody else for anything. An index beside each recording makes long ones open at once.
+    The page follows a running match. It is served on this machine alone, behind a token in its address, and loads
+    nothing from elsewhere. An index in the cache directory makes long recordings open at once.
     """
     from khala.view.serve import Look, run_export, run_view  # noqa: PLC0415  # a web server, which --help can do without
 

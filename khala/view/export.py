@@ -85,7 +85,7 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
     """
     library = sources.library()
     if not library.opened:
-        raise ConfigError("an export is of one recording or two: name them, `khala view RECORDING --export out.html`")
+        raise ConfigError("an export shows one recording or two: name them, `khala view RECORDING --export out.html`")
     packer = _Packer()
     opened = [line for line in library.runs if line.id in library.opened]
     packer.add("library", library.but(runs=tuple(opened), experiments=()).model_dump_json().encode())

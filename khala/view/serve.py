@@ -86,7 +86,7 @@ def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[st
         KhalaError: there is nothing to export, or too much.
     """
     if look.connect:
-        raise ConfigError("an export is of a recording: name one, or look at the match without --export")
+        raise ConfigError("an export needs a recording: name one, or watch the match without --export")
     size = export(find(look.given, RUNS), page(), path, steps=StepSelection.of(None, steps), agents=agents)
     stderr_console().print(f"{path}: {size / 1e6:.1f} MB, opens in a browser without a server", soft_wrap=True)
 
@@ -102,7 +102,7 @@ def door_of(look: Look) -> Door:
     if not near and not password and look.https is None:
         raise ConfigError(
             f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
-            "or --https CERT KEY, or leave --host out and come by `ssh -L`"
+            "or --https CERT KEY, or leave --host out and connect through `ssh -L`"
         )
     return view_door(password=password, is_near=near, is_secure=look.https is not None)
 
@@ -138,7 +138,7 @@ def _tls(look: Look) -> ssl.SSLContext | None:
         context.load_cert_chain(*look.https)
     except (OSError, ssl.SSLError) as error:
         names = " and ".join(map(str, look.https))
-        raise ConfigError(f"--https: {names} are no certificate and its key in PEM: {error}") from None
+        raise ConfigError(f"--https: {names} are not a certificate and its key in PEM: {error}") from None
     return context
 
 

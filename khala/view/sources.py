@@ -96,7 +96,7 @@ def find(given: Sequence[str], runs: Path, *, adviser: str = "") -> Sources:
     directories = [place for place in places if place.is_dir()]
     if directories and len(places) > 1:
         raise ConfigError(
-            f"{directories[0]} holds no recording or several: name two recordings to see them side by side"
+            f"{directories[0]} does not hold exactly one recording: name two recordings to see them side by side"
         )
     if directories:
         return Sources(given[0], directories[0], adviser=adviser)

@@ -69,8 +69,8 @@ def router(
 ) -> None:
     """Join hosts and agents: a Zenoh router, until Ctrl-C.
 
-    It is needed when host and agents are on several machines; `khala run` has its own. With --tls it lets in who has
-    a certificate, and each may read and write only what its name stands for in the task.
+    You need it if host and agents are on several machines; `khala run` has its own. With --tls it admits only holders
+    of a certificate, and each may read and write only what the task gives to its name.
     """
     from khala_orchestrator import commands  # noqa: PLC0415  # see there
 
@@ -91,7 +91,7 @@ def replay(
     file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
     *,
     agent: Annotated[
-        str | None, typer.Option(help="Only what this agent saw, said and did; red/NAME is the one of side red.")
+        str | None, typer.Option(help="Only what this agent saw, said and did; red/NAME is an agent of side red.")
     ] = None,
     steps: Annotated[str | None, typer.Option(help="Only these steps: 7, or 10-20.", metavar="STEPS")] = None,
     text: Annotated[bool, typer.Option("--text", help="Show observations and replies word for word.")] = False,
@@ -101,11 +101,11 @@ def replay(
     new: Annotated[
         Path | None,
         typer.Option(
-            "--recover", help="Write what can be read into this new recording, as a whole one.", metavar="NEW"
+            "--recover", help="Write the readable part into this new recording, as a whole file.", metavar="NEW"
         ),
     ] = None,
     pace: Annotated[
-        bool, typer.Option("--pace", help="Print how fast the models were, as `pace` of their model files.")
+        bool, typer.Option("--pace", help="Print how fast the models were, as `pace` for their model files.")
     ] = False,
     as_json: Json = False,
 ) -> None:

@@ -54,7 +54,7 @@ def route(
 ) -> None:
     """Be a router until a signal arrives."""
     if tls and not names_of_tasks:
-        raise ConfigError("with --tls the agents that may join are those of a task: give --task TASK")
+        raise ConfigError("with --tls only agents of a task may join: give --task TASK")
     rules = access_rules([load_task(name) for name in names_of_tasks], run) if tls else None
     config = router_config(listen, tls=tls, insecure=insecure, rules=rules)
     asyncio.run(_route(config, as_json=as_json))
@@ -148,7 +148,7 @@ def _paces(recording: Recording, *, as_json: bool) -> None:
 
     found = list(measured_paces(recording.of(ModelCall)))
     if not found:
-        raise RecordingError(f"{recording.path} has no answer of a model: a pace is measured from answers")
+        raise RecordingError(f"{recording.path} has no answer of a model, and the pace is measured from answers")
     if as_json:
         typer.echo(json.dumps({"paces": [one._asdict() | {"pace": one.pace.model_dump()} for one in found]}))
         return

@@ -51,7 +51,7 @@ class MatchConfig(Frozen):
     @model_validator(mode="after")
     def _once_over_lan(self) -> Self:
         if self.episodes > 1 and self.task.opponent.kind == "lan":
-            raise ValueError("a game over LAN is played once: its host has to begin each one; give one episode")
+            raise ValueError("a game over LAN is played once: its host has to begin each game; give one episode")
         return self
 
 

@@ -154,8 +154,8 @@ def _check_empty(directory: Path) -> None:
     if found := certificates(directory):
         names = ", ".join(sorted({one.name for one in found}))
         raise ConfigError(
-            f"holds certificates ({names}) and not the key of their authority, ca/key.pem: put it back, or make new "
-            "ones for all in another directory",
+            f"holds certificates ({names}) but not the key of their authority, ca/key.pem: put the key back, or "
+            "make all certificates anew in another directory",
             source=str(directory),
         )
 
@@ -212,7 +212,7 @@ def _general_name(host: str) -> x509.GeneralName:
     try:
         return x509.DNSName(host)
     except ValueError:
-        raise ConfigError(f"{host!r} is no host name in ASCII and no address", source="--host") from None
+        raise ConfigError(f"{host!r} is neither a host name in ASCII nor an address", source="--host") from None
 
 
 def _own_names() -> list[str]:
@@ -241,7 +241,7 @@ def _authority(directory: Path) -> tuple[x509.Certificate, ec.EllipticCurvePriva
     except (OSError, ValueError, TypeError):
         raise ConfigError("holds no authority: make one with `khala keys init DIR`", source=str(directory)) from None
     if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != ca.public_key():
-        raise ConfigError("its key is not that of its certificate", source=str(place))
+        raise ConfigError("its key does not belong to its certificate", source=str(place))
     return ca, key
 
 

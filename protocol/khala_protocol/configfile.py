@@ -102,9 +102,9 @@ def _text_of(path: Path) -> str:
     except FileNotFoundError:
         raise ConfigError("there is no such file", source=str(path)) from None
     except IsADirectoryError:
-        raise ConfigError("this is a directory, a YAML file is wanted", source=str(path)) from None
+        raise ConfigError("this is a directory: name a YAML file", source=str(path)) from None
     except UnicodeDecodeError:
-        raise ConfigError("this is no UTF-8 text", source=str(path)) from None
+        raise ConfigError("this is not UTF-8 text", source=str(path)) from None
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", source=str(path)) from None
 

@@ -101,12 +101,12 @@ class Document:
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark
             line = None if mark is None else min(mark.line, text.rstrip().count("\n")) + 1  # the end is a line further
-            raise ConfigError(f"this is no YAML: {error.problem}", source=self.source, line=line) from None
+            raise ConfigError(f"this is not YAML: {error.problem}", source=self.source, line=line) from None
         except yaml.reader.ReaderError as error:
-            fault = f"this is no YAML: the character U+{_code(error.character):04X} is not allowed"
+            fault = f"this is not YAML: the character U+{_code(error.character):04X} is not allowed"
             raise ConfigError(fault, source=self.source, line=_line_at(text, error)) from None
         except (yaml.YAMLError, UnicodeError):
-            raise ConfigError("this is no YAML: it has characters that no text has", source=self.source) from None
+            raise ConfigError("this is not YAML: it has characters that no text has", source=self.source) from None
 
     def _value(self, node: yaml.Node, place: Place) -> object:
         self.lines.setdefault(place, node.start_mark.line + 1)
@@ -160,7 +160,7 @@ class Document:
 
     def _refuse_double(self, place: Place, first: yaml.Node, second: yaml.Node) -> None:
         raise ConfigError(
-            f"stands here a second time, the first is on line {first.start_mark.line + 1}",
+            f"is given a second time, the first is on line {first.start_mark.line + 1}",
             source=self.source,
             line=second.start_mark.line + 1,
             field=dotted(place),
@@ -169,7 +169,7 @@ class Document:
     def _key(self, node: yaml.Node) -> str | int:
         line = node.start_mark.line + 1
         if not isinstance(node, yaml.ScalarNode):
-            raise ConfigError("the name of a field is wanted here, not a list or fields", source=self.source, line=line)
+            raise ConfigError("write the name of a field here, not a list or fields", source=self.source, line=line)
         if len(node.value) > MAX_KEY_CHARACTERS:
             fault = f"the name of a field has at most {MAX_KEY_CHARACTERS} characters, this has {len(node.value)}"
             raise ConfigError(fault, source=self.source, line=line)
@@ -209,7 +209,7 @@ class _Composer:
         self._loader.get_event()  # the document ends
         if not self._loader.check_event(yaml.StreamEndEvent):
             line = self._loader.get_event().start_mark.line + 1
-            raise ConfigError("this is no YAML: a second document begins here", source=self._source, line=line)
+            raise ConfigError("this is not YAML: a second document begins here", source=self._source, line=line)
         return root
 
     def _node(self, event: Any, depth: int) -> yaml.Node:
@@ -224,7 +224,7 @@ class _Composer:
 
     def _fault(self, event: Any, depth: int) -> str:
         if isinstance(event, yaml.AliasEvent) and event.anchor not in self._anchors:
-            return f"this is no YAML: found undefined alias {event.anchor!r}"
+            return f"this is not YAML: found undefined alias {event.anchor!r}"
         if self._nodes > 2 * MAX_VALUES:  # names of fields are nodes as well
             return f"there are more than {MAX_VALUES} values here"
         return "nested too deep" if depth > MAX_DEPTH else ""

@@ -35,7 +35,7 @@ def check_regular(path: Path) -> None:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, "it is a pipe or a device, a file is wanted", str(path))
+        raise OSError(errno.EINVAL, "it is a pipe or a device: name a file", str(path))
 
 
 def read_limited(path: Path, most_bytes: int) -> bytes:

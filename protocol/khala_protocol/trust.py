@@ -91,7 +91,7 @@ def check_keys(sent: Iterable[str]) -> None:
     """
     for what in sent:
         if not is_trusted(what):
-            raise ConfigError(f"this sends the key in {what}: if you trust that address, say --trust")
+            raise ConfigError(f"this sends the key in {what}: if you trust that address, give --trust")
 
 
 def import_trusted(module: str, *, source: str) -> ModuleType:

@@ -21,13 +21,13 @@ app = typer.Typer(
     add_completion=False,
 )
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON object instead of text.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 OwnMaps = Annotated[
     Path | None,
     typer.Option("--maps", help="Your own .SC2Map files: a directory of them, or a StarCraft II with a folder Maps."),
 ]
 Version = Annotated[str, typer.Option(help=f"Version of the game: {' or '.join(BUILD_OF_VERSION)}.")]
-Directory = Annotated[Path, typer.Argument(help="Made if it is not there. Never one with a real StarCraft II.")]
+Directory = Annotated[Path, typer.Argument(help="Made if it does not exist. Never one with a real StarCraft II.")]
 
 
 @app.command("install")

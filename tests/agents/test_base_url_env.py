@@ -52,12 +52,12 @@ def test_a_wrong_address_names_the_variable_that_holds_it(model: str, monkeypatc
     monkeypatch.setenv("MINE_BASE_URL", "llm:2")
     with pytest.raises(ConfigError) as caught:
         Workshop().policy(WorkerSpec(model=model))
-    assert str(caught.value) == "MINE_BASE_URL (base_url): 'llm:2' is no URL that begins with http:// or https://"
+    assert str(caught.value) == "MINE_BASE_URL (base_url): 'llm:2' is not a URL that begins with http:// or https://"
 
 
 def test_what_is_no_name_of_a_variable_is_refused() -> None:
     with pytest.raises(ConfigError) as caught:
         loads(FILE + "base_url_env: http://llm:2/v1\n", ModelConfig, source="m.yaml")
     assert str(caught.value) == (
-        "m.yaml:4 (base_url_env): the name of an environment variable is wanted here, such as VLLM_BASE_URL"
+        "m.yaml:4 (base_url_env): write the name of an environment variable here, such as VLLM_BASE_URL"
     )

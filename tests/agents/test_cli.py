@@ -57,15 +57,15 @@ BAD_OPTIONS = [
     (
         ["agent", "A", "--run", "r", "--connect", "localhost:7447"],
         (
-            "'localhost:7447' is no endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; transports are "
-            "quic, tcp, tls, unixsock-stream, ws"
+            "'localhost:7447' is not an endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; transports "
+            "are quic, tcp, tls, unixsock-stream, ws"
         ),
     ),
     (
         ["llm", "--fault", "fire=1"],
         (
-            "--fault: 'fire' is no fault: use an HTTP status from 400 to 599 or one of quota, garbage, nonsense, half, "
-            "reset, drip, stall, such as --fault 429=0.1"
+            "--fault: 'fire' is not a fault: use an HTTP status from 400 to 599 or one of quota, garbage, nonsense, "
+            "half, reset, drip, stall, such as --fault 429=0.1"
         ),
     ),
     (

@@ -70,20 +70,20 @@ def test_a_missing_key_names_its_variable(monkeypatch: pytest.MonkeyPatch) -> No
 GOOD = "profile: vllm\nmodel: m\nbase_url: http://h/v1\n"
 BAD_MODELS = [
     ("profile: vllm\nmodel: m\n", "m.yaml:1 (base_url): is required and not given"),
-    (GOOD.replace("http://h", "h"), "m.yaml:3 (base_url): 'h/v1' is no URL that begins with http:// or https://"),
+    (GOOD.replace("http://h", "h"), "m.yaml:3 (base_url): 'h/v1' is not a URL that begins with http:// or https://"),
     (
         GOOD.replace("h/", "me:sk-secret@h/"),
-        ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
+        ("m.yaml:3 (base_url): a key, a password or a query does not belong in an address: "
         "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD.replace("/v1", "/v1?key=sk-secret"),
-        ("m.yaml:3 (base_url): a key, a password or a query does not belong into an address: "
+        ("m.yaml:3 (base_url): a key, a password or a query does not belong in an address: "
         "name a variable in api_key_env, and write a query such as api-version under `query`"),
     ),
     (
         GOOD + "api_key_env: sk-secret",
-        "m.yaml:4 (api_key_env): the name of an environment variable is wanted here, such as OPENAI_API_KEY, not a key",
+        "m.yaml:4 (api_key_env): write the name of an environment variable here, such as OPENAI_API_KEY, not a key",
     ),
     (
         GOOD + "api_key: sk-secret",
@@ -95,37 +95,35 @@ BAD_MODELS = [
     ),
     (
         GOOD.replace("vllm", "openai"),
-        "m.yaml:1: openai wants a key: name the environment variable that holds it in api_key_env",
+        "m.yaml:1: openai needs a key: name the environment variable that holds it in api_key_env",
     ),
     (GOOD + "extra: {stream: true}", "m.yaml:4 (extra): 'stream' cannot be sent: Khala reads whole answers"),
     (GOOD + "extra: {n: 4}", "m.yaml:4 (extra): 'n' cannot be sent: one answer is read, and all would be billed"),
     (GOOD + "extra: {model: x}", "m.yaml:4 (extra): 'model' cannot be sent: the field `model` of the file names it"),
     (
         GOOD + "headers: {Authorization: Bearer sk-secret}",
-        ("m.yaml:4 (headers): 'Authorization' looks like a key, which no file holds: "
-        "write {env: NAME} of a variable"),
+        "m.yaml:4 (headers): 'Authorization' looks like a key; keep it in a variable and write {env: NAME}",
     ),
     (
         GOOD + "query: {subscription-key: sk-secret}",
-        ("m.yaml:4 (query): 'subscription-key' looks like a key, which no file holds: "
-        "write {env: NAME} of a variable"),
+        "m.yaml:4 (query): 'subscription-key' looks like a key; keep it in a variable and write {env: NAME}",
     ),
     (
         GOOD + "headers: {X-Team: '${sk-secret}'}",
-        ("m.yaml:4 (headers.X-Team): the name of an environment variable is wanted here, "
+        ("m.yaml:4 (headers.X-Team): write the name of an environment variable here, "
         "such as {env: GATEWAY_TOKEN}"),
     ),
     (
         GOOD + "headers: {X-Team: {env: sk-secret}}",
-        ("m.yaml:4 (headers.X-Team): the name of an environment variable is wanted here, "
+        ("m.yaml:4 (headers.X-Team): write the name of an environment variable here, "
         "such as {env: GATEWAY_TOKEN}"),
     ),
     (
         GOOD + "headers: {X-Team: {prefix: a}}",
-        "m.yaml:4 (headers.X-Team): either words, or {env: NAME} of an environment variable with or without a prefix",
+        "m.yaml:4 (headers.X-Team): write text, or {env: NAME} of an environment variable, with or without a prefix",
     ),
-    (GOOD + "headers: {Host: other}", "m.yaml:4 (headers): 'Host' is no header that can be set here"),
-    (GOOD + "headers: {'a b': c}", "m.yaml:4 (headers): 'a b' is no header that can be set here"),
+    (GOOD + "headers: {Host: other}", "m.yaml:4 (headers): 'Host' is a header that cannot be set here"),
+    (GOOD + "headers: {'a b': c}", "m.yaml:4 (headers): 'a b' is a header that cannot be set here"),
     (
         GOOD + "system_role: robot",
         "m.yaml:4 (system_role): 'robot' is none of 'system', 'developer', 'user' or 'fold'",
@@ -212,8 +210,8 @@ def test_a_process_of_an_agent_gets_every_variable_that_its_model_file_names(mon
 
 BAD_AGENTS = [
     ("agents: {}", "a.yaml:1 (agents): dictionary should have at least 1 item after validation, not 0, not {}"),
-    ("agents:\n  A: {}", "a.yaml:2 (agents.A): either a model or a policy is wanted"),
-    ("agents:\n  A: {model: scripted, policy: silent}", "a.yaml:2 (agents.A): either a model or a policy is wanted"),
+    ("agents:\n  A: {}", "a.yaml:2 (agents.A): give either a model or a policy"),
+    ("agents:\n  A: {model: scripted, policy: silent}", "a.yaml:2 (agents.A): give either a model or a policy"),
     (
         "agents:\n  A/B: {policy: silent}",
         (
@@ -304,8 +302,8 @@ BAD_POLICIES = [
     (
         "my_agent",
         (
-            "'my_agent' is no policy: write silent, random-legal, focus-fire, skilled or module:name, "
-            "such as my_agent:decide"
+            "'my_agent' is not a policy: write silent, random-legal, focus-fire, skilled or module:name, "
+            "as my_agent:decide"
         ),
     ),
     ("nowhere:decide", "policy nowhere:decide: there is no module 'nowhere'"),
@@ -337,7 +335,7 @@ BAD_SPECS = [
     ("vllm", 1.0, {}, ("a budget needs the price of Qwen/Qwen2.5-7B-Instruct at 127.0.0.1:8000, and no price is known: "
      "write `prices: {prompt: …, completion: …}` into its model file, in US dollars per million tokens; 0 for a model "
      "of your own")),
-    ("scripted", None, {"base_url": "localhost"}, ("command line (base_url): 'localhost' is no URL that begins with "
+    ("scripted", None, {"base_url": "localhost"}, ("command line (base_url): 'localhost' is not a URL that begins with "
      "http:// or https://")),
 ]  # fmt: skip
 

@@ -182,7 +182,7 @@ def test_the_same_seed_and_replies_give_the_same_observations(start: Play, finis
 
 def test_an_episode_that_is_over_is_not_played_on_but_reset(finished: Battle) -> None:
     battle = finished
-    with pytest.raises(GameError, match="the episode is over: the game has to be reset before it is played on"):
+    with pytest.raises(GameError, match="the episode is over: reset the game before you play on"):
         battle.game.act([battle.executor.plan([], battle.now, 8)])
     (fresh,) = battle.game.reset()
     assert (fresh.ended, fresh.outcome, len(fresh.own)) == (False, None, 5)

@@ -76,7 +76,7 @@ def test_an_opponent_is_also_given_in_one_line(line: str, expected: Opponent) ->
         ({"kind": "guest", "race": "zerg"}, "only the computer is given a race and a difficulty"),
         (
             {"kind": "lan", "command": "run.py"},
-            "only a guest is started by a command, and the opponent is of the kind lan",
+            "only a guest is started by a command, but the opponent is of the kind lan",
         ),
     ],
 )
@@ -101,7 +101,7 @@ def test_a_task_may_bring_its_own_map() -> None:
 @pytest.mark.parametrize("file", ["/dev/zero", "../../secret", "a/../../b.SC2Map", "", '"a\\0"'])
 def test_a_map_of_its_own_is_below_the_maps_of_the_install(file: str) -> None:
     own = GOOD.replace("map: 2s3z", f"own_map: {{file: {file or repr(file)}, race: protoss, opponent: null}}")
-    with pytest.raises(ConfigError, match=r"t:2 \(own_map.file\): the path of a map goes from the directory Maps"):
+    with pytest.raises(ConfigError, match=r"t:2 \(own_map.file\): give the path of a map from the directory Maps"):
         loads(own, TaskConfig, source="t")
 
 

@@ -195,7 +195,7 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path, first: Calibration) ->
     first.save(tmp_path / "a.json")
     assert load(tmp_path / "a.json") == first
     (tmp_path / "b.json").write_text('{"kind": "something"}')
-    with pytest.raises(ConfigError, match="no file of `khala calibrate`"):
+    with pytest.raises(ConfigError, match="not a file of `khala calibrate`"):
         load(tmp_path / "b.json")
 
 
@@ -206,7 +206,7 @@ def test_the_command_measures_resumes_and_compares(tmp_path: Path, capsys: pytes
     assert load(out).build == 75689
     with pytest.raises(SystemExit):
         main(["calibrate", "--out", str(out)])
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "--resume continues it" in capsys.readouterr().err
     main_ok("calibrate", "--out", str(out), "--only", "move.st*", "--resume")
     assert set(load(out).probes) == {"move.start", "move.stop"}
     capsys.readouterr()

@@ -257,7 +257,7 @@ BAD = [
     ("golden.mcap --at 3 --advise Who:go --policy silent", "--advise: there is no single 'Who' to advise"),
     ("golden.mcap --at 3 --advise everyone:go", "nobody decides for blue/Stalkers, blue/Zealots after the step"),
     ("golden.mcap --at 3 --memory notes=2 --policy silent", "notes would change what agents saw before the step"),
-    ("golden.mcap --at 3 --base-url http://localhost:1/v1", "--base-url is about a model: name it with --model"),
+    ("golden.mcap --at 3 --base-url http://localhost:1/v1", "--base-url is for a model: name the model with --model"),
     ("golden.mcap --at 3 --model recorded --memory 2", "nothing but what was recorded: leave out --memory"),
     ("golden.mcap --scan --model recorded", "nothing but what was recorded: leave out --scan, or say --model"),
     ("golden.mcap --scan", "nobody decides for blue/Stalkers, blue/Zealots after the step"),
@@ -286,7 +286,7 @@ def test_agents_and_sides_have_players_of_their_own() -> None:
     players = players_of(duel, None, {"red": "focus-fire"}, ["blue/Captain=skilled"])
     assert players["blue"].groups(["Captain"])[0][0].policy == "skilled"
     assert players["red"].groups(["Captain"])[0][0].policy == "focus-fire"
-    with pytest.raises(ConfigError, match="'Captain' names no single agent: there are blue/Captain, red/Captain"):
+    with pytest.raises(ConfigError, match="'Captain' is not the name of one agent: there are blue/Captain"):
         players_of(duel, Minds(), {}, ["Captain=skilled"])
     with pytest.raises(ConfigError, match="nobody decides for red/Captain after the step"):
         players_of(duel, None, {"blue": "silent"}, [])
@@ -356,7 +356,7 @@ def test_steps_are_ranked_by_wins_and_then_by_value(golden: Trunk, futures: Any)
 def test_a_scan_has_a_dozen_steps_and_needs_an_end_to_compare_with(golden: Trunk) -> None:
     assert steps_of(golden, None) == [*range(0, 51, 5)]
     assert steps_of(golden, 20, advised=True) == [20, 40]
-    with pytest.raises(RecordingError, match="has no end of episode 0 that forks could be compared with"):
+    with pytest.raises(RecordingError, match="has no end of episode 0 to compare forks with"):
         steps_of(replace(golden, results=[]), None)
 
 

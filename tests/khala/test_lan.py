@@ -63,7 +63,7 @@ async def test_a_game_that_a_person_hosts_is_joined_played_and_won_when_they_lea
 @pytest.mark.parametrize(
     ("played", "options", "error"),
     [
-        ("Simple96", (), r"^the game at 127.0.0.1:\d+ is on the map Simple96, and the task on another one"),
+        ("Simple96", (), r"^the game at 127.0.0.1:\d+ is on the map Simple96, but the task is on another map"),
         ("Simple64", ("--realtime",), r"goes on in real time: play with --clock realtime"),
     ],
 )

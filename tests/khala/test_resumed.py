@@ -79,7 +79,7 @@ def test_of_the_recordings_of_a_run_the_newest_that_has_begun_is_gone_on_with(
 
 def test_a_run_that_never_began_cannot_be_gone_on_with(tmp_path: Path, write: Callable[..., Path]) -> None:
     write("recording.mcap", steps=None, age_s=0)
-    with pytest.raises(RecordingError, match="has no run card: it was ended before the match began"):
+    with pytest.raises(RecordingError, match="has no run card: the run ended before the match began"):
         new_or_resumed(None, tmp_path / RUN, None, tmp_path, **GIVEN)
 
 

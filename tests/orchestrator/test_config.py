@@ -99,7 +99,7 @@ def test_a_mistake_in_a_task_file_is_named_with_its_line_and_field(tmp_path: Pat
             "name: All of us",
             f"5 (agents.0.name): name 'All of us' cannot stand in a key: {NAMES}",
         ),
-        ("name: mine", "name: [", "3: this is no YAML: did not find expected ',' or ']'"),
+        ("name: mine", "name: [", "3: this is not YAML: did not find expected ',' or ']'"),
     ):
         assert old in GOOD
         with subtests.test(new or f"without {old.strip()}"):

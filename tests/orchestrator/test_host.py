@@ -326,7 +326,7 @@ async def test_a_disk_that_fills_up_within_a_step_ends_the_match_with_one_senten
 async def test_a_recording_is_not_overwritten(hall: Hall, config: MakeConfig, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_bytes(b"precious")
-    with pytest.raises(RecordingError, match="exists already: choose another name, recordings are not overwritten"):
+    with pytest.raises(RecordingError, match="exists already: choose another name: recordings are not overwritten"):
         await hall.play(config(record=path))
     assert path.read_bytes() == b"precious"
     assert hall.watched == []

@@ -147,7 +147,7 @@ async def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_
 
 async def test_a_run_card_of_another_version_is_named(recording: Recording, tmp_path: Path) -> None:
     other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(config={"name": 7}) if isinstance(m, Run) else m)
-    with pytest.raises(RecordingError, match=r"b\.mcap: its run card is not one of this version: name: "):
+    with pytest.raises(RecordingError, match=r"b\.mcap: its run card is not of this version: name: "):
         recorded_config(other)
 
 
@@ -278,4 +278,4 @@ def test_a_recording_without_a_run_card_cannot_be_played(tmp_path: Path) -> None
     Recorder(tmp_path / "empty.mcap").close()
     with pytest.raises(RecordingError) as raised:
         recorded_config(Recording.open(tmp_path / "empty.mcap"))
-    assert str(raised.value) == f"{tmp_path / 'empty.mcap'} has no run card: it was ended before the match began"
+    assert str(raised.value) == f"{tmp_path / 'empty.mcap'} has no run card: the run ended before the match began"

@@ -253,7 +253,7 @@ def test_what_names_no_steps_is_refused(subtests: pytest.Subtests) -> None:
     for steps in ("", "-", "soon", "1-2-3", "1,2", "--1", "9" * 10):
         with subtests.test(steps), pytest.raises(ConfigError) as raised:
             StepSelection.of(None, steps)
-        assert str(raised.value) == f"--steps: {steps!r} names no steps: write 7, 10-20, 10- or -20"
+        assert str(raised.value) == f"--steps: {steps!r} does not name steps: write 7, 10-20, 10- or -20"
 
 
 # --- as data ----------------------------------------------------------------------------------------------

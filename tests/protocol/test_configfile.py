@@ -60,10 +60,10 @@ def test_anchors_and_merges_are_read() -> None:
 
 
 ERRORS = [
-    ("task: [", "m.yaml:1: this is no YAML: did not find expected node content"),
+    ("task: [", "m.yaml:1: this is not YAML: did not find expected node content"),
     ("task: !!python/x y",
-     "m.yaml:1: this is no YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/x'"),
-    ("task: x\n\ttab: 1", "m.yaml:2: this is no YAML: found a tab character that violates indentation"),
+     "m.yaml:1: this is not YAML: could not determine a constructor for the tag 'tag:yaml.org,2002:python/x'"),
+    ("task: x\n\ttab: 1", "m.yaml:2: this is not YAML: found a tab character that violates indentation"),
     ("", "m.yaml:1 (task): is required and not given"),
     ("- a", "m.yaml:1: fields are wanted here, not ['a']"),
     ("task: x\nteems: []", "m.yaml:2 (teems): no such field, did you mean 'teams'?"),
@@ -76,14 +76,14 @@ ERRORS = [
     ("task: x\nlimits:\n  usd: much",
      "m.yaml:3 (limits.usd): input should be a valid number, unable to parse string as a number, not 'much'"),
     ("task: unknown", "m.yaml:1 (task): there is no task of this name"),
-    ("task: x\ntask: y", "m.yaml:2 (task): stands here a second time, the first is on line 1"),
+    ("task: x\ntask: y", "m.yaml:2 (task): is given a second time, the first is on line 1"),
     ("task: 1\nclock: 2", "m.yaml:1 (task): input should be a valid string, not 1 (and 1 more)"),
-    ("task: x\nbest: {name: *a}", "m.yaml:2: this is no YAML: found undefined alias 'a'"),
+    ("task: x\nbest: {name: *a}", "m.yaml:2: this is not YAML: found undefined alias 'a'"),
     ("task: x\nlimits: &a\n  more: *a", "m.yaml:3: nested too deep"),
     ("task: x\nlimits: &a\n  <<: *a", "m.yaml:2: nested too deep"),
     ("task: x\nlimits: {<<: 3}", "m.yaml:2: only fields can be merged by <<"),
-    ("task: x\n---\ntask: y", "m.yaml:2: this is no YAML: a second document begins here"),
-    ("task: x\nlimits:\n  [usd]: 1", "m.yaml:3: the name of a field is wanted here, not a list or fields"),
+    ("task: x\n---\ntask: y", "m.yaml:2: this is not YAML: a second document begins here"),
+    ("task: x\nlimits:\n  [usd]: 1", "m.yaml:3: write the name of a field here, not a list or fields"),
     ("task: x\n" + "k" * 300 + ": 1", "m.yaml:2: the name of a field has at most 200 characters, this has 300"),
     ("task: x\nlimits: {usd: " + "9" * 5000 + "}", f"m.yaml:2: '{'9' * 56}… is too long for int"),
     ("task: 2026-02-31", "m.yaml:1: '2026-02-31' is no timestamp; put it in quotes if it is a text"),
@@ -139,17 +139,17 @@ def test_the_nearest_name_is_looked_for_when_the_error_is_shown() -> None:
 def test_a_control_character_is_refused_with_its_line(text: str, code: str) -> None:
     with pytest.raises(ConfigError) as caught:
         loads(text, Match, source="m.yaml")
-    assert str(caught.value) == f"m.yaml:2: this is no YAML: the character U+{code} is not allowed"
+    assert str(caught.value) == f"m.yaml:2: this is not YAML: the character U+{code} is not allowed"
 
 
 @pytest.mark.parametrize(
     ("name", "text"),
     [
         ("big.yaml", "cannot be read: it is larger than 1 MB"),
-        ("pipe.yaml", "cannot be read: it is a pipe or a device, a file is wanted"),
+        ("pipe.yaml", "cannot be read: it is a pipe or a device: name a file"),
         ("none.yaml", "there is no such file"),
-        ("folder.yaml", "this is a directory, a YAML file is wanted"),
-        ("latin.yaml", "this is no UTF-8 text"),
+        ("folder.yaml", "this is a directory: name a YAML file"),
+        ("latin.yaml", "this is not UTF-8 text"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, text: str) -> None:

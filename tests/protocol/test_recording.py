@@ -392,7 +392,7 @@ def make(base: Path, kind: str) -> Path:
     ("kind", "text"),
     [
         ("directory", "{path} is a directory: name a file in it, such as {path}/run.mcap"),
-        ("file", "{path} exists already: choose another name, recordings are not overwritten"),
+        ("file", "{path} exists already: choose another name: recordings are not overwritten"),
         ("below a file", "{path} cannot be written: a part of its path is a file, not a directory"),
     ],
 )
@@ -442,8 +442,8 @@ def test_a_closed_recorder_says_so(path: Path) -> None:
     [
         ("missing", "{path}: there is no such file"),
         ("directory", "{path} is a directory: name the recording in it"),
-        ("file", "{path} is no recording: it does not begin as an MCAP file"),
-        ("empty", "{path} is empty: whatever recorded it was stopped before it wrote anything"),
+        ("file", "{path} is not a recording: it does not begin as an MCAP file"),
+        ("empty", "{path} is empty: the program that recorded it was stopped before it wrote anything"),
         ("below a file", "{path} cannot be read: Not a directory"),
     ],
 )

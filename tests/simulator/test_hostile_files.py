@@ -48,7 +48,7 @@ SENTENCES = [
     (BOMB, "there are more than 10000 values, those of aliases included"),
     (MERGED, "there are more than 10000 values, those of aliases included"),
     ("r: &r [*r, *r]", "nested too deep"),
-    (HEAD + "points: {[1, 2]: [3, 4]}\n", "h.yaml:6: points: the name of a field is wanted here, not a list or fields"),
+    (HEAD + "points: {[1, 2]: [3, 4]}\n", "h.yaml:6: points: write the name of a field here, not a list or fields"),
     (HEAD + "title: twice\n", "h.yaml:6: title: stands here a second time"),
     (HEAD + 'melee: !!int ""\n', "h.yaml:6: melee:  is no int; put it in quotes if it is a text"),
     (HEAD + "melee: 2026-02-31\n", "h.yaml:6: melee: 2026-02-31 is no timestamp"),

@@ -55,14 +55,14 @@ def checked_address(base_url: str) -> str:
         parts = urlsplit(base_url)
         _ = parts.port
     except ValueError:
-        raise ValueError("this is no URL") from None
+        raise ValueError("this is not a URL") from None
     if "@" in parts.netloc or parts.query or parts.fragment:
         raise ValueError(
-            "a key, a password or a query does not belong into an address: name a variable in api_key_env, "
+            "a key, a password or a query does not belong in an address: name a variable in api_key_env, "
             "and write a query such as api-version under `query`"
         )
     if len(base_url) > MAX_CHARACTERS or not (parts.hostname or "").isprintable():
-        raise ValueError(f"an address has at most {MAX_CHARACTERS} characters, all of which can be seen")
+        raise ValueError(f"an address has at most {MAX_CHARACTERS} characters, all of them visible")
     if parts.scheme not in {"http", "https"} or not parts.hostname:
-        raise ValueError(f"{base_url!r} is no URL that begins with http:// or https://")
+        raise ValueError(f"{base_url!r} is not a URL that begins with http:// or https://")
     return base_of(base_url)

@@ -86,7 +86,7 @@ def _usable(url: str, source: str) -> Proxy:
         parts = urlsplit(url)
         _ = parts.port
     except ValueError:
-        raise ConfigError("this is no URL of a proxy", source=variable) from None  # not quoted: it may have a password
+        raise ConfigError("this is not a proxy's URL", source=variable) from None  # not quoted: it may have a password
     if parts.scheme not in _KINDS or not parts.hostname:
         raise ConfigError(f"a proxy of the kind {parts.scheme!r} cannot be used: {', '.join(_KINDS)}", source=variable)
     if parts.scheme in _SOCKS and importlib.util.find_spec("socksio") is None:

@@ -79,7 +79,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
             said = f"the proxy refused the connection: http {error.status}"
             raise httpx.ProxyError(said, request=request) from None
         except aiohttp.ClientResponseError as error:  # its text has the whole address; the query may have a key
-            raise httpx.RemoteProtocolError(f"that is no HTTP: {error.message}", request=request) from None
+            raise httpx.RemoteProtocolError(f"that is not HTTP: {error.message}", request=request) from None
         except (aiohttp.ClientConnectorError, aiohttp.InvalidURL) as error:
             raise httpx.ConnectError(str(error), request=request) from error
         except (aiohttp.ClientError, OSError) as error:

@@ -68,7 +68,7 @@ def parse_faults(options: Iterable[str]) -> dict[str, float]:
         known = name in NAMED or (name.isdigit() and 400 <= int(name) <= 599)
         if not known:
             raise ConfigError(
-                f"'{name}' is no fault: use an HTTP status from 400 to 599 or one of {', '.join(NAMED)}, "
+                f"'{name}' is not a fault: use an HTTP status from 400 to 599 or one of {', '.join(NAMED)}, "
                 "such as --fault 429=0.1",
                 source="--fault",
             )
@@ -77,8 +77,8 @@ def parse_faults(options: Iterable[str]) -> dict[str, float]:
         except ValueError:
             rate = -1.0
         if not 0.0 <= rate <= 1.0:
-            raise ConfigError(f"'{option}' has no rate between 0 and 1, write for example {name}=0.1", source="--fault")
+            raise ConfigError(f"'{option}' needs a rate between 0 and 1, such as {name}=0.1", source="--fault")
         rates[name] = rate
     if sum(rates.values()) > 1.0:
-        raise ConfigError(f"the rates add up to {sum(rates.values()):g}, at most 1 is possible", source="--fault")
+        raise ConfigError(f"the rates add up to {sum(rates.values()):g}: they may not exceed 1", source="--fault")
     return rates

@@ -117,4 +117,4 @@ def load(path: Path) -> Calibration:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise ConfigError(f"{path} is no file of `khala calibrate`: {where or 'it'}: {first['msg']}") from None
+        raise ConfigError(f"{path} is not a file of `khala calibrate`: {where or 'it'}: {first['msg']}") from None

@@ -111,7 +111,7 @@ def _read(row: list[str]) -> Function | _Raw:
             known: Kind = next(known for known in get_args(Kind) if known == kind)
             return Function(int(id_), name, tuple(args.split()), int(ability), int(general_id), known)
         case _:
-            raise CatalogueError(f"{FILE} has a row that is none: {row}")
+            raise CatalogueError(f"{FILE} has an invalid row: {row}")
 
 
 def _written(row: Function | _Raw) -> list[str]:

@@ -122,11 +122,11 @@ class Guest:
             if self._bot is not None and self._bot.poll() is not None:
                 raise GameError(f"the guest ended with code {self._bot.returncode} before it joined{self._quote()}")
             if self._invitation.withdrawn.wait(_LOOK_S):
-                raise GameError("the guest did not come before the match was given up")
+                raise GameError("the match was given up before the guest joined")
             if time.monotonic() > until_s:
                 raise GameError(
                     f"no guest joined within {self._opponent.wait_s:g} s: start the bot with "
-                    f"{shlex.join(self.arguments)}, or give it longer with wait_s{self._quote()}"
+                    f"{shlex.join(self.arguments)}, or give it more time with wait_s{self._quote()}"
                 )
 
     def _quote(self) -> str:
@@ -141,7 +141,7 @@ class Guest:
         try:
             asyncio.run(self._listen())
         except OSError as error:
-            self._listening.set_exception(GameError(f"no guest can come: {error}"))
+            self._listening.set_exception(GameError(f"no guest can join: {error}"))
 
     async def _listen(self) -> None:
         app = web.Application()
@@ -194,7 +194,7 @@ class Guest:
 
     def _settle_join(self) -> None:
         if self._manners.refused:
-            self._joined.set_exception(GameError(f"the game did not take the guest: {self._manners.refused}"))
+            self._joined.set_exception(GameError(f"the game refused the guest: {self._manners.refused}"))
         else:
             self._joined.set_result(None)
 

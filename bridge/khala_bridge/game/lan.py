@@ -47,7 +47,7 @@ class LanGame:
                 self._forward()
         except (ValueError, LookupError, TypeError, OSError) as error:
             self.close()
-            raise GameError(f"what answers at {opponent.at} hosts no game of `play_vs_agent`: {error}") from None
+            raise GameError(f"the program at {opponent.at} hosts no game of `play_vs_agent`: {error}") from None
 
     def close(self) -> None:
         """Hang up."""
@@ -74,9 +74,7 @@ def _connected(opponent: Opponent, map_name: str, invitation: Invitation) -> soc
             invitation.say(f"waiting for a game at {opponent.at}; to host it: {host}")
             said = True
         if time.monotonic() > until_s or invitation.withdrawn.wait(_PAUSE_S):
-            raise GameError(
-                f"nobody hosts a game at {opponent.at}: its host has to begin first, or --opponent is another"
-            )
+            raise GameError(f"nobody hosts a game at {opponent.at}: start its host first, or give another --opponent")
 
 
 def _read(tcp: socket.socket) -> tuple[bytes, dict[str, Any]]:

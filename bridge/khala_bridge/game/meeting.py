@@ -169,8 +169,8 @@ class LanEnv(_MeetingEnv):
         own = hashlib.sha256(self._maps[0].data(self._run_config)).digest()
         if hashlib.sha256(lan.map_data).digest() != own:
             raise GameError(
-                f"the game at {self._config.opponent.at} is on the map {lan.map_name}, and the task on another one "
-                f"or another version of it: {self._config.map.file}"
+                f"the game at {self._config.opponent.at} is on the map {lan.map_name}, but the task "
+                f"is on another map, or on another version of it: {self._config.map.file}"
             )
         if lan.realtime and not self._config.realtime:
             raise GameError(
@@ -190,4 +190,4 @@ class LanEnv(_MeetingEnv):
             self.met = f"player {other.player_name or 'without a name'} over LAN, {race}"
 
     def _restart(self) -> None:
-        raise GameError("a game over LAN is played once: its host has to begin another one")
+        raise GameError("a game over LAN is played once: its host has to begin the next one")

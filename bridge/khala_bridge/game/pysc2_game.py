@@ -113,7 +113,7 @@ class PySC2Game:
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
         """Play one plan of each player, step by step, all players in the same steps."""
         if self._ended:
-            raise GameError("the episode is over: the game has to be reset before it is played on")
+            raise GameError("the episode is over: reset the game before you play on")
         players = [_Player(plan) for plan in plans]
         snapshots: tuple[Snapshot, ...] = ()
         env_steps = 0

@@ -63,7 +63,7 @@ class MapSpec(Frozen):
     def _below_maps(cls, file: str) -> str:
         parts = PurePosixPath(file).parts
         if not parts or ".." in parts or PurePosixPath(file).is_absolute() or not file.isprintable():
-            raise ValueError("the path of a map goes from the directory Maps of the install downwards")
+            raise ValueError("give the path of a map from the directory Maps of the install downwards")
         return file
 
 

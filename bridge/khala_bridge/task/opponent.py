@@ -54,7 +54,7 @@ class Opponent(Frozen):
         if self.kind != "computer" and (self.race or self.difficulty):
             raise ValueError("only the computer is given a race and a difficulty: other opponents bring their own")
         if self.kind != "guest" and self.command:
-            raise ValueError(f"only a guest is started by a command, and the opponent is of the kind {self.kind}")
+            raise ValueError(f"only a guest is started by a command, but the opponent is of the kind {self.kind}")
         return self
 
     @property
@@ -92,4 +92,4 @@ def opponent_of(words: str) -> dict[str, Any]:
         return {"kind": kind, "at": rest}
     if not colon and kind in ("computer", "guest", "lan"):
         return {"kind": kind}
-    raise ValueError(f"{words!r} is no opponent: say computer, guest, guest:COMMAND or lan:127.0.0.1:PORT")
+    raise ValueError(f"{words!r} is not an opponent: give computer, guest, guest:COMMAND or lan:127.0.0.1:PORT")

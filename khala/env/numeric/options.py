@@ -58,9 +58,9 @@ class Options:
 
     def __post_init__(self) -> None:
         if self.difficulty not in LEVELS or len(self.difficulty) != 1:
-            raise ConfigError(f"difficulty {self.difficulty!r} is no level: it is one of {', '.join(LEVELS)}")
+            raise ConfigError(f"difficulty {self.difficulty!r} is not a level: give one of {', '.join(LEVELS)}")
         if self.step_mul < 1:
-            raise ConfigError(f"step_mul is {self.step_mul}: a step has one game loop at least")
+            raise ConfigError(f"step_mul is {self.step_mul}: a step has at least one game loop")
 
     @property
     def level(self) -> int:

@@ -119,8 +119,8 @@ def trunk_of(recording: Recording, episode: int = 0) -> Trunk:
         )
     if not config.task.clock.waits:
         raise ForkError(
-            f"{recording.path} was played with the clock realtime, where it matters when a reply arrives: forks of it "
-            "could not be compared; play it with --clock token, which counts tokens instead"
+            f"{recording.path} was played with the clock realtime, where the time of a reply matters, so "
+            "its forks could not be compared; play the match with --clock token, which counts tokens instead"
         )
     loops = _loops(recording, episode, sides=len(config.task.per_side()))
     if not loops:

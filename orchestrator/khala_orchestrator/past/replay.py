@@ -48,7 +48,7 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
     """
     run = recording.run
     if run is None:
-        raise RecordingError(f"{recording.path} has no run card: it was ended before the match began")
+        raise RecordingError(f"{recording.path} has no run card: the run ended before the match began")
     try:
         task = TaskConfig.model_validate(run.config)
         game, _, _version = run.game.rpartition(" ")
@@ -60,7 +60,7 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))
         raise RecordingError(
-            f"{recording.path}: its run card is not one of this version: {place}: {fault['msg']}"
+            f"{recording.path}: its run card is not of this version: {place}: {fault['msg']}"
         ) from None
     check_repeatable(recording, task)
     trust(*modules)

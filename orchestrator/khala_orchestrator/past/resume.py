@@ -171,7 +171,7 @@ def _check_same(recorded: RecordedTurn) -> None:
         first = recorded.differences[0]
         raise ResumeError(
             f"the new game differs from the recorded one at step {first.step} of episode {first.episode}, in what "
-            f"{first.agent} sees: the match cannot be resumed; is it the same version of Khala?"
+            f"{first.agent} sees: the match cannot be resumed; is this the same version of Khala?"
         )
 
 

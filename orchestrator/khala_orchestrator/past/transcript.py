@@ -63,7 +63,7 @@ class StepSelection:
             return cls(agent)
         found = re.fullmatch(r"([0-9]{0,9})(?:(-)([0-9]{0,9}))?", steps)
         if not found or not steps.strip("-"):
-            raise ConfigError(f"{steps[:40]!r} names no steps: write 7, 10-20, 10- or -20", source="--steps")
+            raise ConfigError(f"{steps[:40]!r} does not name steps: write 7, 10-20, 10- or -20", source="--steps")
         first, dash, last = found.groups()
         end = last if dash else first
         return cls(agent, int(first or 0), int(end) if end else None)

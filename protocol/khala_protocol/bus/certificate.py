@@ -122,7 +122,7 @@ def check_valid(path: Path, what: str = "certificate") -> None:
     if found.has_expired:
         raise BusError(found.warning)
     if found.begins > datetime.now(UTC):
-        raise BusError(f"the TLS {what} {path} is valid from {found.begins:%Y-%m-%d} on: is the clock here right?")
+        raise BusError(f"the TLS {what} {path} is valid from {found.begins:%Y-%m-%d} on: is the clock right here?")
 
 
 def check_key(path: Path, certificate: Path) -> None:
@@ -142,7 +142,7 @@ def check_key(path: Path, certificate: Path) -> None:
     with _broken_refused(certificate, "certificate"):
         certified = x509.load_pem_x509_certificate(_bytes(certificate, "certificate")).public_key()
     if key.public_key() != certified:
-        raise BusError(f"the TLS key {path} is not that of the certificate {certificate}: copy both again")
+        raise BusError(f"the TLS key {path} does not belong to the certificate {certificate}: copy both again")
 
 
 @contextlib.contextmanager

@@ -206,13 +206,13 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
     found = _ENDPOINT.fullmatch(endpoint)
     if not found or found["transport"] not in TRANSPORTS:
         raise BusError(
-            f"{endpoint[:100]!r} is no endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; "
+            f"{endpoint[:100]!r} is not an endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; "
             f"transports are {', '.join(sorted(TRANSPORTS))}"
         )
     if found["transport"] == "unixsock-stream":
         if len(found["address"].encode()) > UNIX_PATH_BYTES:
             raise BusError(
-                f"{endpoint[:200]!r} has too long a path: a unix socket's has at most {UNIX_PATH_BYTES} bytes"
+                f"{endpoint[:200]!r} is too long: the path of a unix socket has at most {UNIX_PATH_BYTES} bytes"
             )
         return
     place = _HOST_PORT.fullmatch(found["address"])

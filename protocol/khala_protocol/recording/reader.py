@@ -251,9 +251,9 @@ def require_recording(path: Path) -> None:
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from None
     if not magic:
-        raise RecordingError(f"{path} is empty: whatever recorded it was stopped before it wrote anything")
+        raise RecordingError(f"{path} is empty: the program that recorded it was stopped before it wrote anything")
     if magic != MCAP0_MAGIC:
-        raise RecordingError(f"{path} is no recording: it does not begin as an MCAP file")
+        raise RecordingError(f"{path} is not a recording: it does not begin as an MCAP file")
 
 
 def _records(path: Path) -> Iterator[Recorded | McapRecord]:

@@ -154,7 +154,7 @@ def _create(path: Path) -> IO[bytes]:
     except FileExistsError:
         if path.is_dir():
             raise RecordingError(f"{path} is a directory: name a file in it, such as {path / 'run.mcap'}") from None
-        raise RecordingError(f"{path} exists already: choose another name, recordings are not overwritten") from None
+        raise RecordingError(f"{path} exists already: choose another name: recordings are not overwritten") from None
     except NotADirectoryError:
         raise RecordingError(f"{path} cannot be written: a part of its path is a file, not a directory") from None
     except OSError as error:

@@ -124,7 +124,7 @@ class Summary:
                         found = samples_of(chunk_at(file, offset))
                         yield from (sample.payload for sample in found if sample.channel in wanted)
         except BROKEN as error:
-            raise RecordingError(f"{self.path} is damaged: `khala replay` tells what can be read") from error
+            raise RecordingError(f"{self.path} is damaged: `khala replay` shows what can be read") from error
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be read: {error.strerror}") from error
 

@@ -132,7 +132,7 @@ def _fields(node: yaml.MappingNode, field: str) -> list[tuple[str, yaml.Node]]:
     found: dict[str, yaml.Node] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            raise wrong(key, f"{shown(field) or 'the file'}: the name of a field is wanted here, not a list or fields")
+            raise wrong(key, f"{shown(field) or 'the file'}: write the name of a field here, not a list or fields")
         if key.tag != _MERGE:
             _check_scalar(key, field)
         if key.value in found:

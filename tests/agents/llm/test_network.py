@@ -102,7 +102,7 @@ def test_an_endpoint_elsewhere_is_reached_through_the_proxy_that_the_environment
 BAD_PROXIES = [
     ("ftp://p:1", "ALL_PROXY: a proxy of the kind 'ftp' cannot be used: http, https, socks5, socks5h"),
     ("socks4://p:1", "ALL_PROXY: a proxy of the kind 'socks4' cannot be used: http, https, socks5, socks5h"),
-    ("http://p:port", "ALL_PROXY: this is no URL of a proxy"),
+    ("http://p:port", "ALL_PROXY: this is not a proxy's URL"),
 ]
 
 
@@ -271,7 +271,7 @@ async def test_a_connection_that_breaks_after_the_request_may_be_billed(answer: 
 async def test_an_answer_that_is_no_http_shows_no_query() -> None:
     async with serving(b"nonsense\r\n\r\n") as (port, _):
         http = HttpEndpoint(f"http://127.0.0.1:{port}/v1", query={"key": "a/b c"})
-        with pytest.raises(Unreachable, match=r"cannot be reached: that is no HTTP: ") as caught:
+        with pytest.raises(Unreachable, match=r"cannot be reached: that is not HTTP: ") as caught:
             await http.post("/chat/completions", b"{}")
         await http.close()
     assert "key" not in str(caught.value)

@@ -142,11 +142,11 @@ def test_options_become_rates() -> None:
 
 KNOWN = "use an HTTP status from 400 to 599 or one of quota, garbage, nonsense, half, reset, drip, stall"
 BAD_FAULTS = [
-    (["fire=1"], f"--fault: 'fire' is no fault: {KNOWN}, such as --fault 429=0.1"),
-    (["200=1"], f"--fault: '200' is no fault: {KNOWN}, such as --fault 429=0.1"),
-    (["429"], "--fault: '429' has no rate between 0 and 1, write for example 429=0.1"),
-    (["429=2"], "--fault: '429=2' has no rate between 0 and 1, write for example 429=0.1"),
-    (["429=0.6", "500=0.6"], "--fault: the rates add up to 1.2, at most 1 is possible"),
+    (["fire=1"], f"--fault: 'fire' is not a fault: {KNOWN}, such as --fault 429=0.1"),
+    (["200=1"], f"--fault: '200' is not a fault: {KNOWN}, such as --fault 429=0.1"),
+    (["429"], "--fault: '429' needs a rate between 0 and 1, such as 429=0.1"),
+    (["429=2"], "--fault: '429=2' needs a rate between 0 and 1, such as 429=0.1"),
+    (["429=0.6", "500=0.6"], "--fault: the rates add up to 1.2: they may not exceed 1"),
 ]
 
 

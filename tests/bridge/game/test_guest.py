@@ -148,7 +148,7 @@ def test_a_guest_that_does_not_come_is_given_up() -> None:
 
 def test_a_match_that_is_given_up_waits_for_no_guest() -> None:
     invitation = Invitation(say=lambda _: invitation.withdrawn.set())
-    with pytest.raises(GameError, match="before the match was given up"), invited(None, invitation):
+    with pytest.raises(GameError, match="was given up before the guest joined"), invited(None, invitation):
         pass
 
 

@@ -111,7 +111,7 @@ def test_what_is_wrong_is_said(data_set: Path, tmp_path: Path, monkeypatch: pyte
     with pytest.raises(ConfigError, match=r"KHALA_DATASET_RUN: .* has no run 'second'"):
         FromDataset()
     (tmp_path / "wrong.jsonl").write_text('{"text": 1}\n')
-    for place, why in ((tmp_path / "none", "cannot be read"), (tmp_path / "wrong.jsonl", "is no file of")):
+    for place, why in ((tmp_path / "none", "cannot be read"), (tmp_path / "wrong.jsonl", "is not a file of")):
         with pytest.raises(ConfigError, match=why):
             replies_of(place)
     with pytest.raises(ConfigError, match="two decisions first/blue/"):

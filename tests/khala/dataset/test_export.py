@@ -142,7 +142,7 @@ def test_a_number_that_parquet_cannot_hold_is_said(rewritten: Rewrite, tmp_path:
     def change(sample: Any) -> list[Any]:
         return [sample.message.but(seed=10**30)] if isinstance(sample.message, Run) else [sample.message]
 
-    with pytest.raises(RecordingError, match="a number of these recordings is too large for Parquet"):
+    with pytest.raises(RecordingError, match="a number in these recordings is too large for Parquet"):
         export([rewritten(change).path], tmp_path / "out", Recipe((Form.PARQUET,)))
 
 
@@ -224,12 +224,12 @@ def test_seeds_of_two_recordings_go_into_their_splits(
 
 @pytest.mark.parametrize("text", ["", "0.8", "0.8,0.1", "1,0", "0.5,0.6,-0.1", "a,b", "0.25,0.25,0.25,0.25", "nan,1"])
 def test_a_wrong_split_is_refused(text: str) -> None:
-    with pytest.raises(ConfigError, match="is no split: write one, two or three shares above 0 that sum up to 1"):
+    with pytest.raises(ConfigError, match="is not a split: write one, two or three shares above 0 that sum up to 1"):
         Split.of(text, "seed")
 
 
 def test_what_stands_in_the_way_is_named(recording: Recording, tmp_path: Path, data_set: Path) -> None:
-    with pytest.raises(ConfigError, match="is there already, and is not empty: name another directory"):
+    with pytest.raises(ConfigError, match="exists already, and is not empty: name another directory"):
         export([recording.path], data_set, Recipe())
     (tmp_path / "none").mkdir()
     with pytest.raises(ConfigError, match=r"holds no recordings \(\*\.mcap\)"):

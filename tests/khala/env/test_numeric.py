@@ -243,8 +243,8 @@ def test_smacs_own_interface_refuses_what_is_not_available() -> None:
     ("name", "options", "says"),
     [
         ("3s_vs_6z", {}, "SMAC has no map '3s_vs_6z': did you mean 3s_vs_"),
-        ("3m", {"difficulty": "B"}, "difficulty 'B' is no level: it is one of 1, 2, 3"),
-        ("3m", {"step_mul": 0}, "step_mul is 0: a step has one game loop at least"),
+        ("3m", {"difficulty": "B"}, "difficulty 'B' is not a level: give one of 1, 2, 3"),
+        ("3m", {"step_mul": 0}, "step_mul is 0: a step has at least one game loop"),
     ],
 )
 def test_what_cannot_be_played_is_said(name: str, options: dict[str, Any], says: str) -> None:

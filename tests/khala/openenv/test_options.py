@@ -33,7 +33,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "option": ({"agent": ["Stalkers"]}, "reset:1 (agent): no such field, did you mean 'agents'?"),
     "seed": ({"seed": -1}, "reset:1 (seed): input should be greater than or equal to 0, not -1"),
     "task": ({"task": "2s3zz"}, "there is no task '2s3zz': did you mean 2s3z?"),
-    "file": ({"task": "../x.yaml"}, "task: '../x.yaml' is no name of a task: `khala tasks` lists them"),
+    "file": ({"task": "../x.yaml"}, "task: '../x.yaml' is not the name of a task: `khala tasks` lists them"),
     "agent": ({"agents": ["Me"]}, "agents: there is no Me: give one of blue/Stalkers, blue/Zealots"),
     "sides": (
         {"task": "duel_3m", "agents": ["blue/Captain", "red/Captain"]},

@@ -215,7 +215,7 @@ async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage, monkeypa
     config = new("2s3z_pair", "first", Path("nowhere"), seed=7, episodes=1, assemble_s=60.0)
     card = run_card(config.model_copy(update={"game": "Khala simulator"}), GameIdentity("", "", "", ""))
     wanted = order("first").but(match={}, resume=True)
-    with pytest.raises(Refused, match="the service has no run 'first' to go on with: it looks for its recording in"):
+    with pytest.raises(Refused, match="the service has no run 'first' to resume: it looks for its recording in"):
         await client.submit(stage.bus, wanted)
     with Recorder(stage.out / "first" / "recording.mcap") as recorder:
         recorder.write(run_key("first", Topic.RUN), encode(card))

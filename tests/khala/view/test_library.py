@@ -104,7 +104,7 @@ def test_names_of_the_command_line_are_found(tmp_path: Path) -> None:
     [
         (["none"], "there is no none, nor .*runs/none: name a recording, a directory or a run"),
         (["a", "b", "c"], "at most two can be seen side by side, and these are 3"),
-        (["..", "one"], ".. holds no recording or several"),
+        (["..", "one"], ".. does not hold exactly one recording"),
     ],
 )
 def test_what_is_not_there_is_said(

@@ -19,7 +19,8 @@ TRANSPORTS = "quic, tcp, tls, unixsock-stream, ws"
 
 def no_endpoint(text: str) -> str:
     return (
-        f"{text!r} is no endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; transports are {TRANSPORTS}"
+        f"{text!r} is not an endpoint: write <transport>/<address>, such as tcp/127.0.0.1:7447; "
+        f"transports are {TRANSPORTS}"
     )
 
 
@@ -59,7 +60,7 @@ LONG = "unixsock-stream//tmp/" + "x" * 103
         ({"connect": ["tcp/127.0.0.1:0"]}, needs_port("tcp/127.0.0.1:0")),
         ({"connect": ["tcp/127.0.0.1:70000"]}, needs_port("tcp/127.0.0.1:70000")),
         ({"mode": "router", "listen": ["tcp/::1:7447"]}, needs_port("tcp/::1:7447")),
-        ({"connect": [LONG]}, f"{LONG!r} has too long a path: a unix socket's has at most 107 bytes"),
+        ({"connect": [LONG]}, f"{LONG!r} is too long: the path of a unix socket has at most 107 bytes"),
         ({"listen": ["tcp/127.0.0.1:7447"]}, "a client does not listen: remove `listen`, or use mode 'router'"),
         (
             {"mode": "router", "connect": ["tcp/127.0.0.1:7447"]},
@@ -144,7 +145,7 @@ def test_a_wrong_tls_file_is_named(tls: TlsFiles, broken: str, content: str | No
 
 def test_the_key_of_another_certificate_is_refused(tls: TlsFiles, tmp_path: Path) -> None:
     theirs = files_of(tmp_path, "host").key
-    with pytest.raises(BusError, match=f"the TLS key {theirs} is not that of the certificate {tls.certificate}"):
+    with pytest.raises(BusError, match=f"the TLS key {theirs} does not belong to the certificate {tls.certificate}"):
         check(BusConfig(tls=tls.model_copy(update={"key": theirs})))
 
 

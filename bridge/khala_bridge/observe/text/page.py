@@ -108,7 +108,7 @@ def section(name: str, *, parts: Iterable[Part] = (), replace: bool = False) -> 
         ValueError: the name is taken, and `replace` was not given.
     """
     if name in SECTIONS and not replace:
-        raise ValueError(f"there is a section '{name}' already; give replace=True to put another one in its place")
+        raise ValueError(f"there is a section '{name}' already; give replace=True to replace it")
 
     def register(write: Write) -> Write:
         SECTIONS[name] = Section(name, write, frozenset(parts))
