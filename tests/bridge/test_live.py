@@ -123,7 +123,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
 ) -> None:
     battle = start("raw", name)
     (agent,) = battle.observer.observe(battle.now).agents.values()
-    assert {team.view.name: len(team.view.units) for team in agent.teams} == paper_teams[name]
+    assert {team.name: len(team.view.units) for team in agent.teams} == paper_teams[name]
     battle.turn(focus_fire)
     assert battle.reasons == []
 
@@ -140,7 +140,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
 def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name: str, units: dict[str, int]) -> None:
     battle = start("raw", name)
     (agent,) = battle.observer.observe(battle.now).agents.values()
-    assert {team.view.name: len(team.view.units) for team in agent.teams} == units
+    assert {team.name: len(team.view.units) for team in agent.teams} == units
     battle.turn(lambda _: "")
     assert battle.now.outcome is None
 

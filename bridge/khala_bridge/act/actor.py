@@ -198,10 +198,10 @@ class Actor:
             raise CallRejected(meant.reason, meant.message)
         for said in meant:
             if not words.has(said.team, said.action):
-                raise CallRejected("not_available", f"Team {said.team.view.name} has no action {said.action.name}.")
+                raise CallRejected("not_available", f"Team {said.team.name} has no action {said.action.name}.")
             self.standing.begin(said, until, translator, observation)
             end = f", until {until.text}" if until.text else ""
-            yield f"{said.team.view.name} <Standing({said.written[1:-1]}{end})>"
+            yield f"{said.team.name} <Standing({said.written[1:-1]}{end})>"
 
     def _most_calls(self, saw: AgentObservation) -> int:
         """Return the number of calls of an agent that are read: all that may count, and some that are wrong."""

@@ -47,7 +47,7 @@ class Addressees:
         """Take the observation on which the agent decided, which names its teams, and the names that it may use."""
         self._agent = agent
         self._words = words
-        self._by_name = {squashed(team.view.name): team for team in agent.teams}
+        self._by_name = {squashed(team.name): team for team in agent.teams}
 
     def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamObservation]:
         """Return the teams that a call addresses, at least one.
@@ -66,7 +66,7 @@ class Addressees:
             return [self._unnamed(action, tags)]
         named = self._named(heading, action)
         if action.subject == "side" and not any(self._words.has(team, action) for team in named):
-            of_side = [team for team in self._able(action) if not team.team.tags]
+            of_side = [team for team in self._able(action) if not team.tags]
             return of_side if len(of_side) == 1 else named
         return named
 
@@ -84,7 +84,7 @@ class Addressees:
         teams = self._agent.teams
         if len(teams) == 1:
             return teams[0]
-        owners = [team for team in teams if tags[0] in team.team.tags] if action.named else []
+        owners = [team for team in teams if tags[0] in team.tags] if action.named else []
         for candidates in (owners, self._able(action)):
             if len(candidates) == 1:
                 return candidates[0]
@@ -100,7 +100,7 @@ class Addressees:
             return self._able(action) or self._agent.teams
         several = [self._one(_TEAM_WORD.sub("", part)) for part in _BETWEEN.split(heading) if part.strip()]
         if len(several) > 1 and None not in several:
-            return list({team.view.name: team for team in several if team is not None}.values())
+            return list({team.name: team for team in several if team is not None}.values())
         if plain in map(squashed, self._agent.idle_teams):
             raise CallRejected("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
         close = difflib.get_close_matches(plain, self._by_name, n=1, cutoff=0.75)
@@ -119,4 +119,4 @@ class Addressees:
         return kinds[0] if len(kinds) == 1 else None
 
     def _your_teams(self, your: str = "your") -> str:
-        return f"{your} teams are {', '.join(team.view.name for team in self._agent.teams)}."
+        return f"{your} teams are {', '.join(team.name for team in self._agent.teams)}."

@@ -71,9 +71,7 @@ def refuse(command: Command, why: str) -> GameRefusal | None:
     if said is None:
         return None
     message = f"The game refused {said.action.name}: {why}."
-    return GameRefusal(
-        said.team.team.agent, reject(said.call, CallRejected("refused_by_game", message), said.team.view.name)
-    )
+    return GameRefusal(said.team.agent, reject(said.call, CallRejected("refused_by_game", message), said.team.name))
 
 
 def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameRefusal, ...]:

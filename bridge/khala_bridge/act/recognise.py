@@ -52,7 +52,7 @@ class Recognised:
     @property
     def text(self) -> str:
         """The call as agents and reports read it: `Stalker-1 <Attack_Unit(0x1)>`."""
-        return f"{self.team.view.name} {self.written}"
+        return f"{self.team.name} {self.written}"
 
     @property
     def written(self) -> str:

@@ -70,7 +70,7 @@ def _team(command: Command) -> tuple[str, str]:
     """Return the team of a command; the host's own commands form a group of their own, which comes last."""
     if command.said is None:
         return "", ""
-    team = command.said.team.team
+    team = command.said.team
     return team.agent, team.name
 
 
@@ -146,7 +146,7 @@ class _Tour:
         """Return where a team's head was at the start of the tour; None for a team without a screen of its own."""
         if command.said is None or command.said.team.camera is None:
             return None
-        heads = (tag for tag in command.said.team.team.tags if tag in self._start.units)
+        heads = (tag for tag in command.said.team.tags if tag in self._start.units)
         return next((self._start.units[tag].pos for tag in heads), None)
 
     # --- the target -------------------------------------------------------------------------------------------

@@ -92,9 +92,9 @@ class Hand:
         """Return the control group of the team, if the command is for the whole team."""
         if command.said is None:
             return None
-        team = command.said.team.team
+        team = command.said.team
         whole = self._alive(command) == frozenset(tag for tag in team.tags if tag in self._tour.now.units)
-        return team.control_group if whole else None
+        return team.team.control_group if whole else None
 
     def _types(self, command: Command) -> set[str]:
         return {self._tour.now.units[tag].name for tag in self._alive(command)}

@@ -47,7 +47,7 @@ class Vocabulary:
 
     def has(self, team: TeamObservation, action: Action) -> bool:
         """Return True if a team has an action, with its present units."""
-        return action.name in team.team.config.actions or any(
+        return action.name in team.config.actions or any(
             action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
         )
 
@@ -71,7 +71,7 @@ class Vocabulary:
         if not teams:
             return self._catalogue
         types = dict.fromkeys(unit.type for team in teams for unit in team.view.units)
-        lists = (*(team.team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
+        lists = (*(team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
         return [self._by_name[name] for name in dict.fromkeys(name for listed in lists for name in listed)]
 
 

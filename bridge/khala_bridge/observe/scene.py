@@ -144,9 +144,9 @@ class Scene:
             resources=self._resources_on(camera) if resources else (),
             bounds=_edges(camera.bounds(self.world)),
         )
-        tags = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
-        happened = events.of_team(before.view, before.tags, tags) if before else ()
-        return TeamObservation(team, camera, view.but(events=happened), tags)
+        witnessed = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
+        happened = events.of_team(before.view, before.witnessed, witnessed) if before else ()
+        return TeamObservation(team, camera, view.but(events=happened), witnessed)
 
     @functools.cached_property
     def _aim(self) -> list[Aim]:

@@ -114,7 +114,7 @@ def _minimap(
 
 def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
     """Return the agent's own units: those of its teams, or all, if it orders the whole side."""
-    if any(team.team.kind == "side" for team in seen.teams):
+    if any(team.kind == "side" for team in seen.teams):
         return frozenset(subject.tag for subject in moment.subjects if subject.side == "own")
     return frozenset(tag for team in teams for tag in team.tags)
 

@@ -42,7 +42,7 @@ def task(page: Page) -> Iterator[str]:
     yield f"{INDENT}{one_line(page.task.task)}"
     if page.observation.agent.task:
         yield f"{INDENT}{one_line(page.observation.agent.task)}"
-    always = {team.team.config.name: team.team.config.task for team in page.observation.teams}
+    always = {team.config.name: team.config.task for team in page.observation.teams}
     yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
     yield from (f"{INDENT}Team {team.name}: {one_line(team.task)}" for team in page.teams if team.task)
 

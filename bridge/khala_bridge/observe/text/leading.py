@@ -162,5 +162,5 @@ def _answers(page: Page) -> Iterator[str]:
 
 def _trained(page: Page) -> frozenset[str]:
     """Return the types that the agent's orders train or warp in, now or later."""
-    names: Iterable[str] = (name for team in page.observation.teams for name in team.team.config.actions)
+    names: Iterable[str] = (name for team in page.observation.teams for name in team.config.actions)
     return frozenset(name.partition("_")[2] for name in names if name.startswith(("Train_", "Warp_", "Morph_")))
