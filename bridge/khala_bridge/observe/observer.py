@@ -100,7 +100,7 @@ class Observer:
             )
         changes = moment.since(moment.episode.last.get(agent.name, _NOTHING))
         seen = self._seen(moment, agent, changes)
-        page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), changes.conditions)
+        page = Page(seen, self._task, changes.conditions)
         text = render(page, self._sections[agent.name], agent.text_tokens)
         moment.episode.last[agent.name] = moment.as_last(seen)
         return replace(seen, text=text, pictures=moment.album.pictures(seen) if moment.album else ())
@@ -113,15 +113,22 @@ class Observer:
             seen = moment.scene.team(agent, team, before.get(team.name), changes.events, resources=builds)
             task = moment.tasks.get((agent.name, team.name))
             teams.append(replace(seen, view=seen.view.but(task=task)) if task else seen)
-        view = self._view(moment, agent, changes, teams)
+        heard = moment.feedback.get(agent.name, Feedback())
+        view = self._view(moment, agent, changes, teams, heard)
         idle = moment.episode.roster.idle_teams(agent.name)
-        return AgentObservation(agent, moment.snapshot.game_loop, view, tuple(teams), idle)
+        return AgentObservation(agent, moment.snapshot.game_loop, view, tuple(teams), idle, heard)
 
-    def _view(self, moment: _Moment, agent: AgentConfig, changes: Changes, teams: Sequence[TeamObservation]) -> View:
+    def _view(
+        self,
+        moment: _Moment,
+        agent: AgentConfig,
+        changes: Changes,
+        teams: Sequence[TeamObservation],
+        heard: Feedback,
+    ) -> View:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
         scene = moment.scene
         parts = self._parts[agent.name]
-        heard = moment.feedback.get(agent.name, Feedback())
         view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=heard.standing)
         more: dict[str, object] = {}
         if "counts" in parts:
@@ -236,7 +243,7 @@ class _Moment:
 
     def as_last(self, seen: AgentObservation) -> _Last:
         """Return what an agent's next observation needs of this one."""
-        return _Last(self.episode.chronicle.number, self.scene.totals, {team.view.name: team for team in seen.teams})
+        return _Last(self.episode.chronicle.number, self.scene.totals, {team.name: team for team in seen.teams})
 
 
 class _WhenAsked(Mapping[str, AgentObservation]):

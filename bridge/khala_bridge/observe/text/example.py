@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import is_armed, knowledge
-from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation
 from khala_bridge.observe.text.page import Page, find_sections, render
 from khala_protocol.messages import (
@@ -81,7 +80,7 @@ def example(task: TaskConfig, agent: AgentConfig) -> Example | None:
         return None
     view, sections, reply = made
     observation = AgentObservation(agent, game_loop=0, view=view, teams=(), idle_teams=())
-    page = Page(observation, task, Feedback())
+    page = Page(observation, task)
     return Example(observation=render(page, find_sections(sections)), reply=reply.text())
 
 

@@ -23,7 +23,6 @@ from khala_protocol.trust import import_trusted
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from khala_bridge.observe.feedback import Feedback
     from khala_bridge.observe.observation import AgentObservation
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import TeamView, View
@@ -42,7 +41,6 @@ class Page:
 
     observation: AgentObservation
     task: TaskConfig
-    feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)
     """By tag, the written condition of a unit, and its changes: pages of one moment that tell of the same changes share
     it, see `units`."""
