@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from khala.playing import environment
 from khala_bridge.act import executor_of
 from khala_bridge.errors import GameError, GameMissing
-from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides
+from khala_bridge.game.game import GameConfig, GamePatience, GameThread, Sides
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.host import host
@@ -99,7 +99,7 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, proce
     )
     thread = GameThread(
         lambda: PySC2Game(started, processes, invitation),
-        patience=Patience().against(task.opponent),
+        patience=GamePatience().against(task.opponent),
         give_up=invitation.withdrawn.set,
     )
     return Sides(thread, [executor_of(side) for side in sides])

@@ -12,7 +12,7 @@ import pytest
 
 from khala_bridge.act import Actor, executor_of
 from khala_bridge.errors import GameError, GameHangs
-from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides, StepResult
+from khala_bridge.game.game import GameConfig, GamePatience, GameThread, Sides, StepResult
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer
 from khala_bridge.task.maps import known_maps
@@ -208,7 +208,7 @@ async def test_a_stopped_game_is_noticed_killed_and_named(
         games.append(PySC2Game(GameConfig(sc2path=sc2path, map=task("2s3z").map_spec, seed=3)))
         return games[0]
 
-    thread = GameThread(begin, patience=Patience(least_s=4.0))
+    thread = GameThread(begin, patience=GamePatience(least_s=4.0))
     async with Sides(thread, [executor_of(task("2s3z"))]) as side:
         await side.reset()
         for _ in range(3):

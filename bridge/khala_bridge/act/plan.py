@@ -44,7 +44,7 @@ class GameRefusal:
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
+class PlanResult:
     """The result of a plan."""
 
     functions: tuple[str, ...] = ()
@@ -52,7 +52,7 @@ class Played:
     refusals: tuple[GameRefusal, ...] = ()
 
 
-Plan: TypeAlias = Generator[PlanStep, Snapshot, Played]
+Plan: TypeAlias = Generator[PlanStep, Snapshot, PlanResult]
 
 
 class Executor(Protocol):

@@ -24,7 +24,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.aim import RealScreen
-from khala_bridge.act.plan import GameRefusal, Plan, PlanStep, Played, refuse, refused_by_game, written
+from khala_bridge.act.plan import GameRefusal, Plan, PlanResult, PlanStep, refuse, refused_by_game, written
 from khala_bridge.act.select import Hand, Missed
 from khala_bridge.catalogue.functions import raw_forms
 from khala_bridge.compat import actions as pysc2
@@ -63,7 +63,7 @@ class ScreenExecutor:
                 yield from tour.visit(list(of_team))
             if tour.loops < loops:
                 yield from tour.step(None, loops - tour.loops)
-        return Played(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
+        return PlanResult(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
 
 
 def _team(command: Command) -> tuple[str, str]:

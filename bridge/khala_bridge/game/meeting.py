@@ -61,7 +61,7 @@ class _MeetingEnv(Env):
         draws = interface.HasField("render")
         process = self._run_config.start(extra_ports=ports, want_rgb=draws, port=pick_port())
         self._sc2_procs, self._controllers = [process], [process.controller]
-        process.controller._client._sock.settimeout(None)  # noqa: SLF001  # `Patience` says how long a step may take
+        process.controller._client._sock.settimeout(None)  # noqa: SLF001  # `GamePatience` says how long a step may take
 
     def _create_join(self) -> None:
         """Join the game, and set what `SC2Env` wants to know of it."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act.plan import PlanStep, Played
+from khala_bridge.act.plan import PlanResult, PlanStep
 from khala_bridge.catalogue.functions import check_against_pysc2
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError, GameMissing
@@ -205,7 +205,7 @@ class _Player:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._fresh = True
-        self.played = Played()
+        self.played = PlanResult()
         self.step: PlanStep | None = None
         self._advance(None)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from khala_bridge.auto.aims import Aim
     from khala_bridge.catalogue.action import Action
     from khala_bridge.frames import Camera, MapFrame, WorldPoint
-    from khala_bridge.rules import Ledger, Side, UnitState
+    from khala_bridge.rules import Ledger, SideState, UnitState
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Point
@@ -58,7 +58,7 @@ class Asker(NamedTuple):
     """Who asks for valid arguments: an agent's team, or the whole side, at one moment."""
 
     snapshot: Snapshot
-    side: Side
+    side: SideState
     ledger: Ledger
     around: Around
     agent: AgentConfig | None = None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.observe.chronicle import Chronicle, Entry, Sighting
     from khala_bridge.observe.places import Places
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state import Unit
     from khala_protocol.messages import OrderView
 
@@ -44,7 +44,7 @@ class _Seen(NamedTuple):
     unseen_s: float = 0.0
 
 
-def army(scene: Scene, places: Places, chronicle: Chronicle) -> Army:
+def army(scene: SideScene, places: Places, chronicle: Chronicle) -> Army:
     """Return the parts of the own army, its scouts, and the enemy's armed units."""
     own = [unit for unit in scene.snapshot.own if _fights(unit) and unit.build_progress >= 1]
     goals = {unit.tag: goal for unit in scene.snapshot.own if (goal := _scouting(scene, unit)) is not None}
@@ -96,7 +96,7 @@ def _sorted(names: Iterable[str]) -> dict[str, int]:
 # --- parts ----------------------------------------------------------------------------------------------------
 
 
-def _parts(scene: Scene, places: Places, units: Sequence[_Seen]) -> list[ArmyPart]:
+def _parts(scene: SideScene, places: Places, units: Sequence[_Seen]) -> list[ArmyPart]:
     """Return units by place, those between places by nearness; the most valuable part first."""
     parts = [_part(scene, name, group) for name, group in _grouped(places, units)]
     return sorted(parts, key=lambda part: (-part.value, part.minimap))
@@ -115,7 +115,7 @@ def _grouped(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Se
     return [*named.items(), *loose]
 
 
-def _part(scene: Scene, name: str, group: Sequence[_Seen]) -> ArmyPart:
+def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
     x, y = (sum(values) / len(group) for values in ([one.x for one in group], [one.y for one in group]))
     return ArmyPart(
         place=name,
@@ -127,13 +127,13 @@ def _part(scene: Scene, name: str, group: Sequence[_Seen]) -> ArmyPart:
     )
 
 
-def _doing(scene: Scene, units: Sequence[Unit]) -> str:
+def _doing(scene: SideScene, units: Sequence[Unit]) -> str:
     """Return what most of some own units do."""
     said = Counter(_order(scene, unit) for unit in units if unit.is_own)
     return said.most_common(1)[0][0] if said else ""
 
 
-def _order(scene: Scene, unit: Unit) -> str:
+def _order(scene: SideScene, unit: Unit) -> str:
     orders: Sequence[OrderView] = scene.bodies[unit.tag].view.orders if unit.tag in scene.bodies else ()
     if not orders:
         return "idle"
@@ -147,7 +147,7 @@ def _order(scene: Scene, unit: Unit) -> str:
 # --- scouts ---------------------------------------------------------------------------------------------------
 
 
-def _scouting(scene: Scene, unit: Unit) -> tuple[float, float] | None:
+def _scouting(scene: SideScene, unit: Unit) -> tuple[float, float] | None:
     """Return where an own unit goes that scouts: a worker that walks far from home, or an unarmed unit."""
     if is_structure(unit.name) or not unit.orders or (_fights(unit) and is_armed(unit.name)):
         return None
@@ -163,7 +163,7 @@ def _scouting(scene: Scene, unit: Unit) -> tuple[float, float] | None:
 # --- enemies --------------------------------------------------------------------------------------------------
 
 
-def _enemies(scene: Scene, places: Places, chronicle: Chronicle) -> list[ArmyPart]:
+def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[ArmyPart]:
     found = [
         _Seen(known.unit, known.unit.pos.x, known.unit.pos.y, unseen_s)
         for known in chronicle.sightings

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from khala_bridge.observe.chronicle import Chronicle
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state import Unit
 
 MOST_SUPPLY = 200
 
 
-def economy(scene: Scene, chronicle: Chronicle) -> Economy:
+def economy(scene: SideScene, chronicle: Chronicle) -> Economy:
     """Return what comes in, what it is spent on, and what is short soon."""
     own, player = scene.snapshot.own, scene.snapshot.player
     halls = [unit for unit in land_of(scene.snapshot).own_halls if unit.build_progress >= 1]

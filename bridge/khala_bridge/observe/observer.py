@@ -24,7 +24,7 @@ from khala_bridge.observe.chronicle import Chronicle
 from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.places import Places
-from khala_bridge.observe.scene import Scene
+from khala_bridge.observe.scene import SideScene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Page, render, sections_of
 from khala_bridge.state.teams import TeamRoster
@@ -220,10 +220,10 @@ class _Moment:
             self.tasks[team.agent, team.name] = self.episode.stages.task(team, middle, time_s)
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> SideScene:
         """The scene."""
         teams = (team for teams in self.teams.values() for team in teams)
-        return Scene(self.snapshot, self.task.frames, teams)
+        return SideScene(self.snapshot, self.task.frames, teams)
 
     @cached_property
     def album(self) -> Album | None:
@@ -270,7 +270,7 @@ def _parts(sections: Sequence[Section]) -> frozenset[Part]:
     return frozenset(part for section in sections for part in section.parts)
 
 
-def _landmarks(scene: Scene, parts: frozenset[Part], camera: Camera | None) -> Iterator[Landmark]:
+def _landmarks(scene: SideScene, parts: frozenset[Part], camera: Camera | None) -> Iterator[Landmark]:
     if "structures" in parts:
         yield from landmarks.structures(scene)
     if "power" in parts:

@@ -55,7 +55,7 @@ SLACK = 1e-6
 _NO_DETAILS = UnitDetails()
 
 
-class Scene:
+class SideScene:
     """A snapshot, and the common part of all teams' views."""
 
     def __init__(self, snapshot: Snapshot, frames: Frames, teams: Iterable[Team]) -> None:

@@ -52,7 +52,7 @@ def distinct(units: Iterable[UnitState]) -> list[UnitState]:
 
 
 @dataclass(frozen=True)
-class Side:
+class SideState:
     """The units and upgrades of a player; the accounts are in `Ledger`."""
 
     units: dict[int, UnitState]
