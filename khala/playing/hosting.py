@@ -16,7 +16,7 @@ from khala_bridge.game.game import GameConfig, GamePatience, GameThread, Sides
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.host import host
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.errors import RecordingError
 from khala_protocol.parent_watch import named_parent
 from khala_protocol.recording import Recording
@@ -110,11 +110,11 @@ def _played(config: MatchConfig) -> Unfinished | None:
     if config.task.faults.game_lost == "end" or config.record is None or not config.record.exists():
         return None
     try:
-        unfinished(Recording.open(config.record), config)  # is there anything, and can it be played again?
+        read_unfinished(Recording.open(config.record), config)  # is there anything, and can it be played again?
     except RecordingError as error:
         log.warning("the game cannot be started again: %s", error)
         return None
-    return unfinished(Recording.open(_put_aside(config.record)), config)
+    return read_unfinished(Recording.open(_put_aside(config.record)), config)
 
 
 def _put_aside(path: Path) -> Path:

@@ -109,6 +109,6 @@ def written(name: str, *arguments: object) -> str:
     return f"{name}({', '.join(map(str, arguments))})"
 
 
-def listed(tags: Iterable[int]) -> str:
+def tag_list(tags: Iterable[int]) -> str:
     """Return tags as reports show them."""
     return f"[{', '.join(map(hex, tags))}]"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.plan import Plan, PlanResult, PlanStep, listed, refused_by_game, written
+from khala_bridge.act.plan import Plan, PlanResult, PlanStep, refused_by_game, tag_list, written
 from khala_bridge.state.requests import autocast_switch, unit_order
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def _action(command: Command) -> GameAction:
 def _words(command: Command) -> str:
     """Return a command as a raw function of PySC2, `Attack_unit(now, [0x1], 0x2)`."""
     stem = command.function.stem
-    units = listed(command.units)
+    units = tag_list(command.units)
     if command.function.kind == "autocast":
         return written(f"{stem}_autocast", units)
     when = "queued" if command.queued else "now"

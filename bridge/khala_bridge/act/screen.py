@@ -121,9 +121,9 @@ class _Tour:
                 yield from self._hand.select(command)
                 yield from self._call(command)
             except Missed as missed:
-                self._missed(command, str(missed))
+                self._note_refusal(command, str(missed))
 
-    def _missed(self, command: Command, why: str) -> None:
+    def _note_refusal(self, command: Command, why: str) -> None:
         if refusal := refuse(command, why):
             self.refusals.append(refusal)
 

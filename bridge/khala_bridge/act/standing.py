@@ -94,7 +94,7 @@ class StandingOrders:
         """
         agent = said.team.agent
         team = said.team.name
-        if said.action.named:
+        if said.action.actor_count:
             raise CallRejected("wrong_arguments", f"{said.action.name} names a unit: a standing order is for a team.")
         if until.is_reached(observation.snapshot, attacked=False):
             raise CallRejected("not_available", f"The end of this standing order is reached already: {until.text}.")

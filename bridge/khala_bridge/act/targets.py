@@ -11,7 +11,6 @@ reads them with its next observation.
 
 from __future__ import annotations
 
-import functools
 import math
 import operator
 from typing import TYPE_CHECKING
@@ -64,13 +63,13 @@ class Targets:
         end = self.end_of(last)
         return f"its last unit {end}" if end else "its units are not on the map"
 
-    def named(self, said: Recognised) -> tuple[int, ...]:
+    def named_units(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that the first arguments name.
 
         Raises:
             CallRejected: one of them is not a unit of the team, is gone, or is named twice.
         """
-        tags = said.tags[: said.action.named]
+        tags = said.tags[: said.action.actor_count]
         for tag in tags:
             if tag not in said.team.tags:
                 raise self._not_of_team(said, tag)
@@ -89,7 +88,7 @@ class Targets:
         """
         tag = said.tags[-1]
         anywhere = said.action.rule is not None or said.team.camera is None
-        unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
+        unit = (self._observation.snapshot.known if anywhere else self._units).get(tag)
         if unit is None:
             raise self._nowhere(said, tag)
         own = tag in said.team.tags
@@ -177,11 +176,6 @@ class Targets:
 
     # --- tags that are wrong ----------------------------------------------------------------------------------
 
-    @functools.cached_property
-    def _remembered(self) -> dict[int, Unit]:
-        """What the side remembers under the fog: resources and structures that it saw once."""
-        return self._observation.snapshot.known
-
     def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
         if end := self.end_of(tag):
             return CallRejected("dead_target", f"The unit {hex(tag)} {end}; choose another target.")
@@ -206,7 +200,7 @@ class Targets:
             hint = self._near_miss(tag, own) or f"{units}."
             return CallRejected("unknown_target", f"There is no unit {hex(tag)}; {hint}")
         what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
-        if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
+        if said.action.actor_count == 1 and said.tags[-1] in own and len(said.tags) > 1:
             right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
             return CallRejected("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
         owner = self._observation.team_of(tag)

@@ -113,7 +113,7 @@ class Translator:
 
     def lacks_units(self, said: Recognised) -> bool:
         """Return True if some units that a call meant are gone since its agent saw them."""
-        return not said.action.named and any(tag not in self._snapshot.units for tag in said.team.tags)
+        return not said.action.actor_count and any(tag not in self._snapshot.units for tag in said.team.tags)
 
     def commands(self, order: RuleOrder, said: Recognised | None = None) -> list[Command]:
         """Return the commands of an order, behind the earlier orders of its units in this turn."""
@@ -209,7 +209,7 @@ class Translator:
 
     def _units(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that a call means, as far as they exist."""
-        tags = self._targets.named(said) if said.action.named else said.team.tags
+        tags = self._targets.named_units(said) if said.action.actor_count else said.team.tags
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
             raise self._cannot(said, [self._targets.end_of_all(tags) if tags else "it has no units"])

@@ -84,7 +84,7 @@ class Manners:
             answer.status = sc_pb.quit
             answer.quit.SetInParent()
         else:
-            return GuestRequest(kind, passed=self._changed(request, data))
+            return GuestRequest(kind, passed=self._adapt(request, data))
         return GuestRequest(kind, answer=answer.SerializeToString())
 
     def note(self, data: bytes) -> bool:
@@ -96,7 +96,7 @@ class Manners:
             self.refused += f": {response.join_game.error_details}" if response.join_game.error_details else ""
         return response.HasField("join_game")
 
-    def _changed(self, request: sc_pb.Request, data: bytes) -> bytes:
+    def _adapt(self, request: sc_pb.Request, data: bytes) -> bytes:
         if request.HasField("observation") and request.observation.disable_fog:
             request.observation.disable_fog = False
         elif request.HasField("join_game"):

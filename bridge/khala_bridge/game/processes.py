@@ -56,7 +56,7 @@ class Launched:
         """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
         check_install(sc2path)
         settle_flags()
-        with pointed_to(sc2path), explained("the game could not be started"):
+        with pointed_to(sc2path), explain_errors("the game could not be started"):
             run_config = run_configs.get()
             run_config.env = environment_of(run_config, environment)
             self._process: Any = run_config.start(want_rgb=False, connect=False, port=pick_port())
@@ -210,7 +210,7 @@ def _variable(name: str, value: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def explained(what: str) -> Iterator[None]:
+def explain_errors(what: str) -> Iterator[None]:
     """Turn any exception of PySC2 into an error for the user; they have no common base class."""
     try:
         yield

@@ -11,7 +11,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.knowledge import is_armed, is_structure, is_worker, knowledge
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Army, ArmyPart, Toll
@@ -62,8 +62,8 @@ def toll(chronicle: Chronicle, log: Sequence[Entry], since_loop: int) -> Toll:
     events = [event for entry in log for event in entry.events if event.what == "died"]
     return Toll(
         since_s=round((chronicle.loop - since_loop) / LOOPS_PER_S, 1),
-        lost=_sorted(event.type for event in events if event.alliance == "own"),
-        killed=_sorted(event.type for event in events if event.alliance == "enemy"),
+        lost=_counts(event.type for event in events if event.alliance == "own"),
+        killed=_counts(event.type for event in events if event.alliance == "enemy"),
     )
 
 
@@ -89,7 +89,7 @@ def _at(unit: Unit) -> _Seen:
     return _Seen(unit, unit.pos.x, unit.pos.y)
 
 
-def _sorted(names: Iterable[str]) -> dict[str, int]:
+def _counts(names: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(names).items()))
 
 
@@ -98,11 +98,11 @@ def _sorted(names: Iterable[str]) -> dict[str, int]:
 
 def _parts(scene: SideScene, places: Places, units: Sequence[_Seen]) -> list[ArmyPart]:
     """Return units by place, those between places by nearness; the most valuable part first."""
-    parts = [_part(scene, name, group) for name, group in _grouped(places, units)]
+    parts = [_part(scene, name, group) for name, group in _group(places, units)]
     return sorted(parts, key=lambda part: (-part.value, part.minimap))
 
 
-def _grouped(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen]]]:
+def _group(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen]]]:
     named: dict[str, list[_Seen]] = {}
     loose: list[tuple[str, list[_Seen]]] = []
     for unit in units:
@@ -119,8 +119,8 @@ def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
     x, y = (sum(values) / len(group) for values in ([one.x for one in group], [one.y for one in group]))
     return ArmyPart(
         place=name,
-        minimap=rounded(scene.world.minimap(x, y), scene.world.minimap_size),
-        units=_sorted(one.unit.name for one in group),
+        minimap=to_tenth(scene.world.minimap(x, y), scene.world.minimap_size),
+        units=_counts(one.unit.name for one in group),
         doing=_doing(scene, [one.unit for one in group]),
         value=round(sum(_value(one.unit) for one in group)),
         unseen_s=round(min(one.unseen_s for one in group), 1),
@@ -171,7 +171,7 @@ def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[Arm
     ]
     halls = [hall.pos for hall in land_of(scene.snapshot).own_halls]
     parts = []
-    for name, group in _grouped(places, found):
+    for name, group in _group(places, found):
         away = min((math.dist((one.x, one.y), hall) for one in group for hall in halls), default=None)
         parts.append(_part(scene, name, group).but(away=None if away is None else round(away)))
     return sorted(parts, key=lambda part: (part.away or 0.0, part.minimap))

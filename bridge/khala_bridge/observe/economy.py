@@ -32,7 +32,7 @@ def economy(scene: SideScene, chronicle: Chronicle) -> Economy:
     return Economy(
         income=(round(minerals), round(vespene)),
         spending=_spending(chronicle),
-        gatherers=(_assigned(halls), _assigned(gas), sum(is_worker(u.name) and not u.orders for u in own)),
+        gatherers=(_harvesters(halls), _harvesters(gas), sum(is_worker(u.name) and not u.orders for u in own)),
         room=(_ideal(halls), _ideal(gas)),
         supply_coming=coming,
         full_in_s=_full_in_s(chronicle, min(MOST_SUPPLY, player.food_cap + coming) - player.food_used),
@@ -40,7 +40,7 @@ def economy(scene: SideScene, chronicle: Chronicle) -> Economy:
     )
 
 
-def _assigned(structures: Iterable[Unit]) -> int:
+def _harvesters(structures: Iterable[Unit]) -> int:
     return sum(unit.assigned_harvesters for unit in structures)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.auto.places import is_held
 from khala_bridge.knowledge import is_structure
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.observe.scene import on_screen, screen_of
 from khala_bridge.state.ground import land_of
@@ -70,7 +70,7 @@ def _base(
     if nearest is not None:
         far = _nearest(place, own)
         about = f"{far:.0f} from your nearest base" if math.isfinite(far) else ""
-        middle = rounded(scene.world.minimap(*place), scene.world.minimap_size)
+        middle = to_tenth(scene.world.minimap(*place), scene.world.minimap_size)
         yield _landmark("base place", nearest, None, about).but(minimap=middle)
 
 

@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.observe import army, economy, landmarks, side
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.changes import Changes
 from khala_bridge.observe.chronicle import Chronicle
 from khala_bridge.observe.feedback import Feedback
@@ -216,7 +216,7 @@ class _Moment:
         time_s = round(self.snapshot.game_loop / LOOPS_PER_S, 3)
         for team in (team for teams in self.teams.values() for team in teams if team.config.stages):
             head = self.snapshot.units[team.head].pos if team.tags else None
-            middle = rounded(world.minimap(*head), world.minimap_size) if head else None
+            middle = to_tenth(world.minimap(*head), world.minimap_size) if head else None
             self.tasks[team.agent, team.name] = self.episode.stages.task(team, middle, time_s)
 
     @cached_property

@@ -24,7 +24,7 @@ from khala_bridge.auto.aims import aim_of
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, Camera
 from khala_bridge.observe.arguments import Around
-from khala_bridge.observe.body import body, rounded
+from khala_bridge.observe.body import body, to_tenth
 from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.looks import BodyArrays, looks
 from khala_bridge.observe.observation import TeamObservation
@@ -82,7 +82,7 @@ class SideScene:
         members = [[index[tag] for tag in tags] for tags in self._teams.values()]
         heads = [self._order[rows[0]] for rows in members]
         cameras = [Camera(head.x, head.y, self._screen_size) for head in heads]
-        return dict(zip(self._teams, looks(_arranged(self._order), cameras, members), strict=True))
+        return dict(zip(self._teams, looks(_arrays(self._order), cameras, members), strict=True))
 
     @functools.cached_property
     def resources(self) -> tuple[Body, ...]:
@@ -138,7 +138,7 @@ class SideScene:
         bodies = [self._order[row] for row in members.rows]
         around = Around(self.world, camera, self._aims(foes.rows), self._aims([*friends.rows, *members.rows]))
         view = _team_view(team.name, bodies[0].view.minimap, self.possible.for_team(agent, bodies, around)).but(
-            units=self._skilled(agent, bodies, self._units(members, "own")),
+            units=self._add_skills(agent, bodies, self._units(members, "own")),
             allies=self._units(friends, "ally"),
             enemies=self._units(foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
@@ -170,7 +170,7 @@ class SideScene:
             units.append(view.having(values))
         return tuple(units)
 
-    def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
+    def _add_skills(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
         """Return the units of a team, each with the skills that it can use now and those that only others can."""
         skills = [self.possible.skills(agent, body) for body in bodies]
         ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
@@ -184,7 +184,7 @@ class SideScene:
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
 
-def _arranged(order: Sequence[Body]) -> BodyArrays:
+def _arrays(order: Sequence[Body]) -> BodyArrays:
     """Return bodies as arrays."""
     ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
     foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
@@ -214,7 +214,7 @@ def on_screen(camera: Camera, seen: Body) -> bool:
 
 def screen_of(camera: Camera, seen: Body) -> Point:
     """Return the screen position of a body, to a tenth of a cell."""
-    return rounded(camera.screen(seen.x, seen.y), camera.size)
+    return to_tenth(camera.screen(seen.x, seen.y), camera.size)
 
 
 def _edges(bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:

@@ -12,7 +12,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from khala_bridge.knowledge import abilities, is_structure, knowledge
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING
 from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeCount, WarpGates
 
@@ -148,4 +148,4 @@ def warp_gates(scene: SideScene) -> WarpGates | None:
 
 def _middle(scene: SideScene, bodies: Sequence[Body]) -> Point:
     x, y = (sum(values) / len(bodies) for values in ([b.x for b in bodies], [b.y for b in bodies]))
-    return rounded(scene.world.minimap(x, y), scene.world.minimap_size)
+    return to_tenth(scene.world.minimap(x, y), scene.world.minimap_size)

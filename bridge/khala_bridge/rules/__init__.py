@@ -5,10 +5,10 @@
     of_team(why), of_side(why)          in a refusal, of a team's units or of the whole side
     ledger.pay(price_of(facts))         what a use costs, taken from the accounts of a turn
 
-Functions of plain values (`SideState`, `UnitState`, `Ledger`) that `khala_bridge.state.means` reads from a snapshot; nothing
-here knows the SC2 API. Above are `khala_bridge.observe`, which offers actions, `khala_bridge.act`, which refuses them,
-and `khala_bridge.auto`, which finds the host's orders; below is `khala_bridge.knowledge`. Places and targets are not
-judged here: they need the ground.
+Functions of plain values (`SideState`, `UnitState`, `Ledger`) that `khala_bridge.state.means` reads from a snapshot;
+nothing here knows the SC2 API. Above are `khala_bridge.observe`, which offers actions, `khala_bridge.act`, which
+refuses them, and `khala_bridge.auto`, which finds the host's orders; below is `khala_bridge.knowledge`. Places and
+targets are not judged here: they need the ground.
 """
 
 from khala_bridge.rules.cost import Cost, Shortfall, cases, facts_for, is_free, price_of

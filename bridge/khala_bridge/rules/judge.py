@@ -167,7 +167,7 @@ def _lacks(need: str, researched: Collection[str]) -> bool:
 def _unfinished(case: _Case) -> Unavailable | None:
     """Return a reason if it is unfinished."""
     unit = case.unit
-    return None if unit.finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
+    return None if unit.is_finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
 
 
 def _research(case: _Case) -> Unavailable | None:

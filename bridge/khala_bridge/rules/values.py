@@ -38,7 +38,7 @@ class UnitState(NamedTuple):
     """Whether it has no orders except to gather."""
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """True if its construction is finished."""
         return self.progress >= FINISHED
 
@@ -72,7 +72,7 @@ class SideState:
     @functools.cached_property
     def standing(self) -> frozenset[str]:
         """Types of the finished units and structures."""
-        return frozenset(unit.type for unit in self.units.values() if unit.finished)
+        return frozenset(unit.type for unit in self.units.values() if unit.is_finished)
 
     @functools.cached_property
     def able(self) -> frozenset[int] | None:

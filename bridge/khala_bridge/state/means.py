@@ -42,7 +42,7 @@ def side_of(snapshot: Snapshot) -> SideState:
 def ledger_of(snapshot: Snapshot) -> Ledger:
     """Return the accounts at the beginning of a joint action."""
     common = snapshot.player
-    minerals, vespene = _planned(snapshot)
+    minerals, vespene = _plan_costs(snapshot)
     return Ledger(
         max(common.minerals - minerals, 0.0),
         max(common.vespene - vespene, 0.0),
@@ -75,7 +75,7 @@ def _gathers(ability: int) -> bool:
     return ability in wanted or general(ability) in wanted
 
 
-def _planned(snapshot: Snapshot) -> tuple[float, float]:
+def _plan_costs(snapshot: Snapshot) -> tuple[float, float]:
     """Return the minerals and vespene for structures that workers are on their way to build."""
     if not any(_builds(ability) for ability in side_of(snapshot).ordered):
         return 0.0, 0.0

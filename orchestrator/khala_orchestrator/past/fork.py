@@ -255,7 +255,7 @@ def _write(
                     key = agent_key(config.run, one.side, one.agent, Topic.MESSAGE)
                     recorder.write(key, encode(one), log_time_ns=sample.log_time_ns)
                 message = _having_heard(message, heard)
-            payload = sample.payload if message is None else encode(_renamed(message, config.run))
+            payload = sample.payload if message is None else encode(_rename(message, config.run))
             recorder.write(_key(sample.key, config.run), payload, log_time_ns=sample.log_time_ns)
 
 
@@ -285,7 +285,7 @@ def _having_heard(report: Report, advice: Sequence[Message]) -> Report:
     )
 
 
-def _renamed(message: Wire, run: str) -> Wire:
+def _rename(message: Wire, run: str) -> Wire:
     """Return a message as it would be in a match of one episode under this name."""
     changes: dict[str, object] = {"run": run}
     if hasattr(message, "episode"):

@@ -159,7 +159,7 @@ class Gathering:
 
     def speech(self) -> Speech:
         """Return what counts of it."""
-        repeated = self._repeated()
+        repeated = self._repeats()
         said: list[Item] = []
         mentioned: list[Call] = []
         for found in self._found:
@@ -180,7 +180,7 @@ class Gathering:
             mentions=tuple(mentioned),
         )
 
-    def _repeated(self) -> set[tuple[ReplySection, int]]:
+    def _repeats(self) -> set[tuple[ReplySection, int]]:
         """Return the blocks that repeat an earlier one under the same heading (rule S27)."""
         if len(set(self._titles)) == len(self._titles):
             return set()

@@ -146,7 +146,7 @@ def replies(case: Case, stage: Stage, observation: SideObservation) -> Iterator[
     named = [hex(stage.caster)]
     if case.action.subject == "two_units":
         named.append(hex(next(tag for tag in team.tags if tag != stage.caster)))
-    named = named[: case.action.named]
+    named = named[: case.action.actor_count]
     for target in _targets(case.action, stage, team, observation):
         yield f"Actions:\n    Team {team.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
 

@@ -65,7 +65,7 @@ def idle(lab: Lab) -> Samples:
     unit="world units",
     exact=False,
 )
-def engaged(lab: Lab) -> Samples:
+def engage(lab: Lab) -> Samples:
     """Let a Marine fire at a structure, and six Marines walk through it."""
     places = lab.ground.places(24, 10)[:8]
     puts = []
@@ -257,4 +257,4 @@ def firing_line(lab: Lab) -> Samples:
         lab.clear()
 
 
-PROBES = (idle, engaged, crossing, arrival, hover, gap, surround, firing_line)
+PROBES = (idle, engage, crossing, arrival, hover, gap, surround, firing_line)

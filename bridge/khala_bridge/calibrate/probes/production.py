@@ -46,7 +46,7 @@ def unit(lab: Lab) -> Samples:
                 else:
                     lab.kill(maker)  # a Gateway that has begun to become a Warp Gate; the next one may be in time
         counts = {kind: len(lab.of(kind)) for kind in begun}
-        yield from _finished(lab, begun, _is_there(lab, counts))
+        yield from _loops_until_done(lab, begun, _is_there(lab, counts))
         lab.clear()
         _produce(lab)
 
@@ -81,7 +81,7 @@ def _batches(lab: Lab, kinds: Sequence[str]) -> list[tuple[Sequence[str], list[P
     return [(kinds[i : i + len(places)], places) for i in range(0, len(kinds), len(places))]
 
 
-def _finished(lab: Lab, begun: dict[str, tuple[int, int]], is_done: Callable[[str, int], bool]) -> Samples:
+def _loops_until_done(lab: Lab, begun: dict[str, tuple[int, int]], is_done: Callable[[str, int], bool]) -> Samples:
     """Yield the loops until each is done, from its own beginning; what is not by the longest time is left out."""
     end = lab.loop + _LONGEST_LOOPS
     while begun and lab.loop < end:
@@ -166,7 +166,7 @@ def research(lab: Lab) -> Samples:
             for name, maker in zip(batch, makers[::2], strict=False)
             if lab.order(wanted[name].ability, maker)
         }
-        yield from _finished(lab, begun, lambda _, maker: not lab.units[maker].orders)
+        yield from _loops_until_done(lab, begun, lambda _, maker: not lab.units[maker].orders)
         lab.clear()
         _produce(lab)
 

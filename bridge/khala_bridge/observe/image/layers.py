@@ -144,7 +144,7 @@ LAYERS: dict[str, FeatureLayer] = {
         FeatureLayer("height_map", _heights, "scalar", "height of the ground, light is high"),
         FeatureLayer("visibility_map", _sight, "categorical", "what is seen", _SIGHT),
         _switch("creep", _of_land(lambda m: m.land.creep), "creep", "no creep", "creep"),
-        _switch("power", _of_land(lambda m: m.land.powered(corner=False)), "power fields", "no power", "power"),
+        _switch("power", _of_land(lambda m: m.land.power_cells(corner=False)), "power fields", "no power", "power"),
         _switch("pathable", _of_land(lambda m: m.land.open), "where one can walk", "blocked", "walkable"),
         _switch("buildable", _of_land(lambda m: m.land.free), "where one can build", "not free", "buildable"),
         FeatureLayer(
@@ -198,32 +198,32 @@ _MOST = frozenset(
 # --- colours ------------------------------------------------------------------------------------------------
 
 
-def coloured(layer: FeatureLayer, values: Cells) -> Image:
+def colour(layer: FeatureLayer, values: Cells) -> Image:
     """Return the picture of a layer's values."""
     table = np.zeros((256, 3), np.uint8)
     if layer.kind == "scalar":
-        return _graded(layer, values)
+        return _shade(layer, values)
     if layer.kind == "types":
-        return _mapped(np.where(values, values % 254 + 1, 0), _hues())
+        return _apply_table(np.where(values, values % 254 + 1, 0), _hues())
     table[:] = _DARK
     for value, _, colour in layer.colours:
         table[value] = colour
-    return _mapped(np.clip(values, 0, 255), table)
+    return _apply_table(np.clip(values, 0, 255), table)
 
 
-def _mapped(values: Cells, table: Image) -> Image:
+def _apply_table(values: Cells, table: Image) -> Image:
     """Return an image with the numbers replaced by the colours of a table, (256, 3)."""
     return np.asarray(cv2.applyColorMap(values.astype(np.uint8), table[:, None]), np.uint8)
 
 
-def _graded(layer: FeatureLayer, values: Cells) -> Image:
+def _shade(layer: FeatureLayer, values: Cells) -> Image:
     """Return values as shades from dark to light, over their range in the picture or in the layer."""
     low, high = 0, 255
     if layer.name in _MOST:
         high = max(int(values.max()), 1)
     elif layer.name == "height_map" and int(values.max()) - int(values.min()) >= _CLIFF // 2:
         low, high = int(values.min()), int(values.max())
-    image = _mapped(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
+    image = _apply_table(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
     if layer.name != "height_map":
         image[values == 0] = _DARK  # 0 stands for nothing
     return image

@@ -167,7 +167,7 @@ def render(page: Page, sections: Sequence[Section], budget: int | None = None) -
     """
     blocks = [_block(section.write, page) for section in sections]
     if budget is not None:
-        blocks = _shortened(page, sections, blocks, budget)
+        blocks = _shorten(page, sections, blocks, budget)
     return _BETWEEN.join(block for block in blocks if block) + "\n"
 
 
@@ -175,7 +175,7 @@ def _block(write: Write, page: Page) -> str:
     return "\n".join(write(page))
 
 
-def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
+def _shorten(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
     """Return the blocks with as many shorter forms as needed, in the order of ranks, and a notice of the rest."""
     costs = [tokens(block + _BETWEEN) for block in blocks]
     missing: dict[str, str] = {}
