@@ -152,7 +152,7 @@ def files_of(directory: Path, *names: str) -> TlsFiles:
 def _check_empty(directory: Path) -> None:
     """Raise ConfigError if there are certificates, which a new authority would make worthless."""
     if found := certificates(directory):
-        names = ", ".join(sorted({one.name for one in found}))
+        names = ", ".join(sorted({certificate.name for certificate in found}))
         raise ConfigError(
             f"holds certificates ({names}) and not the key of their authority, ca/key.pem: put it back, or make new "
             "ones for all in another directory",

@@ -112,7 +112,7 @@ class IdleGames:
         """See `Processes`; the one that has waited least."""
         while True:
             with self._lock:
-                found = next((one for one in reversed(self._idle) if one[0] == sc2path), None)
+                found = next((idle for idle in reversed(self._idle) if idle[0] == sc2path), None)
                 if found is None:
                     return None
                 self._idle.remove(found)

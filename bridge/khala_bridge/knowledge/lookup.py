@@ -41,11 +41,11 @@ def find(name: str, version: str = VERSION) -> list[Known]:
     everything: list[Known] = [
         *knowledge(version).values(), *upgrades(version).values(), *abilities(version).values()
     ]  # fmt: skip
-    found = [one for one in everything if _plain(one.name) == wanted]
+    found = [facts for facts in everything if _plain(facts.name) == wanted]
     found += [ability for ability in abilities(version).values() if str(ability.id) == name.strip()]
     if found:
         return found
-    plain = {_plain(one.name): one.name for one in everything if one.melee}
+    plain = {_plain(facts.name): facts.name for facts in everything if facts.melee}
     near = [plain[name] for name in difflib.get_close_matches(wanted, plain, n=3)]
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
     raise NotKnown(f"nothing in version {version} of the game is called '{name}'{hint}")

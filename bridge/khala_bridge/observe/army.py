@@ -116,14 +116,14 @@ def _group(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen
 
 
 def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
-    x, y = (sum(values) / len(group) for values in ([one.x for one in group], [one.y for one in group]))
+    x, y = (sum(values) / len(group) for values in ([seen.x for seen in group], [seen.y for seen in group]))
     return ArmyPart(
         place=name,
         minimap=to_tenth(scene.world.minimap(x, y), scene.world.minimap_size),
-        units=_counts(one.unit.name for one in group),
-        doing=_doing(scene, [one.unit for one in group]),
-        value=round(sum(_value(one.unit) for one in group)),
-        unseen_s=round(min(one.unseen_s for one in group), 1),
+        units=_counts(seen.unit.name for seen in group),
+        doing=_doing(scene, [seen.unit for seen in group]),
+        value=round(sum(_value(seen.unit) for seen in group)),
+        unseen_s=round(min(seen.unseen_s for seen in group), 1),
     )
 
 
@@ -172,7 +172,7 @@ def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[Arm
     halls = [hall.pos for hall in land_of(scene.snapshot).own_halls]
     parts = []
     for name, group in _group(places, found):
-        away = min((math.dist((one.x, one.y), hall) for one in group for hall in halls), default=None)
+        away = min((math.dist((seen.x, seen.y), hall) for seen in group for hall in halls), default=None)
         parts.append(_part(scene, name, group).but(away=None if away is None else round(away)))
     return sorted(parts, key=lambda part: (part.away or 0.0, part.minimap))
 

@@ -62,7 +62,8 @@ class Events:
         if gone := old.difference(now.own, now.allies, now.enemies):
             units = (unit for unit in chain(before.units, before.allies, before.enemies) if unit.tag in gone)
             ends = [(self._end_of(unit), unit) for unit in units]
-            found += [_event(end, one, one.alliance) for end, one in ends if end == "died" or one.alliance != "ally"]
+            news = ((end, unit) for end, unit in ends if end == "died" or unit.alliance != "ally")
+            found += [_event(end, unit, unit.alliance) for end, unit in news]
         return tuple(found)
 
     def _end_of(self, unit: UnitView) -> EventKind:

@@ -210,8 +210,8 @@ class Turn:
             asked.append(await self._publish(question, began))
             publish_s += now() - began
         began = now()
-        for one in asked:
-            one.wait_until_answered(began)
+        for open_question in asked:
+            open_question.wait_until_answered(began)
         if wait:
             await self._wait()
         wait_s = now() - began

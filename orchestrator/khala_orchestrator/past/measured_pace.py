@@ -68,7 +68,8 @@ def least_squares(columns: Floats, wanted: Floats) -> Floats:
     number = columns.shape[1]
     choices = (c for size in range(number + 1) for c in itertools.combinations(range(number), size))
     tried = (_least_squares(columns, wanted, list(chosen)) for chosen in choices)
-    return min((one for one in tried if one.min() >= 0), key=lambda one: float(((columns @ one - wanted) ** 2).sum()))
+    possible = (solution for solution in tried if solution.min() >= 0)
+    return min(possible, key=lambda solution: float(((columns @ solution - wanted) ** 2).sum()))
 
 
 def _least_squares(columns: Floats, wanted: Floats, chosen: list[int]) -> Floats:

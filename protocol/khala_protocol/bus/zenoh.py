@@ -336,9 +336,9 @@ class _Held:
         """
         self._declared.difference_update(declared)
         if not self.closed:
-            for one in reversed(declared):  # a listener goes before what it listens to
-                if not isinstance(one, AdvancedPublisher):
-                    one.undeclare()
+            for handle in reversed(declared):  # a listener goes before what it listens to
+                if not isinstance(handle, AdvancedPublisher):
+                    handle.undeclare()
 
 
 class _Publisher:

@@ -171,8 +171,8 @@ def hover(lab: Lab) -> Samples:
         tags = lab.make(*(Put(kind, place) for place in places for _ in range(2)))
         for loops, since in ((8, 8), (32, 24), (128, 96)):
             lab.step(since)
-            for one, other in zip(tags[::2], tags[1::2], strict=True):
-                yield f"{kind} after {loops}", math.dist(lab.at(one), lab.at(other))
+            for left, right in zip(tags[::2], tags[1::2], strict=True):
+                yield f"{kind} after {loops}", math.dist(lab.at(left), lab.at(right))
         lab.clear()
 
 

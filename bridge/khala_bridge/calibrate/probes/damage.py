@@ -40,10 +40,10 @@ def pair(lab: Lab) -> Samples:
     ]
     for pairs in stage(lab, wanted):
         firing = attack(lab, pairs)
-        for one, found in hits(lab, firing, _WAIT_LOOPS).items():
+        for pair, found in hits(lab, firing, _WAIT_LOOPS).items():
             if found:
-                end = found[0][0] + 0.5 * period_loops(lab, one.kind)
-                yield f"{one.kind} > {one.against}", sum(lost for loop, lost in found if loop <= end)
+                end = found[0][0] + 0.5 * period_loops(lab, pair.kind)
+                yield f"{pair.kind} > {pair.against}", sum(lost for loop, lost in found if loop <= end)
 
 
 @probe(

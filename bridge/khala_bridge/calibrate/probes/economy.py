@@ -101,7 +101,8 @@ def share(lab: Lab) -> Samples:
         _workers(lab, [_fields(lab)[0]] * count)
         lab.step(_WARM_UP)
         found = _deliveries(lab, 16)
-        yield from ((f"{count} workers", (one + other) / 2) for one, other in zip(found[::2], found[1::2], strict=True))
+        pairs = zip(found[::2], found[1::2], strict=True)
+        yield from ((f"{count} workers", (first + second) / 2) for first, second in pairs)
         lab.clear()
 
 
@@ -138,7 +139,7 @@ def gas(lab: Lab) -> Samples:
         lab.step(_WARM_UP)
         found = _deliveries(lab, 16, vespene=True)
         yield from (
-            (f"{count} workers", (one + other) / 2) for one, other in zip(found[::2], found[1::2], strict=False)
+            (f"{count} workers", (first + second) / 2) for first, second in zip(found[::2], found[1::2], strict=False)
         )
         lab.clear()
 

@@ -123,12 +123,12 @@ def structure(lab: Lab) -> Samples:
         begun = lab.loop
         for _ in range(2400):
             lab.step()
-            for tag, one in lab.units.items():
+            for tag, unit in lab.units.items():
                 if (
                     tag not in old
                     and tag not in seen
-                    and one.build_progress < 1
-                    and lab.name_of.get(one.unit_type) in batch
+                    and unit.build_progress < 1
+                    and lab.name_of.get(unit.unit_type) in batch
                 ):
                     seen[tag] = lab.loop
             for tag in [tag for tag in seen if tag in lab.units and lab.units[tag].build_progress >= 1]:
@@ -150,11 +150,11 @@ def structure(lab: Lab) -> Samples:
 def research(lab: Lab) -> Samples:
     """Give each a laboratory of its own; levels above the first are left out, for they must follow it."""
     wanted = {
-        name: one
-        for name, one in upgrade_facts(VERSION).items()
-        if one.melee and one.at and one.ability and not name.endswith(("Level2", "Level3"))
+        name: facts
+        for name, facts in upgrade_facts(VERSION).items()
+        if facts.melee and facts.at and facts.ability and not name.endswith(("Level2", "Level3"))
     }
-    names = [name for name, one in wanted.items() if lab.has(one.at[0])]
+    names = [name for name, facts in wanted.items() if lab.has(facts.at[0])]
     _produce(lab)
     for batch, places in _batches(lab, names):
         puts = []
@@ -217,13 +217,13 @@ def regeneration(lab: Lab) -> Samples:
                         "Queen", "Medivac", "Raven", "Sentry", "Infestor", "Viper"))  # fmt: skip
     tags = lab.make(*(Put(kind, at) for kind, at in zip(kinds, lab.ground.places(8, 6), strict=False)))
     for kind, tag in zip(kinds, tags, strict=False):
-        one = fact(kind)
-        if one.shield:
+        facts = fact(kind)
+        if facts.shield:
             lab.set(tag, Shields=1.0)
-        if one.energy:
+        if facts.energy:
             lab.set(tag, Energy=20.0)
-        if one.race == "zerg":
-            lab.set(tag, Life=one.health / 2)
+        if facts.race == "zerg":
+            lab.set(tag, Life=facts.health / 2)
     lab.step(16)
     before = {tag: lab.units[tag] for tag in tags}
     lab.step(224)

@@ -48,8 +48,8 @@ def period(lab: Lab) -> Samples:
         firing = attack(lab, pairs)
         for pair, found in hits(lab, firing, 14 * 40, refill=True).items():
             begun = shots(found, 0.5 * period_loops(lab, pair.kind))
-            for one, other in islice(pairwise(begun[1:]), _SHOTS):
-                yield pair.kind, other - one
+            for shot, next_shot in islice(pairwise(begun[1:]), _SHOTS):
+                yield pair.kind, next_shot - shot
 
 
 @probe(
