@@ -54,7 +54,7 @@ class Vocabulary:
     def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
         """Return the actions that some teams have instead of a wrong name, as the end of a sentence."""
         wanted = squash(name)
-        words = _words(name)
+        words = _split(name)
         known = list(self._sayable(list(teams)))
         likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
         ranked = sorted(known, key=lambda action: -likeness[action.name])[:NEAREST]
@@ -85,7 +85,7 @@ def _likeness(pairs: frozenset[str], words: frozenset[str], known: str) -> float
     """Return the likeness of two names: by pairs of letters (Dice's coefficient), and by common words."""
     its_pairs = _pairs(squash(known))
     letters = 2 * len(pairs & its_pairs) / max(len(pairs) + len(its_pairs), 1)
-    return letters + len(words & _words(known)) / max(len(words), 1)
+    return letters + len(words & _split(known)) / max(len(words), 1)
 
 
 @functools.lru_cache(maxsize=8192)
@@ -94,5 +94,5 @@ def _pairs(name: str) -> frozenset[str]:
 
 
 @functools.lru_cache(maxsize=8192)
-def _words(name: str) -> frozenset[str]:
+def _split(name: str) -> frozenset[str]:
     return frozenset(name.replace("-", "_").casefold().split("_"))

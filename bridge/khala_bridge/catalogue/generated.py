@@ -104,7 +104,7 @@ def _of_function(function: Function, form: Form, like: Action | None) -> Action:
     return Action(
         name=function.stem + form.ending,
         args=form.args,
-        about=like.about if like and not facts.about else f"{_words(function, facts)} {form.remark}".strip(),
+        about=like.about if like and not facts.about else f"{_description(function, facts)} {form.remark}".strip(),
         group=GROUP,
         race=_race(units),
         subject="side" if research else "team",
@@ -179,7 +179,7 @@ def _race(users: tuple[str, ...]) -> Literal["protoss", "terran", "zerg"] | None
     return None if found == "neutral" else found
 
 
-def _words(function: Function, facts: AbilityFacts) -> str:
+def _description(function: Function, facts: AbilityFacts) -> str:
     """Return the description of an ability, or one made from its name."""
     if facts.about:
         return facts.about

@@ -68,7 +68,7 @@ def _plain(name: str) -> str:
 
 def _unit(kind: UnitFacts, version: str) -> list[str]:
     out = [f"{kind.name} ({'structure' if kind.structure else 'unit'}, {kind.race}, id {kind.id})"]
-    out += _told(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
+    out += _indent(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
     out += [INDENT + prompt.body(kind) + f", sight {n(kind.sight)}"]
     out += [INDENT + prompt.weapon(weapon) for weapon in kind.weapons]
     out += [INDENT + said for said in _making(kind)]
@@ -120,7 +120,7 @@ def _relations(kind: UnitFacts) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 def _upgrade(upgrade: UpgradeFacts, version: str) -> list[str]:
     out = [f"{upgrade.name} (upgrade, {upgrade.race or 'no race'}, id {upgrade.id})"]
-    out += _told(upgrade.about, "" if upgrade.melee else "Not in melee games.")
+    out += _indent(upgrade.about, "" if upgrade.melee else "Not in melee games.")
     if upgrade.at:
         needs = f"; needs {join_names(upgrade.requires)}" if upgrade.requires else ""
         cost = price(upgrade.minerals, upgrade.vespene)
@@ -135,7 +135,7 @@ def _upgrade(upgrade: UpgradeFacts, version: str) -> list[str]:
 
 def _ability(ability: AbilityFacts) -> list[str]:
     out = [f"{ability.name} ({'general ' if ability.special else ''}ability {ability.id})"]
-    out += _told(ability.about, "" if ability.melee else "Not in melee games.")
+    out += _indent(ability.about, "" if ability.melee else "Not in melee games.")
     out += [f"{INDENT}{what}: {said}" for what, said in _terms(ability) if said]
     if ability.figures:
         out.append(f"{INDENT}Numbers: " + ", ".join(f"{what} {value:g}" for what, value in ability.figures.items()))
@@ -163,5 +163,5 @@ def _terms(ability: AbilityFacts) -> Iterator[tuple[str, str]]:
     yield "A case of", str(ability.general or "")
 
 
-def _told(*sentences: str) -> list[str]:
+def _indent(*sentences: str) -> list[str]:
     return [INDENT + sentence for sentence in sentences if sentence]

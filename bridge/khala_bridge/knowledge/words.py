@@ -115,10 +115,10 @@ def _needs(ability: AbilityFacts) -> str:
 
 def _makes(ability: AbilityFacts) -> str:
     product = str(ability.produces)
-    return f"{ability.count} {product}s" if ability.count > 1 else _one(product)
+    return f"{ability.count} {product}s" if ability.count > 1 else _with_article(product)
 
 
-def _one(name: str) -> str:
+def _with_article(name: str) -> str:
     return f"{'an' if name[0] in 'AEIOU' or name == 'SCV' else 'a'} {name}"
 
 

@@ -50,8 +50,8 @@ def army(scene: SideScene, places: Places, chronicle: Chronicle) -> Army:
     goals = {unit.tag: goal for unit in scene.snapshot.own if (goal := _scouting(scene, unit)) is not None}
     scouts = [unit for unit in scene.snapshot.own if unit.tag in goals]
     return Army(
-        parts=tuple(_parts(scene, places, [_at(unit) for unit in own])),
-        scouts=tuple(_parts(scene, places, [_at(unit) for unit in scouts])),
+        parts=tuple(_parts(scene, places, [_as_seen(unit) for unit in own])),
+        scouts=tuple(_parts(scene, places, [_as_seen(unit) for unit in scouts])),
         enemies=tuple(_enemies(scene, places, chronicle)),
         value=round(sum(map(_value, own))),
     )
@@ -85,7 +85,7 @@ def _value(unit: Unit) -> float:
     return known.value if known else 0.0
 
 
-def _at(unit: Unit) -> _Seen:
+def _as_seen(unit: Unit) -> _Seen:
     return _Seen(unit, unit.pos.x, unit.pos.y)
 
 

@@ -121,12 +121,14 @@ class Chronicle:
         before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
         new = self._new_enemies(snapshot)
         killed = self._kills(snapshot.dead)
-        made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if self._is_new(unit, before.get(tag))]
+        built = (unit for tag, unit in self._own.items() if self._is_new(unit, before.get(tag)))
+        made = [_event(unit, "finished", "own") for unit in built]
         events: tuple[Event, ...] = ()
         if self.number:
             learnt = [name for name in snapshot.upgrades if name not in self._upgrades]
             researched = [Event(what="researched", tag="", type=name, alliance="own") for name in learnt]
-            lost = [_of(unit, "died", "own") for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit)]
+            gone = (unit for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit))
+            lost = [_event(unit, "died", "own") for unit in gone]
             events = (*made, *researched, *lost, *killed, *new)
         self._upgrades = frozenset(snapshot.upgrades)
         fallen = tuple(before[tag] for tag in sorted(snapshot.dead & before.keys()))
@@ -162,7 +164,7 @@ class Chronicle:
             if not unit.is_enemy or unit.name in PASSING or unit.is_hallucination:
                 continue
             if tag not in self._enemies:
-                new.append(_of(unit, "appeared", "enemy"))
+                new.append(_event(unit, "appeared", "enemy"))
             self._enemies[tag] = Sighting(unit, self.number, snapshot.game_loop)
         return new
 
@@ -172,7 +174,7 @@ class Chronicle:
             known = self._enemies[tag]
             if not known.dead:
                 known.dead = True
-                killed.append(_of(known.unit, "died", "enemy"))
+                killed.append(_event(known.unit, "died", "enemy"))
         return killed
 
     @property
@@ -200,7 +202,7 @@ class Chronicle:
         )
 
 
-def _of(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
+def _event(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
     return Event(what=what, tag=hex(unit.tag), type=unit.name, alliance=alliance)
 
 

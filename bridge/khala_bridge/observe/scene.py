@@ -6,9 +6,25 @@ with a position outside of the frame if the camera does not reach them; everythi
 (resources, rocks) and larvae are left out; builders get resources apart. A team without units of its own, which
 orders units of the whole side, has no camera and sees nothing.
 
-The common part of all teams is made once per scene, and arrays find the units on a screen, since a dozen teams look
-at a hundred units in each step. `khala_bridge.observe.side` makes views of the whole side, `khala_bridge.observe.text`
-the words; `khala_bridge.observe.observer` is above.
+A dozen teams look at a hundred units in each step, so the work has this order:
+
+1. Each unit in sight but the neutral ones becomes a `Body`, once. Its place in ascending order of tags is its *row*.
+2. With the first team that looks, arrays of all bodies and of all cameras give the rows that each team sees: its own
+   units, friends, enemies (`khala_bridge.observe.looks`). Only here are bodies compared with cameras in bulk.
+3. For each team that looks, its rows become unit views: a copy of the body's view with what depends on the team, its
+   side, its place on the screen and its distance. Offers, skills and resources are added.
+4. Events come last: they need the tags that the team witnesses now, and those of its last observation.
+
+Keep in step by hand:
+
+* `bodies`, `views`, `_order`, `_tags`, `_aim` and the arrays of `_arrays` have the same order, that of the rows.
+* `on_screen`, `khala_bridge.frames.sees` and `_shows` in `khala_bridge.act.targets` cut the same square. An agent that
+  is shown a unit may aim at it.
+* `_units` writes fields of `UnitView` by name, unchecked, for speed: a field that is renamed there is renamed here.
+* `screen_of` and `_on_screen` in `khala_bridge.observe.looks` round to the same tenth, within the frame.
+
+`khala_bridge.observe.side` makes views of the whole side, `khala_bridge.observe.text` the words;
+`khala_bridge.observe.observer` is above.
 """
 
 from __future__ import annotations
@@ -145,8 +161,8 @@ class SideScene:
             bounds=_edges(camera.bounds(self.world)),
         )
         witnessed = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
-        happened = events.of_team(before.view, before.witnessed, witnessed) if before else ()
-        return TeamObservation(team, camera, view.but(events=happened), witnessed)
+        news = events.of_team(before.view, before.witnessed, witnessed) if before else ()
+        return TeamObservation(team, camera, view.but(events=news), witnessed)
 
     @functools.cached_property
     def _aim(self) -> list[Aim]:
@@ -165,7 +181,8 @@ class SideScene:
         for row, x, y, distance in zip(*shown, strict=True):
             view = self._order[row].view
             values = view.__dict__.copy()
-            values["alliance"], values["screen"] = alliance, (x, y)
+            values["alliance"] = alliance
+            values["screen"] = (x, y)
             values["distance"] = distance if alliance == "enemy" else None
             units.append(view.having(values))
         return tuple(units)

@@ -280,7 +280,7 @@ class _Walk:
         name = found["name"]
         try:
             if talk:
-                return self._words(name, start, talk.end(), naked=True)
+                return self._read_words(name, start, talk.end(), naked=True)
             if not stands_alone(self._plain, found.end()):
                 self._fault(start, found.end(), name, f"a call stands in angle brackets: write <{name[:SHORT]}(...)>")
             elif is_talk(name):
@@ -313,7 +313,7 @@ class _Walk:
             return self._without_parentheses(start, opening)
         name = opening.name
         if name.lower() in _OF_WORDS:
-            return self._words(name, start, opening.end)
+            return self._read_words(name, start, opening.end)
         inner_end, end = close_parentheses(self._plain, opening)
         inside = self._plain[opening.end : inner_end]
         if is_talk(name):
@@ -349,7 +349,7 @@ class _Walk:
         args = read_arguments(self._plain[start:stop])
         return args if all(not isinstance(arg, str) or arg.startswith("0x") for arg in args) else ()
 
-    def _words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
+    def _read_words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
         """Read a message, a note or a standing order, whose words begin at `at`."""
         if name.lower() in MESSAGE_NAMES:
             return self._message(start, self._messages.read(at, naked=naked))

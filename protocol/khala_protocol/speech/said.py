@@ -187,7 +187,7 @@ class Gathering:
         blocks: dict[tuple[ReplySection, int], list[tuple[object, ...]]] = {}
         for found in self._found:
             if not (found.taken_back or found.in_prose):
-                blocks.setdefault((found.kind, found.block), []).append(_words(found.item))
+                blocks.setdefault((found.kind, found.block), []).append(_content(found.item))
         seen: set[tuple[object, ...]] = set()
         repeated = set()
         for (kind, block), words in blocks.items():
@@ -198,7 +198,7 @@ class Gathering:
         return repeated
 
 
-def _words(item: Item) -> tuple[object, ...]:
+def _content(item: Item) -> tuple[object, ...]:
     """Return the words of an item, without its place."""
     match item:
         case Call():
