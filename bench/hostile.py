@@ -22,7 +22,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,7 @@ import yaml
 from khala_bridge.act import Actor
 from khala_bridge.game.game import GameConfig
 from khala_bridge.game.pysc2_game import PySC2Game
-from khala_bridge.observe import Feedback, Observer, shortened
+from khala_bridge.observe import Feedback, Observer, shorten
 from khala_bridge.observe.text import Page, reply
 from khala_orchestrator.config import load_task
 from khala_orchestrator.roster import Seat
@@ -152,7 +152,7 @@ class Scene:
         seats = {agent.name: Seat(task.side, agent.name) for agent in task.agents}
         reach = {seats[a.name]: [seats[other.name] for other in task.correspondents(a)] for a in task.agents}
         self.mailbox = Mailbox(reach, task.channels)
-        self.words = [team.view.name for seen in observation.agents.values() for team in seen.teams]
+        self.words = [team.name for seen in observation.agents.values() for team in seen.teams]
         self.words += [action.name for agent in self.agents for action in agent.catalogue()]
         self.words += [hex(unit.tag) for unit in observation.snapshot.units.values()]
         self.words += [agent.name for agent in task.agents]
@@ -166,13 +166,13 @@ class Scene:
         for listen in speech.listens:
             self.mailbox.listen(seat, listen.channel)
         post = self.mailbox.deliver(self._message(agent, said.recipient, said.text) for said in speech.messages)
-        rejections = shortened((*joint.rejections[agent], *post.rejections.get(seat, ())))
+        rejections = shorten((*joint.rejections[agent], *post.rejections.get(seat, ())))
         took_s = time.process_time() - began
         lines = {}
         for name in {agent, *(seat.agent for seat in post.received)}:
             own = Feedback(joint.accepted[agent], rejections) if name == agent else Feedback()
             heard = Feedback(own.accepted, own.rejections, post.received.get(Seat(self.task.side, name), ()))
-            page = Page(self.observation.agents[name], self.task, heard)
+            page = Page(replace(self.observation.agents[name], heard=heard), self.task)
             lines[name] = [*reply.last_actions(page), *reply.rejections(page), *reply.messages(page)]
         return took_s, lines
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ROOT: Final = Path(__file__).parent.parent
 PACKAGES: Final = ("khala", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator")
-LIMITS: Final = {"classes": 56, "participles": 262, "one": 145, "packed": 0, "phrases": 0}
+LIMITS: Final = {"classes": 75, "participles": 193, "one": 79, "packed": 133, "phrases": 0}
 PHRASES: Final = (
     r"gone on with", r"who has its \w+ can be", r"what there is of it", r"came to nothing", r"what would have been if",
     r"for whoever", r"comes? to be\b", r"less is nothing", r"hang together", r"nobody is waited for",

@@ -45,7 +45,7 @@ from khala.view.sources import Sources
 from khala_agents.scripted.endpoint import MOST_CONNECTIONS as MOST_OF_ENDPOINT
 from khala_agents.scripted.endpoint import Endpoint
 from khala_orchestrator.config import MatchConfig, load_task
-from khala_protocol.listening import HEAD_S, MOST_CONNECTIONS, Patience, bound
+from khala_protocol.listening import HEAD_S, MOST_CONNECTIONS, Patience, bind
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -110,7 +110,7 @@ class _Uvicorn(uvicorn.Server):
 async def _serve(config: uvicorn.Config) -> AsyncIterator[int]:
     """Serve an ASGI application, and yield the port."""
     server = _Uvicorn(config)
-    with bound("127.0.0.1", 0) as listening:
+    with bind("127.0.0.1", 0) as listening:
         task = asyncio.create_task(server.serve(sockets=[listening]))
         try:
             yield listening.getsockname()[1]
@@ -162,7 +162,7 @@ async def view(directory: Path, *, door: Door | None = None) -> AsyncIterator[Ta
     await runner.setup()
     assert runner.server is not None
     try:
-        with bound("127.0.0.1", 0) as listening:
+        with bind("127.0.0.1", 0) as listening:
             await asyncio.get_running_loop().create_server(Patience(runner.server), sock=listening)
             yield Target(listening.getsockname()[1], f"/api/library?token={door.token}", door=door)
     finally:

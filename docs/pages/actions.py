@@ -120,7 +120,7 @@ def _who(action: Action) -> str:
     more = len(action.units) - SHOWN
     units = ", ".join(action.units[:SHOWN]) + (f" and {more} more" if more > 0 else "")
     subject = SUBJECTS[action.subject]
-    return f"{subject}: {units}" if action.named and units else f"{subject}{units}"
+    return f"{subject}: {units}" if action.actor_count and units else f"{subject}{units}"
 
 
 def _generated(made: list[Action]) -> str:
@@ -159,7 +159,7 @@ def _counts(name: str, rows: list[Coverage]) -> tuple[object, ...]:
 
 
 def _reached(row: Coverage) -> tuple[object, ...]:
-    whole = [name for name in row.actions if catalogue()[name].named == 0]
+    whole = [name for name in row.actions if catalogue()[name].actor_count == 0]
     general = [each.function.stem for each in coverage() if each.function.ability_id == row.function.general_id]
     return (
         row.function.id,

@@ -22,7 +22,7 @@ from khala.experiment.numbers import plain as plain_value
 from khala.playing.environment import plain
 from khala.playing.games import find
 from khala_bridge.calibrate.catalogue import choose
-from khala_bridge.calibrate.connection import started, version
+from khala_bridge.calibrate.connection import run_game, version
 from khala_bridge.calibrate.record import Calibration, Values, load
 from khala_bridge.calibrate.run import play
 from khala_orchestrator.console import stderr_console, stdout_console
@@ -83,7 +83,7 @@ def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume:
     path, name = find(game)
     screen = stderr_console()
     screen.print(f"starting {name} in {path}", soft_wrap=True)
-    with started(path, plain()) as connection:
+    with run_game(path, plain()) as connection:
         said, build, data = version(connection)
         begun = Calibration(
             khala=__version__, game=name, version=said, build=build, data_version=data,

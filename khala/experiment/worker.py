@@ -19,7 +19,7 @@ from khala.playing.local import Supplies
 from khala.playing.local import play as play_with_processes
 from khala_agents.llm.limits import own_turns
 from khala_bridge.game.processes import IdleGames
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.parent_watch import end_with_parent
 from khala_protocol.recording import Recording
@@ -69,7 +69,7 @@ async def played(job: Job, game: str, gates: Gates = own_turns, games: Processes
     """
     try:
         async with asyncio.timeout(job.timeout_s):
-            past = unfinished(Recording.open(job.beginning)) if job.beginning else None
+            past = read_unfinished(Recording.open(job.beginning)) if job.beginning else None
             if job.processes:
                 supplies = Supplies(processes=games)
                 results = await play_with_processes(

@@ -24,7 +24,7 @@ from khala.doors.serving import uvicorn_config
 from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
 from khala_protocol.commandline import say
-from khala_protocol.listening import bound
+from khala_protocol.listening import bind
 from khala_protocol.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ async def over_http(table: Table, port: int) -> None:
             yield
 
     app = Starlette(routes=routes_of(seats), lifespan=running)
-    with bound(HOST, port) as listening:
+    with bind(HOST, port) as listening:
         for seat in seats:
             say(f"{seat.seat}: {seat.address(listening.getsockname()[1])}", err=True)
         server = _Server(uvicorn_config(app, timeout_graceful_shutdown=1))

@@ -11,7 +11,7 @@ from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
-from khala_protocol.listening import bound
+from khala_protocol.listening import bind
 from khala_protocol.trust import trust_named
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def run_openenv(wanted: Wanted) -> None:
         ) from None
     door = openenv_door(wanted.host, is_open=wanted.is_open)
     app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s, door=door)
-    with bound(wanted.host, wanted.port) as listening:
+    with bind(wanted.host, wanted.port) as listening:
         login = f"khala:{door.token}@" if door.token else ""
         say(f"http://{login}{wanted.host}:{listening.getsockname()[1]}", err=True)
         uvicorn.Server(server_config(app, sessions=wanted.sessions, timeout_graceful_shutdown=5)).run(

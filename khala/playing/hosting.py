@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from khala.playing import environment
 from khala_bridge.act import executor_of
 from khala_bridge.errors import GameError, GameMissing
-from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides
+from khala_bridge.game.game import GameConfig, GamePatience, GameThread, Sides
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.host import host
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.errors import RecordingError
 from khala_protocol.parent_watch import named_parent
 from khala_protocol.recording import Recording
@@ -99,7 +99,7 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, proce
     )
     thread = GameThread(
         lambda: PySC2Game(started, processes, invitation),
-        patience=Patience().against(task.opponent),
+        patience=GamePatience().against(task.opponent),
         give_up=invitation.withdrawn.set,
     )
     return Sides(thread, [executor_of(side) for side in sides])
@@ -110,11 +110,11 @@ def _played(config: MatchConfig) -> Unfinished | None:
     if config.task.faults.game_lost == "end" or config.record is None or not config.record.exists():
         return None
     try:
-        unfinished(Recording.open(config.record), config)  # is there anything, and can it be played again?
+        read_unfinished(Recording.open(config.record), config)  # is there anything, and can it be played again?
     except RecordingError as error:
         log.warning("the game cannot be started again: %s", error)
         return None
-    return unfinished(Recording.open(_put_aside(config.record)), config)
+    return read_unfinished(Recording.open(_put_aside(config.record)), config)
 
 
 def _put_aside(path: Path) -> Path:

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from khala_bridge.observe import Observer
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task, new_run_name
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.configfile import words_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import check_name
@@ -104,7 +104,7 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
 
 def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
     """Return the match of a recording, or of the newest one in the directory of a run, and what was played of it."""
-    past = unfinished(newest_recording(_run_at(path, out)))
+    past = read_unfinished(newest_recording(_run_at(path, out)))
     changes = {"record": free_recording(out / past.config.run), "assemble_s": assemble_s}
     return past.config.model_copy(update=changes), past
 

@@ -15,7 +15,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, G
 
 from khala.doors.pages import guarded
 from khala.doors.rules import Door
-from khala_protocol.listening import Patience, bound
+from khala_protocol.listening import Patience, bind
 from khala_protocol.messages import Report, Result
 from khala_protocol.service import MatchState
 
@@ -62,7 +62,7 @@ class Metrics:
         await runner.setup()
         assert runner.server is not None
         try:
-            with bound(host, port, option="--metrics") as listening:
+            with bind(host, port, option="--metrics") as listening:
                 server = await asyncio.get_running_loop().create_server(Patience(runner.server), sock=listening)
                 yield int(listening.getsockname()[1])
                 server.close()

@@ -30,7 +30,7 @@ from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import read_limited
 from khala_protocol.joining import client_config
-from khala_protocol.listening import Patience, bound
+from khala_protocol.listening import Patience, bind
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ async def _listening(runner: web.AppRunner, look: Look, context: ssl.SSLContext 
     """Take connections for the application, and yield the port."""
     assert runner.server is not None
     patience = Patience(runner.server)
-    listening = bound(look.host.strip("[]"), look.port)
+    listening = bind(look.host.strip("[]"), look.port)
     handshake_s = None if context is None else HANDSHAKE_S
     server = await asyncio.get_running_loop().create_server(
         patience, sock=listening, ssl=context, ssl_handshake_timeout=handshake_s

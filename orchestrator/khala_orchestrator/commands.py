@@ -150,7 +150,7 @@ def _paces(recording: Recording, *, as_json: bool) -> None:
     if not found:
         raise RecordingError(f"{recording.path} has no answer of a model, and the pace is measured from answers")
     if as_json:
-        typer.echo(json.dumps({"paces": [one._asdict() | {"pace": one.pace.model_dump()} for one in found]}))
+        typer.echo(json.dumps({"paces": [row._asdict() | {"pace": row.pace.model_dump()} for row in found]}))
         return
     say("\n".join(map(yaml, found)).removesuffix("\n"))
 

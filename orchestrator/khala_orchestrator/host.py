@@ -96,15 +96,15 @@ async def host(
         await roster.assemble(required, config.assemble_s)
         if past is None:
             return [result async for result in match.play()]
-        return [*past.results, *[result async for result in _resumed(match, past, observer)]]
+        return [*past.results, *[result async for result in _resume(match, past, observer)]]
 
 
 def _recorder(config: MatchConfig, path: Path, past: Unfinished | None) -> OwnedSink:
-    recorder = Recorder(path) if past is None else _continued(path, past)
+    recorder = Recorder(path) if past is None else _continue_recording(path, past)
     return BestEffort(recorder) if config.task.faults.recording_lost == "go_on" else recorder
 
 
-def _continued(path: Path, past: Unfinished) -> Recorder:
+def _continue_recording(path: Path, past: Unfinished) -> Recorder:
     """Return a recorder that has what is kept of a recording.
 
     The file has its name only then: who resumes takes the newest recording, and half a copy is not one.
@@ -126,7 +126,7 @@ def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat
     return Turn(bus, config.run, roster, required=waited_for, grace_s=grace_s, advice=inbox.take)
 
 
-def _resumed(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:
+def _resume(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:
     """Play a match from where its recording ends; what was published then is not published again."""
     pacing, match.pacing, observer.live = match.pacing, AtOnce(), False
 

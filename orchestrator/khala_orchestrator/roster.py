@@ -82,17 +82,17 @@ class Roster:
         await self._subscription.close()
         await self._pump
 
-    def present(self, seat: Seat) -> bool:
+    def is_present(self, seat: Seat) -> bool:
         """Return whether at least one instance of this agent is present, as far as is known."""
         return bool(self._instances[seat])
 
-    def reachable(self, seat: Seat) -> bool:
+    def is_reachable(self, seat: Seat) -> bool:
         """Return whether an agent is present and our own link is up."""
-        return self.present(seat) and not self._cut
+        return self.is_present(seat) and not self._cut
 
     def missing(self) -> tuple[Seat, ...]:
         """Return the seats that no agent has taken."""
-        return tuple(seat for seat in self.seats if not self.present(seat))
+        return tuple(seat for seat in self.seats if not self.is_present(seat))
 
     def on_change(self, *, gone: Callable[[Seat], None], here: Callable[[Seat], Awaitable[None]]) -> None:
         """Call `gone` whenever the last instance of an agent leaves, and `here` whenever one comes.
@@ -110,9 +110,9 @@ class Roster:
         wanted = tuple(required)
         try:
             async with asyncio.timeout(timeout_s), self._changed:
-                await self._changed.wait_for(lambda: all(self.present(seat) for seat in wanted))
+                await self._changed.wait_for(lambda: all(self.is_present(seat) for seat in wanted))
         except TimeoutError:
-            raise MissingAgents((s for s in wanted if not self.present(s)), timeout_s) from None
+            raise MissingAgents((s for s in wanted if not self.is_present(s)), timeout_s) from None
 
     async def _follow(self, tokens: Subscription[Liveness]) -> None:
         async for token in tokens:

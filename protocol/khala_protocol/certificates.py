@@ -152,7 +152,7 @@ def files_of(directory: Path, *names: str) -> TlsFiles:
 def _check_empty(directory: Path) -> None:
     """Raise ConfigError if there are certificates, which a new authority would make worthless."""
     if found := certificates(directory):
-        names = ", ".join(sorted({one.name for one in found}))
+        names = ", ".join(sorted({certificate.name for certificate in found}))
         raise ConfigError(
             f"holds certificates ({names}) but not the key of their authority, ca/key.pem: put the key back, or "
             "make all certificates anew in another directory",

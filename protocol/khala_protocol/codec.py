@@ -48,7 +48,7 @@ def decode(payload: bytes) -> Wire:
     try:
         return _ANY.validate_json(payload)
     except ValidationError as error:
-        raise explained(payload, error) from None
+        raise explain(payload, error) from None
 
 
 def decode_as(kind: type[M], payload: bytes) -> M:
@@ -63,7 +63,7 @@ def decode_as(kind: type[M], payload: bytes) -> M:
     try:
         return kind.model_validate_json(payload)
     except ValidationError as error:
-        raise explained(payload, error) from None
+        raise explain(payload, error) from None
 
 
 def _without_surrogates(value: Any) -> Any:
@@ -77,7 +77,7 @@ def _without_surrogates(value: Any) -> Any:
     return value
 
 
-def explained(payload: bytes, error: ValidationError) -> MalformedMessage | WrongVersion:
+def explain(payload: bytes, error: ValidationError) -> MalformedMessage | WrongVersion:
     """Return what is wrong with the bytes of a message, in a sentence."""
     try:
         version = from_json(payload).get("v", SCHEMA_VERSION)

@@ -58,7 +58,7 @@ def run_command(name: str, command: Callable[[], object], *errors: type[Exceptio
             raise others from None
         faults = list(_leaves(ours)) if ours is not None else []
     for fault in faults:
-        say(f"{name}: {_words(fault)}", err=True)
+        say(f"{name}: {_sentence(fault)}", err=True)
     if faults:  # not within `except*`: early Pythons 3.11 raise an exit there as a part of a group
         sys.exit(1)
 
@@ -74,7 +74,7 @@ def _is_of_the_machine(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in _OF_THE_MACHINE
 
 
-def _words(error: BaseException) -> str:
+def _sentence(error: BaseException) -> str:
     """Return an error as a sentence."""
     if not isinstance(error, OSError) or error.strerror is None:
         return str(error)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from khala_protocol.document import Document, dotted, shown
+from khala_protocol.document import Document, place_text, shown
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import MB, check_regular, read_limited
 
@@ -66,7 +66,7 @@ def load(path: Path | str, model: type[M]) -> M:
     Raises:
         ConfigError: the file cannot be read, is not YAML, or does not fit the model; the text says where.
     """
-    return _fitted(_opened(Path(path)), model)
+    return _fit(_open(Path(path)), model)
 
 
 def loads(text: str, model: type[M], *, source: str) -> M:
@@ -75,24 +75,24 @@ def loads(text: str, model: type[M], *, source: str) -> M:
     Raises:
         ConfigError: it is not YAML, or does not fit the model.
     """
-    return _fitted(Document(text, source), model)
+    return _fit(Document(text, source), model)
 
 
-def _fitted(document: Document, model: type[M]) -> M:
+def _fit(document: Document, model: type[M]) -> M:
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
         raise _explain(document, model, error) from None
 
 
-def _opened(path: Path, *users: Path) -> Document:
+def _open(path: Path, *users: Path) -> Document:
     """Return the document at a path, over the one that it extends; `users` are the files that extend it."""
     document = Document(_text_of(path), str(path))
     if isinstance(document.data, dict) and isinstance(name := document.data.get(EXTENDS), str):
         other = path.parent / (name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
         if fault := _unfit_to_extend(other, (*users, path)):
             raise ConfigError(fault, source=str(path), line=document.lines[(EXTENDS,)], field=EXTENDS)
-        document.lay_over(_opened(other, *users, path), but=EXTENDS)
+        document.lay_over(_open(other, *users, path), but=EXTENDS)
     return document
 
 
@@ -130,7 +130,7 @@ def _explain(document: Document, model: type[BaseModel], error: ValidationError)
     if len(faults) > 1:
         text += f" (and {len(faults) - 1} more)"
     source, line = document.origin(place)
-    return ConfigError(text, source=source, line=line, field=dotted(place) or None)
+    return ConfigError(text, source=source, line=line, field=place_text(place) or None)
 
 
 def _line(document: Document, placed: tuple[Place, ErrorDetails]) -> int:

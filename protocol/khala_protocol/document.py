@@ -56,7 +56,7 @@ class Document:
         """
         if isinstance(self.data, dict) and isinstance(other.data, dict):
             self._below = other
-            own = {key: self._completed(key, value, other.data.get(key)) for key, value in self.data.items()}
+            own = {key: self._complete(key, value, other.data.get(key)) for key, value in self.data.items()}
             self.data = other.data | {key: value for key, value in own.items() if key != but}
 
     def origin(self, place: Place) -> tuple[str, int | None]:
@@ -71,7 +71,7 @@ class Document:
         """Return whether there is a value at `place`."""
         return place in self.lines or self._known_below(place) is not None
 
-    def _completed(self, key: str | int, entries: object, others: object) -> object:
+    def _complete(self, key: str | int, entries: object, others: object) -> object:
         """Return a value; a list with its entries completed from those of the same name in another list."""
         if not isinstance(entries, list) or not isinstance(others, list):
             return entries
@@ -143,7 +143,7 @@ class Document:
         for key_node, value_node in node.value:
             self._count(place)
             if key_node.tag == _MERGE:
-                for other in reversed(self._merged(value_node)):
+                for other in reversed(self._merge_nodes(value_node)):
                     merged |= self._fields(other, place, depth + 1)
                 continue
             key = self._key(key_node)
@@ -152,7 +152,7 @@ class Document:
             own[key] = key_node, value_node
         return merged | own
 
-    def _merged(self, node: yaml.Node) -> list[yaml.MappingNode]:
+    def _merge_nodes(self, node: yaml.Node) -> list[yaml.MappingNode]:
         nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
         if not all(isinstance(other, yaml.MappingNode) for other in nodes):
             raise ConfigError("only fields can be merged by <<", source=self.source, line=node.start_mark.line + 1)
@@ -163,7 +163,7 @@ class Document:
             f"is given a second time, the first is on line {first.start_mark.line + 1}",
             source=self.source,
             line=second.start_mark.line + 1,
-            field=dotted(place),
+            field=place_text(place),
         )
 
     def _key(self, node: yaml.Node) -> str | int:
@@ -234,18 +234,18 @@ class _Composer:
         if tag is None or tag == "!":
             tag = self._loader.resolve(yaml.ScalarNode, event.value, event.implicit)
         node = yaml.ScalarNode(tag, event.value, event.start_mark, event.end_mark, event.style)
-        return self._anchored(event, node)
+        return self._anchor(event, node)
 
     def _collection(self, event: Any, depth: int) -> yaml.Node:
         kind = yaml.SequenceNode if isinstance(event, yaml.SequenceStartEvent) else yaml.MappingNode
         parts: list[yaml.Node] = []
-        node = self._anchored(event, kind(event.tag, [], event.start_mark, None))
+        node = self._anchor(event, kind(event.tag, [], event.start_mark, None))
         while not isinstance(part := self._loader.get_event(), yaml.CollectionEndEvent):
             parts.append(self._node(part, depth + 1))
         node.value = parts if kind is yaml.SequenceNode else list(zip(parts[::2], parts[1::2], strict=True))
         return node
 
-    def _anchored(self, event: Any, node: yaml.Node) -> yaml.Node:
+    def _anchor(self, event: Any, node: yaml.Node) -> yaml.Node:
         if event.anchor is not None:
             self._anchors[event.anchor] = node
         return node
@@ -263,7 +263,7 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 
-def dotted(place: Place) -> str:
+def place_text(place: Place) -> str:
     """Return a place as an error names it."""
     return ".".join(str(part) for part in place)
 

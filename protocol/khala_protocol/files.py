@@ -74,11 +74,11 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         return
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    with _named(path):
+    with _name_file(path):
         descriptor, name = tempfile.mkstemp(prefix=_PART, dir=path.parent)  # its mode is 0600
     part = Path(name)
     try:
-        with _named(path):
+        with _name_file(path):
             with os.fdopen(descriptor, "wb") as file:
                 yield file
             part.replace(path)
@@ -91,12 +91,12 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 def replacing_directory(path: Path) -> Iterator[Path]:
     """Yield a new directory that takes the place of none or of an empty one under `path` when it is whole."""
     path = path.resolve()
-    with _named(path):
+    with _name_file(path):
         make_private(path.parent)
         part = Path(tempfile.mkdtemp(prefix=_PART, dir=path.parent))  # its mode is 0700
     try:
         yield part
-        with _named(path):
+        with _name_file(path):
             if path.exists():
                 path.rmdir()
             part.rename(path)
@@ -133,7 +133,7 @@ def _is_stream(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _named(path: Path) -> Iterator[None]:
+def _name_file(path: Path) -> Iterator[None]:
     """Have an `OSError` name the file that is written: that of a full disk names none."""
     try:
         yield

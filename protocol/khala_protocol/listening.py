@@ -25,8 +25,8 @@ _KEEPALIVE: Final = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 15, "TCP_KEEPCNT": 4}
 _END: Final = b"\r\n\r\n"
 
 
-def bound(host: str, port: int, *, option: str = "--port") -> socket.socket:
-    """Return a socket that listens.
+def bind(host: str, port: int, *, option: str = "--port") -> socket.socket:
+    """Open a socket that listens.
 
     Args:
         host: address of this machine.

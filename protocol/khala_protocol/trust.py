@@ -49,7 +49,7 @@ def module_of(reference: str) -> str:
 
 def trust(*names: str) -> None:
     """Trust modules, or commands."""
-    os.environ[VARIABLE] = ",".join(sorted({*_trusted(), *map(_token, names)}))
+    os.environ[VARIABLE] = ",".join(sorted({*_trusted_hashes(), *map(_token, names)}))
 
 
 def trust_named(*references: str | None) -> None:
@@ -66,7 +66,7 @@ def trust_files(trusted: bool) -> bool:
 
 def is_trusted(name: str) -> bool:
     """Return whether a module, or a command, is trusted."""
-    return not _trusted().isdisjoint({ALL, _token(name)})
+    return not _trusted_hashes().isdisjoint({ALL, _token(name)})
 
 
 def check_trusted(names: Iterable[str], *, source: str | None = None) -> None:
@@ -112,7 +112,7 @@ def import_trusted(module: str, *, source: str) -> ModuleType:
         raise ConfigError(f"importing it failed: {type(error).__name__}: {error}", source=source) from error
 
 
-def _trusted() -> set[str]:
+def _trusted_hashes() -> set[str]:
     return set(filter(None, os.environ.get(VARIABLE, "").split(",")))
 
 

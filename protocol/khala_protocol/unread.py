@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, GetPydanticSchema, PrivateAttr, ValidationError
 from pydantic_core import core_schema
 
-from khala_protocol.codec import decode_as, explained
+from khala_protocol.codec import decode_as, explain
 from khala_protocol.messages import Observation, View
 
 _ANY_OBJECT = core_schema.typed_dict_schema({}, extra_behavior="ignore")
@@ -29,7 +29,7 @@ def decode_observation(payload: bytes) -> Observation:
     try:
         words = _Words.model_validate_json(payload)
     except ValidationError as error:
-        raise explained(payload, error) from None
+        raise explain(payload, error) from None
     fields = dict(vars(words))
     del fields["view"]
     unread = words.having(fields)

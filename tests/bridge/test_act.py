@@ -406,7 +406,7 @@ def test_commands_come_in_the_order_of_the_agents(
         "Stalkers": parse("<Move_Screen([12, 12])>"),
     }
     joint = Actor(config).joint(Observer(config).observe(world()), replies)
-    assert [c.said.team.team.agent for c in joint.commands if c.said] == ["Stalkers", "Zealots"]
+    assert [c.said.team.agent for c in joint.commands if c.said] == ["Stalkers", "Zealots"]
     assert all(isinstance(command, Command) for command in joint.commands)
 
 

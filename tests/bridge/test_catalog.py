@@ -10,7 +10,7 @@ import pytest
 
 from khala_bridge import auto
 from khala_bridge.catalogue.action import Action
-from khala_bridge.catalogue.catalogue import GROUPS, catalogue, catalogue_sha256, chosen, curated, example, read
+from khala_bridge.catalogue.catalogue import GROUPS, catalogue, catalogue_sha256, chosen, example, read, read_curated
 from khala_bridge.errors import CatalogueError
 from khala_bridge.knowledge import abilities, ability_of, knowledge
 
@@ -90,7 +90,7 @@ def test_every_rule_that_an_action_names_is_there() -> None:
 
 
 def test_what_is_written_of_an_action_can_be_shown_to_a_model(subtests: pytest.Subtests) -> None:
-    for action in curated().values():
+    for action in read_curated().values():
         with subtests.test(action.name):
             assert action.about[0].isupper()
             assert action.about.endswith(".")
@@ -194,7 +194,7 @@ WIDER = {
 
 def test_the_units_of_a_written_action_are_those_that_the_game_lets_do_it() -> None:
     found: dict[str, set[str]] = {}
-    for name, action in curated().items():
+    for name, action in read_curated().items():
         if action.pysc2 and action.units:
             users = abilities()[action.pysc2.ability_id].users
             found |= {name: extra} if (extra := {unit for unit in action.units if unit not in users}) else {}
@@ -207,13 +207,15 @@ def test_what_a_written_action_produces_is_what_the_game_makes_of_it() -> None:
         return (facts.produces or facts.researches) if facts else None
 
     wrong = [
-        name for name, action in curated().items() if action.produces and made(action) not in (None, action.produces)
+        name
+        for name, action in read_curated().items()
+        if action.produces and made(action) not in (None, action.produces)
     ]
     assert wrong == []
 
 
 def test_how_far_a_jump_reaches_is_what_the_game_says() -> None:
-    jump = curated()["Ability_Blink_Screen"]
+    jump = read_curated()["Ability_Blink_Screen"]
     facts = ability_of(jump.pysc2.ability_id, "Stalker") if jump.pysc2 else None
     assert facts
     assert f"at most {facts.figures['distance']:g} away" in jump.about

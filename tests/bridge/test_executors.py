@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import raw_pb2
 
-    from khala_bridge.act import Command, Executor, PlanStep, Played
+    from khala_bridge.act import Command, Executor, PlanResult, PlanStep
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
 
@@ -72,7 +72,7 @@ class Table:
         ]
         return self._snapshot(units, camera=self.camera, **{"functions": ALL} | self._fields)
 
-    def play(self, executor: Executor, joint: JointAction | Sequence[Command], loops: int = 8) -> Played:
+    def play(self, executor: Executor, joint: JointAction | Sequence[Command], loops: int = 8) -> PlanResult:
         commands = joint.commands if isinstance(joint, JointAction) else joint
         plan = executor.plan(commands, self.now(), loops)
         step = next(plan)
@@ -83,7 +83,7 @@ class Table:
             try:
                 step = plan.send(self.now())
             except StopIteration as done:
-                played: Played = done.value
+                played: PlanResult = done.value
                 return played
 
     def functions(self) -> list[tuple[str, list[Any]]]:

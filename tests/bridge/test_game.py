@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act import JointAction, PlanStep, Played
+from khala_bridge.act import JointAction, PlanResult, PlanStep
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
 from khala_bridge.game import pysc2_game
-from khala_bridge.game.game import GameConfig, GameIdentity, GameThread, Patience, Sides, StepResult, find_sc2
+from khala_bridge.game.game import GameConfig, GameIdentity, GamePatience, GameThread, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.state.grid import NO_GRID
@@ -91,7 +91,7 @@ async def test_a_side_plays_commands_and_gets_snapshots(snapshot: Callable[..., 
         (first,) = await game.reset()
         (turn,) = await game.act([JointAction().commands], 11)
         assert (first.game_loop, turn.snapshot.game_loop) == (0, 11)
-        assert (turn.played, turn.env_steps) == (Played(), 1)
+        assert (turn.played, turn.env_steps) == (PlanResult(), 1)
         assert game.info.version == "4.10.0.75689"
     assert fake.calls == ["reset", "act", "close"]
 
@@ -108,21 +108,21 @@ async def test_the_game_has_a_thread_of_its_own(snapshot: Callable[..., Snapshot
     ("slowest_s", "limit_s"), [(None, 120), (0.001, 10), (0.5, 10), (1, 20), (3, 60), (6, 120), (60, 120)]
 )
 def test_the_limit_for_a_step_suits_what_the_game_has_shown(slowest_s: float | None, limit_s: float) -> None:
-    assert Patience().limit_s(slowest_s) == limit_s
+    assert GamePatience().limit_s(slowest_s) == limit_s
 
 
 def test_an_opponent_who_joins_may_take_its_time_too_and_is_named_if_the_game_hangs() -> None:
-    patience = Patience().against(Opponent(kind="lan", wait_s=30))
+    patience = GamePatience().against(Opponent(kind="lan", wait_s=30))
     assert (patience.limit_s(None), patience.limit_s(0.5)) == (150, 40)
     assert patience.hangs == "the game, or the player over LAN at 127.0.0.1:14380"
-    assert Patience().against(Opponent()) == Patience()
+    assert GamePatience().against(Opponent()) == GamePatience()
 
 
 async def test_a_game_that_has_played_is_given_less_time_to_answer(
     snapshot: Callable[..., Snapshot], caplog: pytest.LogCaptureFixture
 ) -> None:
     fake = FakeGame(snapshot)
-    async with GameThread(lambda: fake, patience=Patience(least_s=0.2, times_slowest=0, remark_s=0.1)) as game:
+    async with GameThread(lambda: fake, patience=GamePatience(least_s=0.2, times_slowest=0, remark_s=0.1)) as game:
         await game.act([RawExecutor().plan([], snapshot([]), 8)])
         assert caplog.messages == []
         fake.hangs = True
@@ -133,7 +133,7 @@ async def test_a_game_that_has_played_is_given_less_time_to_answer(
 
 async def test_a_game_that_has_begun_once_is_given_less_time_to_begin_again(snapshot: Callable[..., Snapshot]) -> None:
     fake = FakeGame(snapshot)
-    async with GameThread(lambda: fake, patience=Patience(least_s=0.2, times_slowest=0)) as game:
+    async with GameThread(lambda: fake, patience=GamePatience(least_s=0.2, times_slowest=0)) as game:
         await game.reset()
         fake.hangs = True
         with pytest.raises(GameHangs, match=r"within 0.2 s"):
@@ -158,7 +158,7 @@ async def test_a_game_that_dies_when_nobody_waits_for_it_any_more_says_nothing(
 
 async def test_a_game_that_hangs_is_killed_and_named(snapshot: Callable[..., Snapshot]) -> None:
     fake = FakeGame(snapshot, hangs=True)
-    async with GameThread(lambda: fake, patience=Patience(unknown_s=0.05)) as game:
+    async with GameThread(lambda: fake, patience=GamePatience(unknown_s=0.05)) as game:
         with pytest.raises(GameHangs, match=r"^the game did not answer within 0.05 s and was ended; try again"):
             await game.act([RawExecutor().plan([], snapshot([]), 8)])
     assert fake.calls == ["act", "kill", "close"]
@@ -209,7 +209,7 @@ def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[St
         for step in steps:
             if (yield step).ended:
                 break
-        return Played((f"{len(steps)} steps",))
+        return PlanResult((f"{len(steps)} steps",))
 
     game = object.__new__(PySC2Game)
     env = StubEnv(last_loop)

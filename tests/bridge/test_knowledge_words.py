@@ -11,7 +11,7 @@ from khala_bridge.errors import CatalogueError
 from khala_bridge.knowledge import VERSIONS, abilities, advice, knowledge, short, upgrades
 from khala_bridge.knowledge.facts import ability_facts, buff_facts, unit_facts, upgrade_facts
 from khala_bridge.knowledge.load import ability_words, unit_words, upgrade_words
-from khala_bridge.knowledge.words import PLACEHOLDER, Filler, listed, price, rounded
+from khala_bridge.knowledge.words import PLACEHOLDER, Filler, listed, price, round_number
 
 BY_THEIR_ABILITIES = {
     ("HighTemplar", "Mutalisk"), ("HighTemplar", "Viper"), ("HighTemplar", "Medivac"), ("HighTemplar", "Raven"),
@@ -138,7 +138,7 @@ def test_a_placeholder_without_a_fact_is_an_error_that_names_both(wrong: str) ->
     ("value", "said"), [(10.714, "10.7"), (1440, "1440"), (0.41, "0.41"), (107.14, "107"), (8, "8")]
 )
 def test_numbers_are_said_with_three_digits(value: float, said: str) -> None:
-    assert rounded(value) == said
+    assert round_number(value) == said
 
 
 def test_prices_and_lists_are_said_in_words() -> None:

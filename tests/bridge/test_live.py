@@ -12,7 +12,7 @@ import pytest
 
 from khala_bridge.act import Actor, executor_of
 from khala_bridge.errors import GameError, GameHangs
-from khala_bridge.game.game import GameConfig, GameThread, Patience, Sides, StepResult
+from khala_bridge.game.game import GameConfig, GamePatience, GameThread, Sides, StepResult
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer
 from khala_bridge.task.maps import known_maps
@@ -123,7 +123,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
 ) -> None:
     battle = start("raw", name)
     (agent,) = battle.observer.observe(battle.now).agents.values()
-    assert {team.view.name: len(team.view.units) for team in agent.teams} == paper_teams[name]
+    assert {team.name: len(team.view.units) for team in agent.teams} == paper_teams[name]
     battle.turn(focus_fire)
     assert battle.reasons == []
 
@@ -140,7 +140,7 @@ def test_the_teams_of_a_battle_begin_with_the_units_of_the_paper(
 def test_a_map_without_a_task_file_is_played_by_one_commander(start: Play, name: str, units: dict[str, int]) -> None:
     battle = start("raw", name)
     (agent,) = battle.observer.observe(battle.now).agents.values()
-    assert {team.view.name: len(team.view.units) for team in agent.teams} == units
+    assert {team.name: len(team.view.units) for team in agent.teams} == units
     battle.turn(lambda _: "")
     assert battle.now.outcome is None
 
@@ -208,7 +208,7 @@ async def test_a_stopped_game_is_noticed_killed_and_named(
         games.append(PySC2Game(GameConfig(sc2path=sc2path, map=task("2s3z").map_spec, seed=3)))
         return games[0]
 
-    thread = GameThread(begin, patience=Patience(least_s=4.0))
+    thread = GameThread(begin, patience=GamePatience(least_s=4.0))
     async with Sides(thread, [executor_of(task("2s3z"))]) as side:
         await side.reset()
         for _ in range(3):

@@ -68,7 +68,7 @@ class Table:
     def shown(self) -> list[str]:
         """Return what the agent is shown of its orders, when it is asked."""
         views = self._actor.standing.views("A")
-        self._actor.standing.seen("A")
+        self._actor.standing.forget_ended("A")
         return [_words(view) for view in views]
 
 

@@ -14,7 +14,7 @@ from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_orchestrator.config import MatchConfig, change, load_task
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_orchestrator.past.transcript import StepSelection, transcript
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.keys import Topic, parse
@@ -138,7 +138,7 @@ async def test_a_duel_goes_on_where_its_host_was_lost(duel: Recording, tmp_path:
             if isinstance(sample.message, Report) and (sample.message.side, sample.message.step) == ("blue", 5):
                 break
     config = match("duel_2s3z", STEPS, tmp_path / "whole.mcap")
-    past = unfinished(Recording.open(torn.path), config.model_copy(update={"game": "Khala simulator"}))
+    past = read_unfinished(Recording.open(torn.path), config.model_copy(update={"game": "Khala simulator"}))
     assert past.steps == 5
     await play(config, past)
     whole = Recording.open(tmp_path / "whole.mcap")

@@ -9,7 +9,7 @@ import pytest
 from khala_orchestrator.host import host
 from khala_orchestrator.past.fork import advice_of, trunk_of, write_beginning, write_whole
 from khala_orchestrator.past.replay import replay
-from khala_orchestrator.past.resume import FORKED, unfinished
+from khala_orchestrator.past.resume import FORKED, read_unfinished
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, KhalaError, RecordingError
 from khala_protocol.keys import Topic
@@ -69,7 +69,7 @@ def fork(hall: Hall, tmp_path: Path) -> Callable[..., Awaitable[tuple[list[Resul
         forked = trunk_of(recording, episode).fork(step, RUN)
         beginning, path = tmp_path / f"beginning-{step}.mcap", tmp_path / f"fork-{step}.mcap"
         write_beginning(recording, forked, beginning, advice_of(forked, advice))
-        past = unfinished(Recording.open(beginning))
+        past = read_unfinished(Recording.open(beginning))
 
         async def resumed(*arguments: Any, **options: Any) -> list[Result]:
             return await host(*arguments, **options, past=past)

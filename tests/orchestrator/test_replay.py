@@ -12,7 +12,7 @@ from khala_bridge.observe.text import SECTIONS
 from khala_orchestrator.config import change, load_task
 from khala_orchestrator.match.turn import Question
 from khala_orchestrator.past.replay import RecordedTurn, recorded_config, replay
-from khala_orchestrator.past.resume import unfinished
+from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic
@@ -140,7 +140,7 @@ async def test_a_match_against_a_player_whose_decisions_are_not_recorded_is_not_
     task = change(load_task("simple64_eceb_terran"), opponent="guest:rm -r x").model_dump(mode="json")
     met = {"config": task, "game": "Khala simulator 1, as 4.10", "opponent": "guest bot Rush, zerg"}
     other = changed(recording, tmp_path / "b.mcap", lambda m: m.but(**met) if isinstance(m, Run) else m)
-    for repeat in (recorded_config, unfinished):
+    for repeat in (recorded_config, read_unfinished):
         with pytest.raises(RecordingError, match=r"against a guest bot Rush, zerg, whose decisions are not recorded"):
             repeat(other)
 

@@ -12,7 +12,7 @@ import pytest
 
 from khala_orchestrator.host import host
 from khala_orchestrator.past.replay import replay
-from khala_orchestrator.past.resume import RESUMED, ResumeError, unfinished
+from khala_orchestrator.past.resume import RESUMED, ResumeError, read_unfinished
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic
@@ -81,7 +81,7 @@ async def test_wherever_it_is_killed_it_ends_as_if_it_had_not_been(
     assert any(view.notes for view in views)
     assert any(view.standing for view in views)
     for reports in killed:
-        past = unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
+        past = read_unfinished(killed_after(whole, reports, tmp_path / f"killed-{reports}.mcap"))
         assert (past.episode, past.steps) == divmod(reports, 5)
         path = tmp_path / f"resumed-{reports}.mcap"
         again = await _resume(hall, past.config.model_copy(update={"record": path}), past)
@@ -101,11 +101,11 @@ async def test_a_host_that_is_killed_before_its_first_report_can_be_resumed(
 
     def look(message: Wire) -> None:
         if isinstance(message, Run):  # what a host leaves that is killed now
-            past = unfinished(Recording.open(path))
+            past = read_unfinished(Recording.open(path))
             left.append((past.episode, past.steps))
 
     await hall.play(config(game=GAME, max_steps=4, record=path), Stalkers=stalkers, watch=look)
-    past = unfinished(killed_after(path, 3, tmp_path / "killed.mcap"))
+    past = read_unfinished(killed_after(path, 3, tmp_path / "killed.mcap"))
     path = tmp_path / "resumed.mcap"
 
     async def played(*arguments: Any, **options: Any) -> list[Result]:
@@ -126,7 +126,7 @@ async def test_a_match_that_was_resumed_with_open_questions_is_resumed_once_more
     match = config(game=GAME, max_steps=12, rule="realtime", speed=10.0, step_loops=8)
     await hall.play(match.model_copy(update={"record": path}), Stalkers=slow)
     for reports in (4, 5, 7):
-        past = unfinished(killed_after(path, reports, tmp_path / f"killed-{reports}.mcap"))
+        past = read_unfinished(killed_after(path, reports, tmp_path / f"killed-{reports}.mcap"))
         path = tmp_path / f"{reports}.mcap"
 
         async def played(*arguments: Any, past: Any = past, **options: Any) -> list[Result]:
@@ -164,7 +164,7 @@ async def test_what_was_asked_before_the_kill_and_is_answered_anew_after_it_play
     match = config(game=GAME, max_steps=12, rule="realtime", speed=10.0, step_loops=8)
     await hall.play(match.model_copy(update={"record": path}), Stalkers=slow, Zealots=slow)
     for reports in kills:
-        past = unfinished(killed_with_answers_on_the_table(path, reports, tmp_path / f"killed-{reports}.mcap"))
+        past = read_unfinished(killed_with_answers_on_the_table(path, reports, tmp_path / f"killed-{reports}.mcap"))
         path = tmp_path / f"{reports}.mcap"
 
         async def played(*arguments: Any, past: Any = past, **options: Any) -> list[Result]:
@@ -194,7 +194,7 @@ async def test_agents_are_asked_for_the_open_step_and_for_nothing_before(
 ) -> None:
     whole = tmp_path / "whole.mcap"
     await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=stalkers)
-    past = unfinished(killed_after(whole, 2, tmp_path / "killed.mcap"))
+    past = read_unfinished(killed_after(whole, 2, tmp_path / "killed.mcap"))
     heard = await hall.broker.session().subscribe("**/Zealots/*", Delivery.STATE)
     await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
     await heard.close()
@@ -215,7 +215,7 @@ async def test_what_a_model_was_asked_in_the_open_step_is_kept(hall: Hall, confi
 
     whole = tmp_path / "whole.mcap"
     await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=ask)
-    kept = list(unfinished(killed_after(whole, 2, tmp_path / "killed.mcap")).kept())
+    kept = list(read_unfinished(killed_after(whole, 2, tmp_path / "killed.mcap")).kept())
     assert [call.message.step for call in kept if isinstance(call.message, ModelCall)] == [0, 1, 2]
     assert [seen.message.step for seen in kept if isinstance(seen.message, Observation)] == [0, 0, 1, 1]
 
@@ -234,7 +234,7 @@ async def test_a_reply_under_the_key_of_another_agent_is_not_taken_for_one_of_it
     whole = tmp_path / "whole.mcap"
     match = config(game=GAME, max_steps=4, record=whole)
     await hall.play(match, Stalkers=later, Zealots=forge)
-    past = unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
+    past = read_unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
     await _resume(hall, past.config.model_copy(update={"record": tmp_path / "resumed.mcap"}), past)
     assert digest(Recording.open(tmp_path / "resumed.mcap")) == digest(Recording.open(whole))
 
@@ -243,7 +243,7 @@ async def test_a_game_that_goes_another_way_is_found_out(hall: Hall, config: Mak
     whole = tmp_path / "whole.mcap"
     await hall.play(config(game=GAME, max_steps=4, record=whole), Stalkers=stalkers)
     hall.game.after = {1: {"dead": [0x2]}}
-    past = unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
+    past = read_unfinished(killed_after(whole, 3, tmp_path / "killed.mcap"))
     with pytest.raises(ResumeError, match="differs from the recorded one at step 2 of episode 0"):
         await _resume(hall, past.config, past)
 
@@ -252,7 +252,7 @@ async def test_what_cannot_be_resumed_is_refused(hall: Hall, config: MakeConfig,
     whole = tmp_path / "whole.mcap"
     await hall.play(config(game=GAME, max_steps=2, record=whole), Stalkers=stalkers)
     with pytest.raises(ResumeError, match="is over: begin a new one"):
-        unfinished(Recording.open(whole))
+        read_unfinished(Recording.open(whole))
     real = tmp_path / "real.mcap"
     with Recorder(real) as recorder:
         for sample in Recording.open(whole):
@@ -261,4 +261,4 @@ async def test_what_cannot_be_resumed_is_refused(hall: Hall, config: MakeConfig,
                 payload = payload.replace(b"Khala simulator", b"StarCraft II")
             recorder.write(sample.key, payload)
     with pytest.raises(ResumeError, match="does not play the same game twice"):
-        unfinished(Recording.open(real))
+        read_unfinished(Recording.open(real))

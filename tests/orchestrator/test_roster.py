@@ -53,7 +53,7 @@ async def test_one_that_came_before_the_host_is_there(broker: MemoryBroker, peer
     async with called(broker) as (roster, _):
         await settle()
         assert roster.missing() == (ZEALOTS,)
-        assert roster.present(STALKERS)
+        assert roster.is_present(STALKERS)
 
 
 async def test_it_assembles_as_soon_as_the_last_required_agent_is_there(broker: MemoryBroker, peer: MakePeer) -> None:
@@ -126,10 +126,10 @@ async def test_who_leaves_is_said_once_and_may_come_back(broker: MemoryBroker, p
         await settle()
         await zealots.leave()
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (False, [ZEALOTS])
+        assert (roster.is_present(ZEALOTS), gone) == (False, [ZEALOTS])
         await zealots.arrive("2")
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (True, [ZEALOTS])
+        assert (roster.is_present(ZEALOTS), gone) == (True, [ZEALOTS])
 
 
 async def test_an_agent_may_leave_before_anybody_asks_to_hear_of_it(broker: MemoryBroker, peer: MakePeer) -> None:
@@ -139,7 +139,7 @@ async def test_an_agent_may_leave_before_anybody_asks_to_hear_of_it(broker: Memo
         await settle()
         await zealots.leave()
         await settle()
-        assert not roster.present(ZEALOTS)
+        assert not roster.is_present(ZEALOTS)
 
 
 async def test_an_agent_is_gone_when_its_last_instance_is(
@@ -153,10 +153,10 @@ async def test_an_agent_is_gone_when_its_last_instance_is(
         assert caplog.messages == ["2 processes are agent p1/Zealots: the first reply of a step counts"]
         old.bus.kill()
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (True, [])
+        assert (roster.is_present(ZEALOTS), gone) == (True, [])
         new.bus.kill()
         await settle()
-        assert (roster.present(ZEALOTS), gone) == (False, [ZEALOTS])
+        assert (roster.is_present(ZEALOTS), gone) == (False, [ZEALOTS])
 
 
 async def test_agents_that_have_no_seat_are_named_and_count_for_nothing(
@@ -182,7 +182,7 @@ async def test_a_crowd_under_one_name_is_taken_note_of_up_to_a_limit(broker: Mem
         await zealots.arrive(str(number))
     async with called(broker) as (roster, _):
         await settle()
-        assert roster.present(ZEALOTS)
+        assert roster.is_present(ZEALOTS)
         assert len(roster._instances[ZEALOTS]) == 16
 
 
@@ -214,10 +214,10 @@ async def test_with_the_own_link_down_nobody_is_gone(broker: MemoryBroker, peer:
         await settle()
         session.cut()
         await settle()
-        assert (roster.present(ZEALOTS), roster.reachable(ZEALOTS), gone) == (True, False, [ZEALOTS])
+        assert (roster.is_present(ZEALOTS), roster.is_reachable(ZEALOTS), gone) == (True, False, [ZEALOTS])
         session.mend()
         await asyncio.sleep(2)
-        assert (roster.present(ZEALOTS), roster.reachable(ZEALOTS), gone) == (True, True, [ZEALOTS])
+        assert (roster.is_present(ZEALOTS), roster.is_reachable(ZEALOTS), gone) == (True, True, [ZEALOTS])
 
 
 async def test_one_that_leaves_while_our_link_is_down_is_gone_when_it_is_back(

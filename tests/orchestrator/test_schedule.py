@@ -44,13 +44,13 @@ def play(
     moments: list[tuple[int, list[str], list[str]]] = []
     loop, thinking = 0, set[Seat]()
     while loop <= until:
-        asked, _ = schedule.ask(StepId(0, len(moments)), loop, nothing)
+        asked, _ = schedule.choose(StepId(0, len(moments)), loop, nothing)
         thinking |= {*asked}
         found = {seat: answer for seat in sorted(thinking) if (answer := answers(seat, loop)) is not None}
         thinking -= found.keys()
         schedule.decide(found, loop)
-        due = schedule.due(loop)
-        moments.append((loop, [seat.agent for seat in asked], [one.seat.agent for one in due]))
+        due = schedule.take_due(loop)
+        moments.append((loop, [seat.agent for seat in asked], [decision.seat.agent for decision in due]))
         loop += schedule.loops(loop)
     return moments
 
@@ -102,10 +102,10 @@ def test_in_real_time_a_slow_agent_costs_another_nothing() -> None:
 def test_a_decision_knows_what_it_was_made_for() -> None:
     schedule = made(rule="budget", thinking_loops=20)
     schedule.begin()
-    schedule.ask(StepId(0, 3), 100, nothing)
+    schedule.choose(StepId(0, 3), 100, nothing)
     schedule.decide({QUICK: reply(QUICK), SLOW: reply(SLOW)}, 100)
-    assert schedule.due(119) == []
-    (quick, slow) = schedule.due(120)
+    assert schedule.take_due(119) == []
+    (quick, slow) = schedule.take_due(120)
     assert (quick.asked, quick.asked_loop, quick.due_loop) == (StepId(0, 3), 100, 120)
     assert schedule.drop(99) == []
     assert slow.seat == SLOW
@@ -114,7 +114,7 @@ def test_a_decision_knows_what_it_was_made_for() -> None:
 def test_a_decision_that_never_takes_effect_and_one_that_nobody_made_are_found_at_the_end() -> None:
     schedule = made(rule="budget", thinking_loops=20)
     schedule.begin()
-    schedule.ask(StepId(0, 0), 0, nothing)
+    schedule.choose(StepId(0, 0), 0, nothing)
     schedule.decide({SLOW: reply(SLOW)}, 0)
     assert {one.seat: (one.answer.status, one.answer.detail) for one in schedule.drop(99)} == {
         SLOW: ("ok", ""),
@@ -144,17 +144,17 @@ def test_an_agent_is_asked_by_its_cadence(
 def test_whatever_its_cadence_an_agent_sees_the_beginning() -> None:
     schedule = Schedule(Clock(), {SLOW: Cadence(1000, ("message",))})
     schedule.begin()
-    assert schedule.ask(StepId(0, 0), 5, nothing).seats == [SLOW]
+    assert schedule.choose(StepId(0, 0), 5, nothing).seats == [SLOW]
 
 
 def test_who_is_not_asked_is_told_with_the_reason() -> None:
     schedule = Schedule(Clock(step_loops=8), {QUICK: Cadence(), SLOW: Cadence(1000)})
     schedule.begin()
-    schedule.ask(StepId(0, 0), 0, nothing)
-    assert schedule.ask(StepId(0, 1), 0, nothing) == ([], {})
+    schedule.choose(StepId(0, 0), 0, nothing)
+    assert schedule.choose(StepId(0, 1), 0, nothing) == ([], {})
     schedule.decide({QUICK: reply(QUICK), SLOW: reply(SLOW)}, 0)
-    schedule.due(0)
-    asked = schedule.ask(StepId(0, 2), 8, nothing, is_needed=lambda seat: seat is SLOW)
+    schedule.take_due(0)
+    asked = schedule.choose(StepId(0, 2), 8, nothing, is_needed=lambda seat: seat is SLOW)
     assert asked == ([], {QUICK: "no_units", SLOW: "not_due"})
 
 

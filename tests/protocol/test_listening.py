@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_protocol.listening import HEAD_S, MOST_HEAD_BYTES, Patience, bound
+from khala_protocol.listening import HEAD_S, MOST_HEAD_BYTES, Patience, bind
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
@@ -59,7 +59,7 @@ async def serving(**limits: float) -> AsyncIterator[Callable[[], Awaitable[Clien
         return clients[-1]
 
     patience = Patience(Echo, **limits)  # type: ignore[arg-type]  # the most is a whole number
-    with bound("127.0.0.1", 0) as listening:
+    with bind("127.0.0.1", 0) as listening:
         server = await asyncio.get_running_loop().create_server(patience, sock=listening)
         yield connect
         for client in clients:
@@ -131,7 +131,7 @@ async def test_a_server_full_of_clients_that_have_asked_takes_no_more_until_one_
 
 def test_a_peer_whose_machine_is_gone_is_noticed_by_tcp() -> None:
     with (
-        bound("127.0.0.1", 0) as listening,
+        bind("127.0.0.1", 0) as listening,
         socket.create_connection(listening.getsockname()),
         listening.accept()[0] as accepted,
     ):

@@ -29,7 +29,7 @@ from pydantic_core import to_json
 from khala_agents.scripted.faults import Faults
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.bus.config import is_loopback
-from khala_protocol.listening import Patience, bound
+from khala_protocol.listening import Patience, bind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -85,7 +85,7 @@ class Endpoint:
 
     async def __aenter__(self) -> Self:
         host, port = self._address
-        listening = bound(host, port)
+        listening = bind(host, port)
         guard = _guard_near if is_loopback(host) else _guard
         application = web.Application(client_max_size=MAX_BODY_BYTES, middlewares=[guard])
         application.router.add_post("/v1/chat/completions", self._complete)

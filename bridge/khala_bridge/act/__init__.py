@@ -6,7 +6,17 @@ carries out. `actor` runs all of it.
 """
 
 from khala_bridge.act.actor import Actor, JointAction, executor_of
-from khala_bridge.act.plan import Executor, GameRefusal, Plan, PlanStep, Played
+from khala_bridge.act.plan import Executor, GameRefusal, Plan, PlanResult, PlanStep
 from khala_bridge.act.translate import Command
 
-__all__ = ["Actor", "Command", "Executor", "GameRefusal", "JointAction", "Plan", "PlanStep", "Played", "executor_of"]
+__all__ = [
+    "Actor",
+    "Command",
+    "Executor",
+    "GameRefusal",
+    "JointAction",
+    "Plan",
+    "PlanResult",
+    "PlanStep",
+    "executor_of",
+]

@@ -122,7 +122,7 @@ class Actor:
             if speech is None:
                 continue
             saw = seen[name] if seen and name in seen else observation.agents[name]
-            ordered, said, faults, hindered = self._one(translator, saw, speech)
+            ordered, said, faults, hindered = self._carry_out(translator, saw, speech)
             taken, refused = self._stand(translator, observation, saw, speech)
             commands += ordered
             said += taken
@@ -140,7 +140,7 @@ class Actor:
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections, fates)
 
-    def _one(self, translator: Translator, saw: AgentObservation, speech: Speech) -> _Outcome:
+    def _carry_out(self, translator: Translator, saw: AgentObservation, speech: Speech) -> _Outcome:
         words = self._words[saw.agent.name]
         addressees = Addressees(saw, words)
         commands: list[Command] = []
@@ -178,12 +178,12 @@ class Actor:
                     self.standing.revoke(saw.agent.name, item.number)
                     accepted.append(render(_call_of(item)))
                 else:
-                    accepted += self._begun(translator, observation, saw, item)
+                    accepted += self._begin_standing(translator, observation, saw, item)
             except CallRejected as refused:
                 faults.append(reject(_call_of(item), refused))
         return accepted, faults
 
-    def _begun(
+    def _begin_standing(
         self, translator: Translator, observation: SideObservation, saw: AgentObservation, item: Standing
     ) -> Iterator[str]:
         """Begin a standing order of each team that it is for, and yield it as it was accepted.
@@ -198,10 +198,10 @@ class Actor:
             raise CallRejected(meant.reason, meant.message)
         for said in meant:
             if not words.has(said.team, said.action):
-                raise CallRejected("not_available", f"Team {said.team.view.name} has no action {said.action.name}.")
+                raise CallRejected("not_available", f"Team {said.team.name} has no action {said.action.name}.")
             self.standing.begin(said, until, translator, observation)
             end = f", until {until.text}" if until.text else ""
-            yield f"{said.team.view.name} <Standing({said.written[1:-1]}{end})>"
+            yield f"{said.team.name} <Standing({said.written[1:-1]}{end})>"
 
     def _most_calls(self, saw: AgentObservation) -> int:
         """Return the number of calls of an agent that are read: all that may count, and some that are wrong."""

@@ -20,7 +20,7 @@ import re
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.rejected import CallRejected
-from khala_bridge.act.vocabulary import squashed
+from khala_bridge.act.vocabulary import squash
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,7 @@ _EVERY_TEAM = (
     "todos los equipos, todas as equipes, toutes les équipes, все команды, 所有队伍, 所有小队, 全部队伍, 所有隊伍, "
     "全チーム, 모든 팀"
 )
-ALL = frozenset(squashed(words) for words in _EVERY_TEAM.split(", "))
+ALL = frozenset(squash(words) for words in _EVERY_TEAM.split(", "))
 BOTH = frozenset({"both", "bothteams", "beide", "beideteams"})
 _BETWEEN = re.compile(r"\s*[,;&/+、]\s*(?:and\b)?\s*|\s+(?:and|und|et|y|e|и)\s+|和|与")
 _TEAM_WORD = re.compile(r"(?:the\s+)?teams?\s+", re.IGNORECASE)
@@ -47,7 +47,7 @@ class Addressees:
         """Take the observation on which the agent decided, which names its teams, and the names that it may use."""
         self._agent = agent
         self._words = words
-        self._by_name = {squashed(team.view.name): team for team in agent.teams}
+        self._by_name = {squash(team.name): team for team in agent.teams}
 
     def meant(self, heading: str | None, action: Action, tags: Sequence[int]) -> Sequence[TeamObservation]:
         """Return the teams that a call addresses, at least one.
@@ -63,60 +63,60 @@ class Addressees:
         if not self._agent.teams:
             raise CallRejected("unknown_team", "You have no units left, so no team can act.")
         if heading is None:
-            return [self._unnamed(action, tags)]
-        named = self._named(heading, action)
+            return [self._without_heading(action, tags)]
+        named = self._under_heading(heading, action)
         if action.subject == "side" and not any(self._words.has(team, action) for team in named):
-            of_side = [team for team in self._able(action) if not team.team.tags]
+            of_side = [team for team in self._able(action) if not team.tags]
             return of_side if len(of_side) == 1 else named
         return named
 
     def listening(self, heading: str | None) -> Sequence[TeamObservation]:
         """Return the team of a heading, or all of them."""
-        team = None if heading is None else self._one(heading)
+        team = None if heading is None else self._team_called(heading)
         return self._agent.teams if team is None else [team]
 
     def _able(self, action: Action) -> list[TeamObservation]:
         """Return the teams that have the action."""
         return [team for team in self._agent.teams if self._words.has(team, action)]
 
-    def _unnamed(self, action: Action, tags: Sequence[int]) -> TeamObservation:
+    def _without_heading(self, action: Action, tags: Sequence[int]) -> TeamObservation:
         """Return the team that a call without a heading means."""
         teams = self._agent.teams
         if len(teams) == 1:
             return teams[0]
-        owners = [team for team in teams if tags[0] in team.team.tags] if action.named else []
+        owners = [team for team in teams if tags[0] in team.tags] if action.actor_count else []
         for candidates in (owners, self._able(action)):
             if len(candidates) == 1:
                 return candidates[0]
         ask = 'write "Team <name>:" above the action'
         raise CallRejected("unknown_team", f"No team is named: {ask}; {self._your_teams()}")
 
-    def _named(self, heading: str, action: Action) -> Sequence[TeamObservation]:
+    def _under_heading(self, heading: str, action: Action) -> Sequence[TeamObservation]:
         """Return the teams that a heading names."""
-        plain = squashed(heading)
-        if team := self._one(heading):
+        plain = squash(heading)
+        if team := self._team_called(heading):
             return [team]
         if plain in ALL or (plain in BOTH and len(self._agent.teams) == len("AB")):
             return self._able(action) or self._agent.teams
-        several = [self._one(_TEAM_WORD.sub("", part)) for part in _BETWEEN.split(heading) if part.strip()]
+        several = [self._team_called(_TEAM_WORD.sub("", part)) for part in _BETWEEN.split(heading) if part.strip()]
         if len(several) > 1 and None not in several:
-            return list({team.view.name: team for team in several if team is not None}.values())
-        if plain in map(squashed, self._agent.idle_teams):
+            return list({team.name: team for team in several if team is not None}.values())
+        if plain in map(squash, self._agent.idle_teams):
             raise CallRejected("unknown_team", f"Team {heading} has no units left; {self._your_teams()}")
         close = difflib.get_close_matches(plain, self._by_name, n=1, cutoff=0.75)
         meant = f"did you mean {self._by_name[close[0]].view.name}? Your" if close else "your"
         raise CallRejected("unknown_team", f"You have no team {heading}; {self._your_teams(meant)}")
 
-    def _one(self, name: str) -> TeamObservation | None:
+    def _team_called(self, name: str) -> TeamObservation | None:
         """Return the one team that a name can mean."""
-        plain = squashed(name)
+        plain = squash(name)
         if found := self._by_name.get(plain):
             return found
-        if plain == squashed(self._agent.agent.name) and len(self._agent.teams) == 1:
+        if plain == squash(self._agent.agent.name) and len(self._agent.teams) == 1:
             return self._agent.teams[0]
         forms = (plain, plain.rstrip("s"))
         kinds = [team for written, team in self._by_name.items() if written.rstrip("0123456789") in forms]
         return kinds[0] if len(kinds) == 1 else None
 
     def _your_teams(self, your: str = "your") -> str:
-        return f"{your} teams are {', '.join(team.view.name for team in self._agent.teams)}."
+        return f"{your} teams are {', '.join(team.name for team in self._agent.teams)}."

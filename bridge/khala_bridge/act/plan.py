@@ -44,7 +44,7 @@ class GameRefusal:
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
+class PlanResult:
     """The result of a plan."""
 
     functions: tuple[str, ...] = ()
@@ -52,7 +52,7 @@ class Played:
     refusals: tuple[GameRefusal, ...] = ()
 
 
-Plan: TypeAlias = Generator[PlanStep, Snapshot, Played]
+Plan: TypeAlias = Generator[PlanStep, Snapshot, PlanResult]
 
 
 class Executor(Protocol):
@@ -71,9 +71,7 @@ def refuse(command: Command, why: str) -> GameRefusal | None:
     if said is None:
         return None
     message = f"The game refused {said.action.name}: {why}."
-    return GameRefusal(
-        said.team.team.agent, reject(said.call, CallRejected("refused_by_game", message), said.team.view.name)
-    )
+    return GameRefusal(said.team.agent, reject(said.call, CallRejected("refused_by_game", message), said.team.name))
 
 
 def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameRefusal, ...]:
@@ -111,6 +109,6 @@ def written(name: str, *arguments: object) -> str:
     return f"{name}({', '.join(map(str, arguments))})"
 
 
-def listed(tags: Iterable[int]) -> str:
+def tag_list(tags: Iterable[int]) -> str:
     """Return tags as reports show them."""
     return f"[{', '.join(map(hex, tags))}]"

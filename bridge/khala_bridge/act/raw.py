@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.act.plan import Plan, PlanStep, Played, listed, refused_by_game, written
+from khala_bridge.act.plan import Plan, PlanResult, PlanStep, refused_by_game, tag_list, written
 from khala_bridge.state.requests import autocast_switch, unit_order
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class RawExecutor:
     def plan(self, commands: Sequence[Command], snapshot: Snapshot, loops: int) -> Plan:  # noqa: ARG002  # the other executor looks at it
         """Return a plan of one step with all commands, `loops` game loops long."""
         after = yield PlanStep(tuple(_action(command) for command in commands), loops)
-        return Played(tuple(_words(command) for command in commands), refused_by_game(commands, after))
+        return PlanResult(tuple(_as_function(command) for command in commands), refused_by_game(commands, after))
 
 
 def _action(command: Command) -> GameAction:
@@ -39,10 +39,10 @@ def _action(command: Command) -> GameAction:
     return unit_order(ability_id, command.units, command.target, queued=command.queued)
 
 
-def _words(command: Command) -> str:
+def _as_function(command: Command) -> str:
     """Return a command as a raw function of PySC2, `Attack_unit(now, [0x1], 0x2)`."""
     stem = command.function.stem
-    units = listed(command.units)
+    units = tag_list(command.units)
     if command.function.kind == "autocast":
         return written(f"{stem}_autocast", units)
     when = "queued" if command.queued else "now"

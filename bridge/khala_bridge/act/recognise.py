@@ -52,7 +52,7 @@ class Recognised:
     @property
     def text(self) -> str:
         """The call as agents and reports read it: `Stalker-1 <Attack_Unit(0x1)>`."""
-        return f"{self.team.view.name} {self.written}"
+        return f"{self.team.name} {self.written}"
 
     @property
     def written(self) -> str:
@@ -86,7 +86,7 @@ def _action(call: Call, words: Vocabulary, addressees: Addressees) -> Action:
 
 
 def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | None]:
-    given = [_typed(argument) for argument in call.args]
+    given = [_read_argument(argument) for argument in call.args]
     if not action.args and _is_nothing(given):
         given = []
     tags = tuple(value for value in given if isinstance(value, int))
@@ -97,7 +97,7 @@ def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | Non
     return tags, points[0] if points else None
 
 
-def _typed(argument: str | Point) -> int | Point | str:
+def _read_argument(argument: str | Point) -> int | Point | str:
     """Return a tag as a number, a point as it is, anything else as text."""
     if not isinstance(argument, str):
         return argument

@@ -24,7 +24,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from khala_bridge.act.aim import RealScreen
-from khala_bridge.act.plan import GameRefusal, Plan, PlanStep, Played, refuse, refused_by_game, written
+from khala_bridge.act.plan import GameRefusal, Plan, PlanResult, PlanStep, refuse, refused_by_game, written
 from khala_bridge.act.select import Hand, Missed
 from khala_bridge.catalogue.functions import raw_forms
 from khala_bridge.compat import actions as pysc2
@@ -63,14 +63,14 @@ class ScreenExecutor:
                 yield from tour.visit(list(of_team))
             if tour.loops < loops:
                 yield from tour.step(None, loops - tour.loops)
-        return Played(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
+        return PlanResult(tuple(tour.functions), (*tour.refusals, *refused_by_game(commands, tour.now)))
 
 
 def _team(command: Command) -> tuple[str, str]:
     """Return the team of a command; the host's own commands form a group of their own, which comes last."""
     if command.said is None:
         return "", ""
-    team = command.said.team.team
+    team = command.said.team
     return team.agent, team.name
 
 
@@ -121,9 +121,9 @@ class _Tour:
                 yield from self._hand.select(command)
                 yield from self._call(command)
             except Missed as missed:
-                self._missed(command, str(missed))
+                self._note_refusal(command, str(missed))
 
-    def _missed(self, command: Command, why: str) -> None:
+    def _note_refusal(self, command: Command, why: str) -> None:
         if refusal := refuse(command, why):
             self.refusals.append(refusal)
 
@@ -146,7 +146,7 @@ class _Tour:
         """Return where a team's head was at the start of the tour; None for a team without a screen of its own."""
         if command.said is None or command.said.team.camera is None:
             return None
-        heads = (tag for tag in command.said.team.team.tags if tag in self._start.units)
+        heads = (tag for tag in command.said.team.tags if tag in self._start.units)
         return next((self._start.units[tag].pos for tag in heads), None)
 
     # --- the target -------------------------------------------------------------------------------------------

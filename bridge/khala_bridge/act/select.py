@@ -69,7 +69,7 @@ class Hand:
                 return
         yield from self._click_all(command)
         wanted = self._alive(command)
-        selected = self._selected
+        selected = self._selection
         if not wanted & selected:
             raise Missed("its units could not be selected, something stands over them")
         if selected - wanted:
@@ -82,7 +82,7 @@ class Hand:
     # --- the state --------------------------------------------------------------------------------------------
 
     @property
-    def _selected(self) -> frozenset[int]:
+    def _selection(self) -> frozenset[int]:
         return frozenset(unit.tag for unit in self._tour.now.own if unit.is_selected)
 
     def _alive(self, command: Command) -> frozenset[int]:
@@ -92,16 +92,16 @@ class Hand:
         """Return the control group of the team, if the command is for the whole team."""
         if command.said is None:
             return None
-        team = command.said.team.team
+        team = command.said.team
         whole = self._alive(command) == frozenset(tag for tag in team.tags if tag in self._tour.now.units)
-        return team.control_group if whole else None
+        return team.team.control_group if whole else None
 
     def _types(self, command: Command) -> set[str]:
         return {self._tour.now.units[tag].name for tag in self._alive(command)}
 
     def _is_right(self, command: Command) -> bool:
         wanted = self._alive(command)
-        selected = self._selected
+        selected = self._selection
         if self._one_will_do(command):
             same = {self._tour.now.units[tag].name for tag in selected}
             return wanted <= selected and same == self._types(command)
@@ -149,10 +149,10 @@ class Hand:
     def _click_all(self, command: Command) -> Way:
         """Click the units that the selection lacks, and those that must leave it; those on the screen first."""
         tries: Counter[int] = Counter()
-        fresh = bool(self._selected - self._alive(command))
+        fresh = bool(self._selection - self._alive(command))
         while True:
             wanted = self._alive(command)
-            selected = self._selected
+            selected = self._selection
             missing = [t for t in command.units if t in wanted and (fresh or t not in selected) and tries[t] < TRIES]
             strange = [] if fresh else [t for t in sorted(selected - wanted) if tries[t] < TRIES]
             if not missing and not strange:

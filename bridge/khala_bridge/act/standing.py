@@ -9,7 +9,6 @@ State of one episode, a function of the words and the snapshots since its beginn
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -45,6 +44,11 @@ class _Order:
     waits_for: str = ""
     ended: str = ""
 
+    def end(self, why: str) -> None:
+        """End the order, which its agent is yet to be told."""
+        self.ended = why
+        self.waits_for = ""
+
     @property
     def text(self) -> str:
         """The order as its agent reads it, `Developer <Train_Probe()> until 22 Probe`."""
@@ -78,8 +82,8 @@ class StandingOrders:
         """Return an agent's orders in force, and those that have ended since it was asked."""
         return tuple(order.view for order in self._orders.get(agent, ()))
 
-    def seen(self, agent: str) -> None:
-        """Forget the orders of an agent that have ended, since it was shown them."""
+    def forget_ended(self, agent: str) -> None:
+        """Forget the orders of an agent that have ended, once it was shown them."""
         self._orders[agent] = self._in_force(agent)
 
     def begin(self, said: Recognised, until: Until, translator: Translator, observation: SideObservation) -> None:
@@ -88,22 +92,22 @@ class StandingOrders:
         Raises:
             CallRejected: it could never be carried out, is over already, or is one too many.
         """
-        agent, team = said.team.team.agent, said.team.view.name
-        if said.action.named:
+        agent = said.team.agent
+        team = said.team.name
+        if said.action.actor_count:
             raise CallRejected("wrong_arguments", f"{said.action.name} names a unit: a standing order is for a team.")
         if until.is_reached(observation.snapshot, attacked=False):
             raise CallRejected("not_available", f"The end of this standing order is reached already: {until.text}.")
-        mine = [order for order in self._in_force(agent) if order.said.team.view.name == team]
+        mine = [order for order in self._in_force(agent) if order.said.team.name == team]
         for order in mine:
             if order.said.text == said.text:
                 order.until = until
                 return
         if len(mine) >= self.most:
             raise CallRejected("too_many_actions", self._too_many(team, mine))
-        first = _Trial(translator, said)
-        first.undo()
-        if isinstance(first.outcome, Rejection) and first.outcome.reason not in PASSING:
-            raise CallRejected(first.outcome.reason, first.outcome.message)
+        first = translator.try_(said)
+        if isinstance(first, Rejection) and first.reason not in PASSING:
+            raise CallRejected(first.reason, first.message)
         self._given[agent] = self._given.get(agent, 0) + 1
         order = _Order(self._given[agent], said, until, _vitals(said, observation))
         self._orders.setdefault(agent, []).append(order)
@@ -125,12 +129,13 @@ class StandingOrders:
         """Yield the commands of all orders that are possible now, and end those that are over."""
         for agent in observation.agents:
             for order in self._in_force(agent):
-                before, order.vitals = order.vitals, _vitals(order.said, observation)
-                attacked = were_attacked(before, order.vitals, observation.died)
+                vitals = _vitals(order.said, observation)
+                attacked = were_attacked(order.vitals, vitals, observation.died)
+                order.vitals = vitals
                 if order.until.is_reached(observation.snapshot, attacked=attacked):
-                    order.ended, order.waits_for = "its end is reached", ""
+                    order.end("its end is reached")
                 else:
-                    yield from _given_again(order, observation, translator)
+                    yield from _give(order, observation, translator)
 
     def _in_force(self, agent: str) -> list[_Order]:
         return [order for order in self._orders.get(agent, ()) if not order.ended]
@@ -144,46 +149,33 @@ class StandingOrders:
         )
 
 
-class _Trial:
-    """The translation of a call, which can be undone."""
-
-    def __init__(self, translator: Translator, said: Recognised) -> None:
-        self._translator = translator
-        self._before = copy.deepcopy(translator.ledger), set(translator.ordered)
-        self.outcome = translator.translate(said, standing=True)
-
-    def undo(self) -> None:
-        """Leave no trace in the accounts of the turn."""
-        self._translator.ledger, self._translator.ordered = self._before
-
-
-def _given_again(order: _Order, observation: SideObservation, translator: Translator) -> Sequence[Command]:
+def _give(order: _Order, observation: SideObservation, translator: Translator) -> Sequence[Command]:
     """Return the commands of an order, none if it has to wait; note why."""
     said = _for_the_idle(order.said, observation, translator)
     if isinstance(said, str):
         order.waits_for = said
         return ()
-    trial = _Trial(translator, said)
-    if isinstance(trial.outcome, Rejection):
-        order.waits_for = trial.outcome.message.rpartition(" now: ")[2].rstrip(".")
-        if trial.outcome.reason in LASTING:
-            order.ended, order.waits_for = order.waits_for, ""
+    trial = translator.try_(said)
+    if isinstance(trial, Rejection):
+        order.waits_for = trial.message.rpartition(" now: ")[2].rstrip(".")
+        if trial.reason in LASTING:
+            order.end(order.waits_for)
         return ()
-    if any(_is_busy(tag, observation.snapshot) for command in trial.outcome for tag in command.units):
-        trial.undo()
+    if any(_is_busy(tag, observation.snapshot) for command in trial.commands for tag in command.units):
         order.waits_for = "all that could do it are busy"
         return ()
-    order.times, order.waits_for = order.times + 1, ""
-    return [replace(command, said=None) for command in trial.outcome]
+    translator.keep(trial)
+    order.times += 1
+    order.waits_for = ""
+    return [replace(command, said=None) for command in trial.commands]
 
 
 def _for_the_idle(said: Recognised, observation: SideObservation, translator: Translator) -> Recognised | str:
     """Return the call for the units of its team that have no order; a reason if there are none."""
-    if said.team.team.kind == "side":
+    if said.team.kind == "side":
         return said
     units = observation.snapshot.units
-    teams = observation.teams[said.team.team.agent]
-    team = next((team for team in teams if team.name == said.team.team.name), None)
+    team = observation.team_now(said.team)
     if team is None:
         return "the team has no units"
     idle = tuple(tag for tag in team.tags if tag in units and not units[tag].orders and tag not in translator.ordered)
@@ -200,9 +192,9 @@ def _is_busy(tag: int, snapshot: Snapshot) -> bool:
 def _vitals(said: Recognised, observation: SideObservation) -> dict[int, float]:
     """Return health and shield of the units of a call's team; of the whole side, if the team is one of it."""
     units = observation.snapshot.units
-    if said.team.team.kind == "side":
+    if said.team.kind == "side":
         tags: Sequence[int] = [unit.tag for unit in observation.snapshot.own]
     else:
-        teams = observation.teams[said.team.team.agent]
-        tags = [tag for team in teams if team.name == said.team.team.name for tag in team.tags]
+        team = observation.team_now(said.team)
+        tags = team.tags if team else ()
     return {tag: units[tag].health + units[tag].shield for tag in tags if tag in units}

@@ -11,7 +11,6 @@ reads them with its next observation.
 
 from __future__ import annotations
 
-import functools
 import math
 import operator
 from typing import TYPE_CHECKING
@@ -64,15 +63,15 @@ class Targets:
         end = self.end_of(last)
         return f"its last unit {end}" if end else "its units are not on the map"
 
-    def named(self, said: Recognised) -> tuple[int, ...]:
+    def named_units(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that the first arguments name.
 
         Raises:
             CallRejected: one of them is not a unit of the team, is gone, or is named twice.
         """
-        tags = said.tags[: said.action.named]
+        tags = said.tags[: said.action.actor_count]
         for tag in tags:
-            if tag not in said.team.team.tags:
+            if tag not in said.team.tags:
                 raise self._not_of_team(said, tag)
             if tag not in self._units:
                 raise self._gone(tag)
@@ -89,10 +88,10 @@ class Targets:
         """
         tag = said.tags[-1]
         anywhere = said.action.rule is not None or said.team.camera is None
-        unit = self._units.get(tag) or (self._remembered.get(tag) if anywhere else None)
+        unit = (self._observation.snapshot.known if anywhere else self._units).get(tag)
         if unit is None:
             raise self._nowhere(said, tag)
-        own = tag in said.team.team.tags
+        own = tag in said.team.tags
         if not (anywhere or own or _shows(said.team.camera, unit) or said.team.seen(tag)):
             raise self._out_of_sight(said, unit)
         if said.action.aim == "unit" and (reason := unfit(said.action, aim_of(unit))):
@@ -123,8 +122,7 @@ class Targets:
     def _camera_now(self, said: Recognised) -> Camera | None:
         """Return the present camera of a call's team; None if the team has no screen, or no unit any more."""
         then = said.team.camera
-        teams = self._observation.teams[said.team.team.agent]
-        team = next((team for team in teams if team.name == said.team.team.name), None)
+        team = self._observation.team_now(said.team)
         if then is None or team is None:
             return None
         return Camera(*self._units[team.head].pos, then.size)
@@ -138,7 +136,7 @@ class Targets:
     # --- points -----------------------------------------------------------------------------------------------
 
     def _screen_point(self, said: Recognised) -> WorldPoint:
-        name, camera = said.team.view.name, said.team.camera
+        name, camera = said.team.name, said.team.camera
         if camera is None:
             raise CallRejected("wrong_frame", f"Team {name} has no units and no screen; give this to a team that has.")
         x, y = self._in_frame(said, "screen", camera.size, "minimap", self._observation.map.minimap_size)
@@ -170,18 +168,13 @@ class Targets:
                 "out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}."
             )
         sister = said.action.name.replace(frame.capitalize(), other.capitalize())
-        agent = self._observation.configs[said.team.team.agent]
+        agent = self._observation.configs[said.team.agent]
         has_sister = sister in {action.name for action in agent.catalogue()}
         hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
         where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
         raise CallRejected("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
 
     # --- tags that are wrong ----------------------------------------------------------------------------------
-
-    @functools.cached_property
-    def _remembered(self) -> dict[int, Unit]:
-        """What the side remembers under the fog: resources and structures that it saw once."""
-        return self._observation.snapshot.known
 
     def _nowhere(self, said: Recognised, tag: int) -> CallRejected:
         if end := self.end_of(tag):
@@ -194,11 +187,11 @@ class Targets:
         camera = self._camera_now(said)
         fits = [unit.tag for unit in self._units.values() if _may_be_meant(camera, unit, wanted)]
         hint = self._near_miss(tag, fits) or "use a tag that stands in its lists."
-        return CallRejected("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.view.name}; {hint}")
+        return CallRejected("unknown_target", f"No unit {hex(tag)} is in sight of team {said.team.name}; {hint}")
 
     def _not_of_team(self, said: Recognised, tag: int) -> CallRejected:
-        name = said.team.view.name
-        own = [tag for tag in said.team.team.tags if tag in self._units]
+        name = said.team.name
+        own = [tag for tag in said.team.tags if tag in self._units]
         if self.end_of(tag):
             return self._gone(tag)
         units = f"units of team {name} are {', '.join(map(hex, own))}"
@@ -207,7 +200,7 @@ class Targets:
             hint = self._near_miss(tag, own) or f"{units}."
             return CallRejected("unknown_target", f"There is no unit {hex(tag)}; {hint}")
         what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
-        if said.action.named == 1 and said.tags[-1] in own and len(said.tags) > 1:
+        if said.action.actor_count == 1 and said.tags[-1] in own and len(said.tags) > 1:
             right = f"{said.action.name}({hex(said.tags[-1])}, {hex(tag)})"
             return CallRejected("not_yours", f"{what}, the unit that acts comes first: did you mean <{right}>?")
         owner = self._observation.team_of(tag)
@@ -233,7 +226,7 @@ class Targets:
     def _out_of_sight(self, said: Recognised, unit: Unit) -> CallRejected:
         x, y = self._observation.map.minimap(unit.pos.x, unit.pos.y)
         what = f"{_SIDES[unit.alliance]} {unit.name} {hex(unit.tag)}"
-        away = f"is out of sight of team {said.team.view.name}, at [{x:.0f}, {y:.0f}] of the minimap"
+        away = f"is out of sight of team {said.team.name}, at [{x:.0f}, {y:.0f}] of the minimap"
         return CallRejected("unknown_target", f"The {what} {away}; move there first.")
 
 

@@ -16,6 +16,7 @@ the same reply, since here all commands of a turn reach the game in one loop.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from khala_bridge.catalogue.functions import Function
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.observe.observation import SideObservation
+    from khala_bridge.rules import Ledger
     from khala_protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
@@ -55,6 +57,15 @@ class Command:
     queued: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """The commands of a standing order that may yet be put off, and the accounts of the turn if they are given."""
+
+    commands: list[Command]
+    ledger: Ledger
+    ordered: set[int]
+
+
 class Translator:
     """Translates the calls of one turn, of all agents of a side, one after the other."""
 
@@ -68,22 +79,41 @@ class Translator:
         self.ordered: set[int] = set()
         """Tags of the units that were told something in this turn."""
         self._targets = Targets(observation)
-        self._count: dict[tuple[str, str], int] = {}
+        self._count: Counter[tuple[str, str]] = Counter()
+        """By agent and team, the actions of this turn."""
 
-    def translate(self, said: Recognised, *, standing: bool = False) -> list[Command] | Rejection:
-        """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait.
-
-        A standing order does not count as one of the actions that its team may have.
-        """
+    def translate(self, said: Recognised) -> list[Command] | Rejection:
+        """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait."""
         try:
-            orders = self._standing(said) if standing else self._orders(said)
+            return self._commands(said, self._counted_orders(said))
         except CallRejected as refused:
-            return reject(said.call, refused, said.team.view.name)
-        return [command for order in orders for command in self.commands(order, said)]
+            return reject(said.call, refused, said.team.name)
+
+    def try_(self, said: Recognised) -> Trial | Rejection:
+        """Translate a standing order, and leave the accounts of the turn as they are until `keep`.
+
+        It does not count as one of the actions that its team may have.
+        """
+        ledger = self.ledger
+        ordered = self.ordered
+        self.ledger = ledger.copy()
+        self.ordered = ordered.copy()
+        try:
+            return Trial(self._commands(said, self._orders(said)), self.ledger, self.ordered)
+        except CallRejected as refused:
+            return reject(said.call, refused, said.team.name)
+        finally:
+            self.ledger = ledger
+            self.ordered = ordered
+
+    def keep(self, trial: Trial) -> None:
+        """Make the accounts of the newest trial those of the turn."""
+        self.ledger = trial.ledger
+        self.ordered = trial.ordered
 
     def lacks_units(self, said: Recognised) -> bool:
         """Return True if some units that a call meant are gone since its agent saw them."""
-        return not said.action.named and any(tag not in self._snapshot.units for tag in said.team.team.tags)
+        return not said.action.actor_count and any(tag not in self._snapshot.units for tag in said.team.tags)
 
     def commands(self, order: RuleOrder, said: Recognised | None = None) -> list[Command]:
         """Return the commands of an order, behind the earlier orders of its units in this turn."""
@@ -94,28 +124,28 @@ class Translator:
         found = [Command(said, order.function, first, order.target, order.queued)] if first else []
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
 
-    def _orders(self, said: Recognised) -> list[RuleOrder]:
-        """Return the orders of a call, and count the call if it can be carried out.
+    def _commands(self, said: Recognised, orders: Iterable[RuleOrder]) -> list[Command]:
+        return [command for order in orders for command in self.commands(order, said)]
+
+    def _counted_orders(self, said: Recognised) -> list[RuleOrder]:
+        """Return the orders of a call that is one of the actions of its team.
 
         Raises:
             CallRejected: it cannot be carried out.
         """
-        count = (said.team.team.agent, said.team.team.name)
-        if said.action.rule is not None:
-            found = self._by_rule(said, said.action.rule) if self._may_say(count) else []
-        else:
-            found = self._as_said(said)
-        if not self._may_say(count):
-            allowed = self._max_actions[said.team.team.agent]
+        team = (said.team.agent, said.team.name)
+        allowed = self._max_actions[said.team.agent]
+        if self._count[team] >= allowed:
+            if said.action.rule is None:
+                self._as_said(said)  # another fault is named first
             limit = f"{allowed} action{'s' if allowed > 1 else ''}"
-            raise CallRejected("too_many_actions", f"Team {said.team.view.name} had its {limit} in this reply already.")
-        self._count[count] = self._count.get(count, 0) + 1
-        if said.action.rule is None:
-            self._book(found)
+            raise CallRejected("too_many_actions", f"Team {said.team.name} had its {limit} in this reply already.")
+        found = self._orders(said)
+        self._count[team] += 1
         return found
 
-    def _standing(self, said: Recognised) -> list[RuleOrder]:
-        """Return the orders of a call that counts as no action of its team.
+    def _orders(self, said: Recognised) -> list[RuleOrder]:
+        """Return the orders of a call, entered in the accounts.
 
         Raises:
             CallRejected: it cannot be carried out.
@@ -147,12 +177,9 @@ class Translator:
     def _facts(self, function: Function, tag: int) -> AbilityFacts | None:
         return facts_for(function.ability_id, self._side.units[tag].type, self._side.upgrades)
 
-    def _may_say(self, count: tuple[str, str]) -> bool:
-        return self._count.get(count, 0) < self._max_actions[count[0]]
-
     def _by_rule(self, said: Recognised, rule: str) -> list[RuleOrder]:
         """Return the orders that a rule makes of a call; the rule takes the price from the ledger itself."""
-        units = self._having(said, self._units(said)) if said.team.team.tags else ()
+        units = self._having(said, self._units(said)) if said.team.tags else ()
         tag = self._targets.unit(said).tag if said.action.target_kind == "tag" else None
         point = None if said.point is None else self._targets.place(said)
         try:
@@ -164,7 +191,7 @@ class Translator:
     def _as_said(self, said: Recognised) -> list[RuleOrder]:
         """Return the order of a call that leaves nothing open."""
         function = said.action.pysc2
-        if function is None and not said.team.team.tags:
+        if function is None and not said.team.tags:
             return []
         units = self._having(said, self._units(said))
         if function is None:
@@ -182,7 +209,7 @@ class Translator:
 
     def _units(self, said: Recognised) -> tuple[int, ...]:
         """Return the units that a call means, as far as they exist."""
-        tags = self._targets.named(said) if said.action.named else said.team.team.tags
+        tags = self._targets.named_units(said) if said.action.actor_count else said.team.tags
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
             raise self._cannot(said, [self._targets.end_of_all(tags) if tags else "it has no units"])
@@ -190,7 +217,7 @@ class Translator:
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
         """Return the units that have the action by the task."""
-        listed = self._observation.configs[said.team.team.agent].actions
+        listed = self._observation.configs[said.team.agent].actions
         types = {tag: self._snapshot.units[tag].name for tag in tags}
         found = tuple(tag for tag, name in types.items() if said.action.name in listed.get(name, ()))
         if not found:
@@ -219,7 +246,7 @@ class Translator:
     @staticmethod
     def _cannot(said: Recognised, reasons: list[str]) -> CallRejected:
         why = "; ".join(dict.fromkeys(reasons))
-        return CallRejected("not_available", f"Team {said.team.view.name} cannot do {said.action.name} now: {why}.")
+        return CallRejected("not_available", f"Team {said.team.name} cannot do {said.action.name} now: {why}.")
 
     # --- targets ----------------------------------------------------------------------------------------------
 
@@ -235,9 +262,7 @@ class Translator:
             where = "in the air" if aim.aloft else "on the ground"
             what = f"{hex(unit.tag)} is a {unit.name} {where}"
             if not aiming:
-                raise CallRejected(
-                    "invalid_target", f"{what}, and no weapon of team {said.team.view.name} reaches that."
-                )
+                raise CallRejected("invalid_target", f"{what}, and no weapon of team {said.team.name} reaches that.")
         if not aiming:
             raise CallRejected(
                 "invalid_target", f"{hex(unit.tag)} is the unit itself; {said.action.name} needs another one."

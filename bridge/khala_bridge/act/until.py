@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from khala_bridge.act.rejected import CallRejected
-from khala_bridge.act.vocabulary import squashed
+from khala_bridge.act.vocabulary import squash
 from khala_bridge.knowledge import abilities, knowledge, stand_ins, upgrades
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S
@@ -72,28 +72,28 @@ def read_until(words: str) -> Until:
     """
     if not words:
         return Until()
-    if squashed(words) in ("attacked", "attack", "underattack"):
+    if squash(words) in ("attacked", "attack", "underattack"):
         return Until("attacked", "attacked")
     if clock := _TIME.fullmatch(words):
         return Until(f"{int(clock[1])}:{clock[2]}", "time", 60 * int(clock[1]) + int(clock[2]))
-    if upgrade := _named(words, upgrades()):
+    if upgrade := _match_name(words, upgrades()):
         return Until(upgrade, "upgrade", name=upgrade)
     if amount := _AMOUNT.fullmatch(words):
         number = int(amount["a"] or amount["b"])
         what = amount["what"] or amount["name"]
-        plain = squashed(what)
+        plain = squash(what)
         if plain in ("minerals", "vespene", "gas"):
             kind: Literal["minerals", "vespene"] = "minerals" if plain == "minerals" else "vespene"
             return Until(f"{kind} {number}", kind, number)
-        if name := _named(what, knowledge()):
+        if name := _match_name(what, knowledge()):
             return Until(f"{number} {name}", "count", number, name)
     raise CallRejected("wrong_arguments", f"'{words}' is no end of a standing order: {_FORMS}.")
 
 
-def _named(words: str, known: Iterable[str]) -> str | None:
+def _match_name(words: str, known: Iterable[str]) -> str | None:
     """Return the known name that some words mean, in any spelling and also in the plural."""
-    names = {squashed(name): name for name in known}
-    plain = squashed(words)
+    names = {squash(name): name for name in known}
+    plain = squash(words)
     return names.get(plain) or names.get(plain.removesuffix("s"))
 
 

@@ -36,29 +36,29 @@ class Vocabulary:
         self._catalogue = agent.catalogue()
         self._by_name = {action.name: action for action in self._catalogue}
         for action in self._catalogue:
-            self._actions[squashed(action.name)] = action
+            self._actions[squash(action.name)] = action
         for action in self._catalogue:
             for alias in action.aliases:
-                self._actions.setdefault(squashed(alias), action)
+                self._actions.setdefault(squash(alias), action)
 
     def find(self, name: str) -> Action | None:
         """Return the action of this name, in any spelling; None if the agent has no such action."""
-        return self._actions.get(squashed(name))
+        return self._actions.get(squash(name))
 
     def has(self, team: TeamObservation, action: Action) -> bool:
         """Return True if a team has an action, with its present units."""
-        return action.name in team.team.config.actions or any(
+        return action.name in team.config.actions or any(
             action.name in self._agent.actions.get(unit.type, ()) for unit in team.view.units
         )
 
     def hint(self, name: str, teams: Iterable[TeamObservation]) -> str:
         """Return the actions that some teams have instead of a wrong name, as the end of a sentence."""
-        wanted = squashed(name)
-        words = _words(name)
+        wanted = squash(name)
+        words = _split(name)
         known = list(self._sayable(list(teams)))
         likeness = {action.name: _likeness(_pairs(wanted), words, action.name) for action in known}
         ranked = sorted(known, key=lambda action: -likeness[action.name])[:NEAREST]
-        if ranked and difflib.SequenceMatcher(None, wanted, squashed(ranked[0].name)).ratio() >= CLOSE:
+        if ranked and difflib.SequenceMatcher(None, wanted, squash(ranked[0].name)).ratio() >= CLOSE:
             return f"did you mean {ranked[0].form}?"
         alike = [action.form for action in ranked if likeness[action.name] >= ALIKE]
         if alike:
@@ -71,21 +71,21 @@ class Vocabulary:
         if not teams:
             return self._catalogue
         types = dict.fromkeys(unit.type for team in teams for unit in team.view.units)
-        lists = (*(team.team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
+        lists = (*(team.config.actions for team in teams), *(self._agent.actions.get(name, ()) for name in types))
         return [self._by_name[name] for name in dict.fromkeys(name for listed in lists for name in listed)]
 
 
 @functools.lru_cache(maxsize=8192)
-def squashed(name: str) -> str:
+def squash(name: str) -> str:
     """Return a name without what models vary in it: case, underscores, blanks, hyphens."""
     return "".join(filter(str.isalnum, name)).casefold()
 
 
 def _likeness(pairs: frozenset[str], words: frozenset[str], known: str) -> float:
     """Return the likeness of two names: by pairs of letters (Dice's coefficient), and by common words."""
-    its_pairs = _pairs(squashed(known))
+    its_pairs = _pairs(squash(known))
     letters = 2 * len(pairs & its_pairs) / max(len(pairs) + len(its_pairs), 1)
-    return letters + len(words & _words(known)) / max(len(words), 1)
+    return letters + len(words & _split(known)) / max(len(words), 1)
 
 
 @functools.lru_cache(maxsize=8192)
@@ -94,5 +94,5 @@ def _pairs(name: str) -> frozenset[str]:
 
 
 @functools.lru_cache(maxsize=8192)
-def _words(name: str) -> frozenset[str]:
+def _split(name: str) -> frozenset[str]:
     return frozenset(name.replace("-", "_").casefold().split("_"))

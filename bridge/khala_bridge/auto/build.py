@@ -10,7 +10,7 @@ import numpy as np
 from khala_bridge.auto.builders import GAS_STRUCTURES, builder
 from khala_bridge.auto.places import for_structure, free_base, free_geyser, has_room
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
-from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised
+from khala_bridge.auto.sites import best, footprint_need, good, legal, near, on_corner, promised_cells
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of, sites
@@ -44,7 +44,7 @@ def build_at(ask: RuleRequest) -> list[RuleOrder]:
             raise NotAvailable("invalid_target", f"There is no free geyser there; {structure_of(ask)} stands on one.")
         return _on_geyser(ask, near_by[0])
     footprint = footprint_need(structure_of(ask))
-    return _checked(ask, footprint.middle(footprint.cell(*ask.point)))
+    return _check_and_build(ask, footprint.middle(footprint.cell(*ask.point)))
 
 
 def build_near(ask: RuleRequest) -> list[RuleOrder]:
@@ -53,7 +53,7 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: as `build_at`, or there is no place near it.
     """
-    unit = _named(ask)
+    unit = _landmark(ask)
     ask.able()
     land = land_of(ask.snapshot)
     structure = structure_of(ask)
@@ -64,13 +64,13 @@ def build_near(ask: RuleRequest) -> list[RuleOrder]:
             raise NotAvailable("invalid_target", f"There is no free geyser near the {name(unit)} {hex(unit.tag)}.")
         return _on_geyser(ask, found)
     if sites()[structure].clear:
-        return _checked(ask, _base_of(ask, unit).place)
+        return _check_and_build(ask, _base_of(ask, unit).place)
     cost = near(land, [place(unit)], reach=NEAR, corner=on_corner(structure))
     cell = best(good(land, ask.ledger, structure), cost) or best(legal(land, ask.ledger, structure), cost)
     if cell is None:
         what = f"{name(unit)} {hex(unit.tag)}{_lack(structure)}"
         raise NotAvailable("invalid_target", f"There is no room for a {structure} within {NEAR:g} of the {what}.")
-    return _at(ask, footprint_need(structure).middle(cell))
+    return _build(ask, footprint_need(structure).middle(cell))
 
 
 def lock_base(ask: RuleRequest) -> list[RuleOrder]:
@@ -79,10 +79,10 @@ def lock_base(ask: RuleRequest) -> list[RuleOrder]:
     Raises:
         NotAvailable: as `build_at`.
     """
-    unit = _named(ask)
+    unit = _landmark(ask)
     ask.able()
     footprint = footprint_need(structure_of(ask))
-    return _checked(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
+    return _check_and_build(ask, footprint.middle(footprint.cell(*_base_of(ask, unit).place)))
 
 
 def build_auto(ask: RuleRequest) -> list[RuleOrder]:
@@ -97,12 +97,12 @@ def build_auto(ask: RuleRequest) -> list[RuleOrder]:
     if is_gas(ask):
         orders = _on_geyser(ask, free_geyser(ask, free_geysers(ask)))
     elif sites()[structure].clear:
-        orders = _at(ask, free_base(ask, land, structure))
+        orders = _build(ask, free_base(ask, land, structure))
     else:
         cell = for_structure(land, ask.ledger, structure)
         if cell is None:
             raise _no_room(ask)
-        orders = _at(ask, footprint_need(structure).middle(cell))
+        orders = _build(ask, footprint_need(structure).middle(cell))
     return [*orders, *_back_to_work(ask, orders[-1])]
 
 
@@ -130,13 +130,13 @@ def _no_room(ask: RuleRequest) -> NotAvailable:
 # the order ------------------------------------------------------------------------------------------------------------
 
 
-def _checked(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
+def _check_and_build(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
     """Return the orders to build at the middle of some cells, which the host has not chosen itself."""
     _check_site(ask, land_of(ask.snapshot), middle)
-    return _at(ask, middle)
+    return _build(ask, middle)
 
 
-def _at(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
+def _build(ask: RuleRequest, middle: WorldPoint) -> list[RuleOrder]:
     """Return the orders to build at the middle of some cells."""
     structure = structure_of(ask)
     worker, queued = builder(ask, middle)
@@ -207,7 +207,7 @@ def _why_not(ask: RuleRequest, land: Land, cell: tuple[int, int]) -> str:
     reasons = (
         (again, f"a {structure_of(ask)} is going to be built there already."),
         (land.taken[x, y].any(), f"a {name(standing) if standing else 'unit'} is in its way."),
-        ((land.planned | promised(land, ask.ledger))[x, y].any(), "something else is going to be built there."),
+        ((land.planned | promised_cells(land, ask.ledger))[x, y].any(), "something else is going to be built there."),
         (site.ground == "creep" and not land.creep[x, y].all(), "it needs creep under all of it."),
         (site.ground in ("bare", "powered") and land.creep[x, y].any(), "there is creep, on which only Zerg build."),
         (site.seen and (land.sight[x, y] < SEEN_NOW).any(), "the place has to be in sight."),
@@ -231,7 +231,7 @@ def _lack(structure: str) -> str:
             return ""
 
 
-def _named(ask: RuleRequest) -> Unit:
+def _landmark(ask: RuleRequest) -> Unit:
     """Return the unit that names the place; it may be one that is only remembered."""
     unit = None if ask.tag is None else land_of(ask.snapshot).unit(ask.tag)
     if unit is None:

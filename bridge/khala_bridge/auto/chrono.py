@@ -76,7 +76,7 @@ def training_workers(ask: RuleRequest) -> list[Unit]:
         NotAvailable: there is none.
     """
     found = [unit for unit, facts in _at_work(ask) if _is_worker(facts)]
-    return _unboosted(ask, found, "no Nexus trains Probes that is not boosted yet; train Probes first.")
+    return _without_boost(ask, found, "no Nexus trains Probes that is not boosted yet; train Probes first.")
 
 
 def training_army(ask: RuleRequest) -> list[Unit]:
@@ -87,7 +87,7 @@ def training_army(ask: RuleRequest) -> list[Unit]:
     """
     training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
     why = "no structure trains an army unit that is not boosted yet; train one first."
-    return _unboosted(ask, [*training, *_recharging(ask)], why)
+    return _without_boost(ask, [*training, *_recharging(ask)], why)
 
 
 def researching(ask: RuleRequest) -> list[Unit]:
@@ -97,7 +97,9 @@ def researching(ask: RuleRequest) -> list[Unit]:
         NotAvailable: there is none.
     """
     found = [unit for unit, facts in _at_work(ask) if facts.researches is not None]
-    return _unboosted(ask, found, "no structure researches anything that is not boosted yet; research something first.")
+    return _without_boost(
+        ask, found, "no structure researches anything that is not boosted yet; research something first."
+    )
 
 
 def working(ask: RuleRequest) -> list[Unit]:
@@ -152,7 +154,7 @@ def _recharging(ask: RuleRequest) -> list[Unit]:
     return [gate for gate in gates if not ask.can(gate.tag, zealot.id)]
 
 
-def _unboosted(ask: RuleRequest, units: Sequence[Unit], nothing: str) -> list[Unit]:
+def _without_boost(ask: RuleRequest, units: Sequence[Unit], nothing: str) -> list[Unit]:
     """Return those of some structures that are not boosted, nor going to be by an earlier call of this turn."""
     aimed = ask.ledger.aimed
     left = [u for u in units if BOOSTED not in u.buff_ids and (ask.function.name, u.tag) not in aimed]

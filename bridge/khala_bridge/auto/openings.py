@@ -64,7 +64,7 @@ def _producing(ask: RuleRequest) -> list[Unit]:
     return [ask.snapshot.units[unit.tag] for unit in ask.able() if unit.orders]
 
 
-def _unfinished(ask: RuleRequest) -> list[Unit]:
+def _under_construction(ask: RuleRequest) -> list[Unit]:
     return [u for u in own_structures(ask.snapshot) if u.build_progress < 1 and ask.has(u.tag)]
 
 
@@ -131,7 +131,7 @@ def _has_cell(allowed: Bools, unit: Unit, reach: float, *, corner: bool) -> bool
 
 _TARGETS: Final[dict[str, Callable[[RuleRequest], list[Unit]]]] = {
     "stop_building": _producing,
-    "cancel_building": _unfinished,
+    "cancel_building": _under_construction,
     "warp_near": _with_power,
     "cast": _castable,
     "chrono_unit": _to_boost,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from khala_bridge.catalogue.functions import Function
     from khala_bridge.frames import WorldPoint
     from khala_bridge.knowledge import AbilityFacts
-    from khala_bridge.rules import Ledger, Side, Unavailable, UnitState
+    from khala_bridge.rules import Ledger, SideState, Unavailable, UnitState
     from khala_bridge.state import Snapshot
     from khala_protocol.messages import RejectionReason
 
@@ -50,7 +50,7 @@ class RuleRequest:
         return facts_for(number, unit_type, self.side.upgrades) or abilities().get(number)
 
     @property
-    def side(self) -> Side:
+    def side(self) -> SideState:
         """The player's side, as `khala_bridge.rules` knows it."""
         return side_of(self.snapshot)
 

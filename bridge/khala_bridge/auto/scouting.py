@@ -46,7 +46,7 @@ def scout(ask: RuleRequest) -> list[RuleOrder]:
         return _look(ask, unit, places[number])
     watched = {_seen_by(places, WorldPoint(*goal)) for goal in (*goals.values(), *ask.ledger.looks)}
     to = next((point for number, point in enumerate(places) if number not in watched), places[0])
-    return _look(ask, min(units, key=lambda u: (_needed(ask.snapshot, u), math.dist(place(u), to), u.tag)), to)
+    return _look(ask, min(units, key=lambda u: (_importance(ask.snapshot, u), math.dist(place(u), to), u.tag)), to)
 
 
 def _look(ask: RuleRequest, unit: Unit, to: WorldPoint) -> list[RuleOrder]:
@@ -69,7 +69,7 @@ def _seen_by(places: list[WorldPoint], goal: WorldPoint | None) -> int | None:
     return next((n for n, p in enumerate(places) if abs(p.x - goal.x) + abs(p.y - goal.y) <= SAME_PLACE), None)
 
 
-def _needed(snapshot: Snapshot, unit: Unit) -> int:
+def _importance(snapshot: Snapshot, unit: Unit) -> int:
     """Return how important a unit's present work is."""
     return int(use(snapshot, unit)) if is_worker(unit) else 0
 

@@ -49,13 +49,13 @@ def _fitting(land: Land, structure: str, ground: Bools) -> Bools:
     site = sites()[structure]
     footprint = footprint_need(structure)
     result = everywhere(ground & land.clear if site.clear else ground, footprint.cells)
-    return result & land.powered(corner=on_corner(structure)) if site.ground == "powered" else result
+    return result & land.power_cells(corner=on_corner(structure)) if site.ground == "powered" else result
 
 
 def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
     """Return the cells (w, h) on which a part of the structure may stand."""
     site = sites()[structure]
-    ground = land.free & ~promised(land, ledger)
+    ground = land.free & ~promised_cells(land, ledger)
     if site.ground == "creep":
         ground &= land.creep
     elif site.ground != "any":
@@ -63,7 +63,7 @@ def _ground(land: Land, ledger: Ledger, structure: str) -> Bools:
     return ground & (land.sight >= SEEN_NOW) if site.seen else ground
 
 
-def promised(land: Land, ledger: Ledger) -> Bools:
+def promised_cells(land: Land, ledger: Ledger) -> Bools:
     """Return the cells (w, h) on which earlier calls of this turn are going to build."""
     taken = np.zeros(land.ground.size, np.bool_)
     for x0, y0, x1, y1 in ledger.sites:
@@ -88,7 +88,7 @@ _good_before: dict[object, tuple[int, int]] = {}
 
 def _find_good(land: Land, structure: str, key: object) -> bool:
     ground = _ground(land, NO_ORDERS, structure) & ~land.kept & (land.sight > 0)
-    cells = np.argwhere(_fitting(land, structure, ground) & _reached(land))
+    cells = np.argwhere(_fitting(land, structure, ground) & _reachable(land))
     if len(cells):
         x, y = cells[len(cells) // 2].tolist()
         _good_before[key] = x, y
@@ -109,8 +109,8 @@ def _is_good(land: Land, structure: str, cell: tuple[int, int] | None) -> bool:
     ground = land.free[x, y] & ~land.kept[x, y] & (land.sight[x, y] >= (SEEN_NOW if site.seen else 1))
     if site.ground != "any":
         ground &= land.creep[x, y] == (site.ground == "creep")
-    powered = site.ground != "powered" or bool(land.powered(corner=on_corner(structure))[cell])
-    return bool(ground.all()) and powered and bool(_reached(land)[cell])
+    powered = site.ground != "powered" or bool(land.power_cells(corner=on_corner(structure))[cell])
+    return bool(ground.all()) and powered and bool(_reachable(land)[cell])
 
 
 def good(land: Land, ledger: Ledger, structure: str) -> Bools:
@@ -120,7 +120,7 @@ def good(land: Land, ledger: Ledger, structure: str) -> Bools:
     workers can walk to it.
     """
     ground = _ground(land, ledger, structure) & ~land.kept
-    result = _fitting(land, structure, ground & (land.sight > 0)) & _reached(land)
+    result = _fitting(land, structure, ground & (land.sight > 0)) & _reachable(land)
     wishes = [_open_around(land, ledger, _with_addon(structure))]
     if sites()[structure].addon:
         wishes.insert(0, everywhere(ground, ADDON))
@@ -156,7 +156,7 @@ def _with_addon(structure: str) -> Cells:
     return (*cells, *ADDON) if sites()[structure].addon else cells
 
 
-def _reached(land: Land) -> Bools:
+def _reachable(land: Land) -> Bools:
     """Return the cells (w, h) that a worker can walk to from any own town hall; all cells if there is none."""
     reached = np.zeros(land.ground.size, np.bool_)
     for hall in land.own_halls:
@@ -170,7 +170,7 @@ def _open_around(land: Land, ledger: Ledger, cells: Cells) -> Bools:
     A unit can walk round such a structure to every place that it could reach before: no gap is closed, no unit is
     locked in and no add-on walled up, wherever the structure stands.
     """
-    open_ = land.open & ~land.planned & ~promised(land, ledger)
+    open_ = land.open & ~land.planned & ~promised_cells(land, ledger)
     width, height = open_.shape
     ring = _ring(cells)
     reach = max(max(abs(dx), abs(dy)) for dx, dy in ring)
@@ -215,7 +215,7 @@ def near(land: Land, points: Iterable[WorldPoint], *, reach: float = np.inf, cor
 def new_power(land: Land, ledger: Ledger) -> Floats:
     """Return the number (w, h) of new places for a structure of 3 x 3, in no unit's way, that a Pylon would power."""
     places = everywhere(_ground(land, ledger, "Gateway") & ~land.kept, footprint_need("Gateway").cells)
-    places &= ~land.powered(corner=False)
+    places &= ~land.power_cells(corner=False)
     for left, bottom, right, top in ledger.sites:  # it may be a Pylon; either way the next one stands elsewhere
         x, y = int((left + right) / 2), int((bottom + top) / 2)
         places[max(x - PYLON_REACH, 0) : x + PYLON_REACH + 1, max(y - PYLON_REACH, 0) : y + PYLON_REACH + 1] = False

@@ -9,7 +9,7 @@ import numpy as np
 
 from khala_bridge.auto.cast import caster, casters, note
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
-from khala_bridge.auto.sites import best, near, promised
+from khala_bridge.auto.sites import best, near, promised_cells
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import SEEN_NOW
@@ -140,7 +140,7 @@ def _no_creep(ask: RuleRequest) -> NotAvailable:
 def _edge(ask: RuleRequest, unit: Unit, reach: float) -> WorldPoint | None:
     """Return the free place on creep, within reach of a unit, that is farthest from all tumors and hatcheries."""
     land = land_of(ask.snapshot)
-    free = land.free & land.creep & (land.sight >= SEEN_NOW) & ~land.kept & ~promised(land, ask.ledger)
+    free = land.free & land.creep & (land.sight >= SEEN_NOW) & ~land.kept & ~promised_cells(land, ask.ledger)
     away = near(land, [place(unit)], reach=reach)
     sources = [place(u) for u in of_types(ask.snapshot, (*TUMORS, *HATCHERIES))]
     promised_spots = [WorldPoint((x0 + x1) / 2, (y0 + y1) / 2) for x0, y0, x1, y1 in ask.ledger.sites]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
-from khala_bridge.auto.sites import best, near, promised
+from khala_bridge.auto.sites import best, near, promised_cells
 from khala_bridge.frames import WorldPoint
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.resources import coordinates, everywhere
@@ -98,7 +98,7 @@ def warp_auto(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: no gate is ready, the resources do not suffice, or no field has room.
     """
     gate = _gate(ask)
-    for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _crowded(ask, source)):
+    for source in sorted(land_of(ask.snapshot).power_sources, key=lambda source: _rank(ask, source)):
         cell = _room(ask.snapshot, ask.ledger, source)
         if cell is not None:
             return _warp(ask, gate, cell)
@@ -125,7 +125,7 @@ def _gate(ask: RuleRequest) -> Unit:
 # places ---------------------------------------------------------------------------------------------------------------
 
 
-def _crowded(ask: RuleRequest, source: PowerSource) -> tuple[bool, int, int]:
+def _rank(ask: RuleRequest, source: PowerSource) -> tuple[bool, int, int]:
     """Return a rank: the lower, the better a field is for the next unit."""
     middle = (source.pos.x, source.pos.y)
     units = [u for u in ask.snapshot.own if not is_structure(u) and math.dist(place(u), middle) <= CROWD]
@@ -146,15 +146,15 @@ def _room(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> tuple[int,
     land = land_of(snapshot)
     free = _free(snapshot, ledger, source)
     away = near(land, [WorldPoint(source.pos.x, source.pos.y)])
-    airy = free & everywhere(land.open & ~promised(land, ledger), BESIDE)
+    airy = free & everywhere(land.open & ~promised_cells(land, ledger), BESIDE)
     return best(airy & ~land.kept, away) or best(airy, away) or best(free, away)
 
 
 def _free(snapshot: Snapshot, ledger: Ledger, source: PowerSource) -> Bools:
     """Return the cells (w, h) of a field where a unit touches no other."""
     land = land_of(snapshot)
-    field = land.powered(corner=False, by=source.tag) & land.open
-    return field & ~promised(land, ledger) & ~_bodies(snapshot, land, source)
+    field = land.power_cells(corner=False, by=source.tag) & land.open
+    return field & ~promised_cells(land, ledger) & ~_bodies(snapshot, land, source)
 
 
 def _bodies(snapshot: Snapshot, land: Land, source: PowerSource) -> Bools:

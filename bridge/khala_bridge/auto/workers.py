@@ -137,10 +137,10 @@ def _gather(snapshot: Snapshot, taken: frozenset[int] | set[int]) -> list[RuleOr
     if not posts:
         return []
     idle = [worker for worker in workers(snapshot) if not worker.orders and worker.tag not in taken]
-    return [*_employed(posts, idle), *_moved(snapshot, posts, taken)]
+    return [*_employ(posts, idle), *_rebalance(snapshot, posts, taken)]
 
 
-def _employed(posts: list[_Post], idle: list[Unit]) -> Iterator[RuleOrder]:
+def _employ(posts: list[_Post], idle: list[Unit]) -> Iterator[RuleOrder]:
     """Yield each idle worker with the place that needs it most."""
     for worker in idle:
         post = _post_for(posts, worker)
@@ -175,7 +175,7 @@ def _post_for(posts: list[_Post], worker: Unit) -> _Post:
     return min(posts, key=rank)
 
 
-def _moved(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[RuleOrder]:
+def _rebalance(snapshot: Snapshot, posts: list[_Post], taken: frozenset[int] | set[int]) -> Iterator[RuleOrder]:
     """Yield moves of workers from full places to emptier ones: to the gas of the same base, and to other bases."""
     free = [
         worker

@@ -50,7 +50,7 @@ def mobile() -> tuple[str, ...]:
 
 
 @functools.cache
-def armed() -> tuple[str, ...]:
+def armed_types() -> tuple[str, ...]:
     """Return the types that attack by an order, again and again."""
     return tuple(name for name in melee_types() if fact(name).weapons and name not in _SPECIAL_ATTACK)
 

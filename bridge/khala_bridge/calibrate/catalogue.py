@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from khala_bridge.calibrate.probe import Probe
 
 _MODULES: Final = (movement, crowds, weapons, damage, targets, spells, production, making, terrain, economy, fights)
-_ALL: Final = tuple(one for module in _MODULES for one in module.PROBES)
+_ALL: Final = tuple(probe for module in _MODULES for probe in module.PROBES)
 
 PROBES: Final = tuple(
-    one for setting in dict.fromkeys(one.setting for one in _ALL) for one in _ALL if one.setting == setting
+    probe for setting in dict.fromkeys(probe.setting for probe in _ALL) for probe in _ALL if probe.setting == setting
 )
 
 
@@ -40,6 +40,6 @@ def choose(patterns: Sequence[str]) -> list[Probe]:
         ConfigError: a pattern fits none.
     """
     for pattern in patterns:
-        if not any(fnmatchcase(one.id, pattern) for one in PROBES):
+        if not any(fnmatchcase(probe.id, pattern) for probe in PROBES):
             raise ConfigError(f"there is no probe {pattern!r}: `khala calibrate --list` shows all")
-    return [one for one in PROBES if not patterns or any(fnmatchcase(one.id, pattern) for pattern in patterns)]
+    return [probe for probe in PROBES if not patterns or any(fnmatchcase(probe.id, pattern) for pattern in patterns)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala_bridge.game.processes import explained, new_process
+from khala_bridge.game.processes import explain_errors, new_process
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,19 +39,19 @@ class ProcessConnection:
     def send(self, **request: Any) -> Any:
         """See `Connection`."""
         (kind,) = request
-        with explained(f"the game did not answer {kind}"):
+        with explain_errors(f"the game did not answer {kind}"):
             return self._client.send(**request)
 
 
 @contextlib.contextmanager
-def started(sc2path: Path, environment: dict[str, str] | None = None) -> Iterator[ProcessConnection]:
+def run_game(sc2path: Path, environment: dict[str, str] | None = None) -> Iterator[ProcessConnection]:
     """Start the game of an install, and end it.
 
     Raises:
         GameMissing: there is no game.
         GameError: it could not be started.
     """
-    with explained("the game could not be started"):
+    with explain_errors("the game could not be started"):
         process = new_process(sc2path, environment)
     try:
         yield ProcessConnection(process.controller._client)  # noqa: SLF001  # its own methods check a status of their own

@@ -71,7 +71,7 @@ class Lab:
         known = self._connection.send(data=sc.RequestData(unit_type_id=True))
         kinds = {kind.unit_id: kind for kind in known.units if kind.name}
         self.types: dict[str, Any] = {
-            name: kinds[one.id] for name, one in unit_facts(VERSION).items() if one.id in kinds
+            name: kinds[facts.id] for name, facts in unit_facts(VERSION).items() if facts.id in kinds
         }
         """Names are PySC2's: those of the game differ, and ids do not."""
         self.name_of: dict[int, str] = {kind.unit_id: name for name, kind in self.types.items()}
@@ -223,7 +223,7 @@ class Lab:
         """Return the ids of what a unit can be ordered to do now."""
         query = query_pb2.RequestQuery(abilities=[query_pb2.RequestQueryAvailableAbilities(unit_tag=tag)])
         answer = self._connection.send(query=query)
-        return frozenset(ability.ability_id for one in answer.abilities for ability in one.abilities)
+        return frozenset(ability.ability_id for available in answer.abilities for ability in available.abilities)
 
     def set(self, tag: int, **values: float) -> None:
         """Set a unit's `Life`, `Shields` or `Energy`."""

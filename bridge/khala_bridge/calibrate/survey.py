@@ -12,7 +12,7 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_bridge.calibrate.catalogue import PROBES
-from khala_bridge.calibrate.connection import started, version
+from khala_bridge.calibrate.connection import run_game, version
 from khala_bridge.errors import GameError
 from khala_bridge.task.maps import known_maps
 
@@ -46,11 +46,11 @@ def survey(sc2path: Path, environment: dict[str, str] | None = None) -> Survey:
 
     Raises:
         GameMissing: there is no game.
-        GameError: it cannot be started, or dies.
+        GameError: it cannot be run_game, or dies.
     """
     files = sorted({spec.file for spec in known_maps().values()} | {probe.setting.map for probe in PROBES})
     there = [file for file in files if (sc2path / "Maps" / file).is_file()]
-    with started(sc2path, environment) as connection:
+    with run_game(sc2path, environment) as connection:
         said, build, _ = version(connection)
         tried = {file: _try(connection, file) for file in there}
         loaded = tuple(file for file, trouble in tried.items() if not trouble)

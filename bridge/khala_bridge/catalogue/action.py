@@ -54,14 +54,14 @@ class Action(Frozen):
     """Unit type or upgrade that it produces."""
 
     @functools.cached_property
-    def named(self) -> int:
+    def actor_count(self) -> int:
         """How many of its arguments name the units that carry it out."""
         return {"unit": 1, "two_units": 2}.get(self.subject, 0)
 
     @functools.cached_property
     def target_kind(self) -> ArgKind | None:
         """The kind of the target argument; None for an action without a target."""
-        return self.args[self.named] if len(self.args) > self.named else None
+        return self.args[self.actor_count] if len(self.args) > self.actor_count else None
 
     @property
     def form(self) -> str:

@@ -20,7 +20,7 @@ from khala_bridge import data
 from khala_bridge.catalogue.action import GROUP_SELECTOR, Action, ArgKind
 from khala_bridge.catalogue.fault import fault
 from khala_bridge.catalogue.generated import GROUP as GENERATED
-from khala_bridge.catalogue.generated import generated
+from khala_bridge.catalogue.generated import generate
 from khala_bridge.errors import CatalogueError
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ __all__ = [
     "catalogue",
     "catalogue_sha256",
     "chosen",
-    "curated",
     "example",
     "read",
+    "read_curated",
 ]
 
 DIRECTORY = "actions"
@@ -69,12 +69,12 @@ def catalogue() -> dict[str, Action]:
     Raises:
         CatalogueError: an entry contradicts another one or PySC2's functions.
     """
-    written = curated()
+    written = read_curated()
     found = dict(written)
     spellings = _Spellings()
     for action in written.values():
         spellings.add(action)
-    for action in generated(written):
+    for action in generate(written):
         if wrong := spellings.add(action) or fault(action):
             raise CatalogueError(f"text action {action.name}, made by rule: {wrong}")
         found[action.name] = action
@@ -82,7 +82,7 @@ def catalogue() -> dict[str, Action]:
 
 
 @functools.cache
-def curated() -> dict[str, Action]:
+def read_curated() -> dict[str, Action]:
     """Return the actions of the files, by name.
 
     Raises:

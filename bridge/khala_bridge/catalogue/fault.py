@@ -36,9 +36,9 @@ def fault(action: Action) -> str | None:
 
 
 def _of_subject(action: Action) -> str | None:
-    if len(action.args) < action.named or set(action.args[: action.named]) - {"tag"}:
-        return f"its first {action.named} argument(s) name units, so they are tags, not {list(action.args)}"
-    if len(action.args) > action.named + 1:
+    if len(action.args) < action.actor_count or set(action.args[: action.actor_count]) - {"tag"}:
+        return f"its first {action.actor_count} argument(s) name units, so they are tags, not {list(action.args)}"
+    if len(action.args) > action.actor_count + 1:
         return f"it has more than one target: {list(action.args)}"
     if action.target and action.target_kind != "tag":
         return f"only a tag can be {action.target}, and it has none for its target"

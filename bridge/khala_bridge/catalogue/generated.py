@@ -63,7 +63,7 @@ def without_words() -> dict[str, str]:
     return reasons
 
 
-def generated(curated: Mapping[str, Action]) -> Iterator[Action]:
+def generate(curated: Mapping[str, Action]) -> Iterator[Action]:
     """Yield the actions that are not written by hand: first for teams and the side, then for single units."""
     taken = {name.casefold() for action in curated.values() for name in (action.name, *action.aliases)}
     made = [action for action in _of_functions(curated) if action.name.casefold() not in taken]
@@ -104,7 +104,7 @@ def _of_function(function: Function, form: Form, like: Action | None) -> Action:
     return Action(
         name=function.stem + form.ending,
         args=form.args,
-        about=like.about if like and not facts.about else f"{_words(function, facts)} {form.remark}".strip(),
+        about=like.about if like and not facts.about else f"{_description(function, facts)} {form.remark}".strip(),
         group=GROUP,
         race=_race(units),
         subject="side" if research else "team",
@@ -179,17 +179,17 @@ def _race(users: tuple[str, ...]) -> Literal["protoss", "terran", "zerg"] | None
     return None if found == "neutral" else found
 
 
-def _words(function: Function, facts: AbilityFacts) -> str:
+def _description(function: Function, facts: AbilityFacts) -> str:
     """Return the description of an ability, or one made from its name."""
     if facts.about:
         return facts.about
     kind, _, rest = function.stem.partition("_")
     if kind == "Cancel":
-        return f"Call off what is under way: {_spaced(rest)}."
+        return f"Call off what is under way: {_split_words(rest)}."
     if match := _LEVEL.fullmatch(rest):
-        return f"Research level {match[2]} of {_spaced(match[1])}."
-    return f"{_spaced(kind)}: {_spaced(rest)}." if rest else f"{_spaced(kind)}."
+        return f"Research level {match[2]} of {_split_words(match[1])}."
+    return f"{_split_words(kind)}: {_split_words(rest)}." if rest else f"{_split_words(kind)}."
 
 
-def _spaced(name: str) -> str:
+def _split_words(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])|_", " ", name)

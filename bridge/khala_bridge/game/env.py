@@ -13,7 +13,7 @@ from absl import flags
 
 from khala_bridge.compat import maps, sc2_env
 from khala_bridge.game.ports import pick_port, pick_ports
-from khala_bridge.game.processes import environment_of, explained, new_process, pointed_to, settle_flags
+from khala_bridge.game.processes import environment_of, explain_errors, new_process, pointed_to, settle_flags
 
 if TYPE_CHECKING:
     from khala_bridge.game.game import GameConfig
@@ -90,7 +90,7 @@ class Map(maps.Map):  # type: ignore[misc]  # PySC2 is untyped
         return self._name
 
 
-def started(env: Env, config: GameConfig, *given: Any) -> Any:
+def start(env: Env, config: GameConfig, *given: Any) -> Any:
     """Return an environment that is ready to be reset.
 
     Args:
@@ -101,7 +101,7 @@ def started(env: Env, config: GameConfig, *given: Any) -> Any:
     settle_flags()
     flags.FLAGS["sc2_timeout"].value = config.start_timeout_s
     try:
-        with pointed_to(config.sc2path), explained("the game could not be started"):
+        with pointed_to(config.sc2path), explain_errors("the game could not be started"):
             env.__init__(config, *given)  # type: ignore[misc]  # see above
     except BaseException:
         env.close()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from khala_bridge.act import Command, Executor
-    from khala_bridge.act.plan import Plan, Played
+    from khala_bridge.act.plan import Plan, PlanResult
     from khala_bridge.state import Snapshot
 
 log = logging.getLogger(__name__)
@@ -99,7 +99,7 @@ class StepResult:
     """The result of one player's plan."""
 
     snapshot: Snapshot
-    played: Played
+    played: PlanResult
     env_steps: int
     """Calls of `SC2Env.step` that the plan took; players share them."""
 
@@ -131,7 +131,7 @@ class Game(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class GamePatience:
     """How long a game may take to answer before it is taken to hang; what it has shown so far decides."""
 
     unknown_s: float = 120.0
@@ -144,7 +144,7 @@ class Patience:
     hangs: str = "the game"
     """What it is that does not answer then."""
 
-    def against(self, opponent: Opponent) -> Patience:
+    def against(self, opponent: Opponent) -> GamePatience:
         """Return it for a game whose opponent may take its time, too."""
         if not opponent.joins:
             return self
@@ -173,7 +173,7 @@ class GameThread:
         self,
         start: Callable[[], Game],
         *,
-        patience: Patience | None = None,
+        patience: GamePatience | None = None,
         give_up: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare a game without starting it.
@@ -185,7 +185,7 @@ class GameThread:
         """
         self._start = start
         self._give_up = give_up
-        self._patience = patience or Patience()
+        self._patience = patience or GamePatience()
         self._slowest_s: float | None = None
         self._slowest_reset_s: float | None = None
         self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")

@@ -88,7 +88,7 @@ class Guest:
         self._listening.result()
         if self._opponent.command:
             check_trusted([shlex.join(self._opponent.command)])
-            self._bot = _started(self._opponent.command + self.arguments, environment, self._invitation.log)
+            self._bot = _start(self._opponent.command + self.arguments, environment, self._invitation.log)
         else:
             self._invitation.say(f"start the bot: python run.py {shlex.join(self.arguments)}")
         self._wait(self._asked.is_set)
@@ -215,7 +215,7 @@ class Guest:
         self._left.set()
 
 
-def _started(
+def _start(
     command: tuple[str, ...], environment: Mapping[str, str] | None, log: Path | None
 ) -> subprocess.Popen[bytes]:
     try:

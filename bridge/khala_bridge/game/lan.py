@@ -34,7 +34,7 @@ class LanGame:
             GameError: there is none, or it is something else.
         """
         self._udp: socket.socket | None = None
-        self._tcp = _connected(opponent, map_name, invitation)
+        self._tcp = _connect(opponent, map_name, invitation)
         try:
             self.map_data, settings = _read(self._tcp)
             self.map_name, self.map_path = str(settings["map_name"]), str(settings["map_path"])
@@ -63,7 +63,7 @@ class LanGame:
         lan_sc2_env.daemon_thread(lan_sc2_env.udp_to_tcp, (self._udp, self._tcp))
 
 
-def _connected(opponent: Opponent, map_name: str, invitation: Invitation) -> socket.socket:
+def _connect(opponent: Opponent, map_name: str, invitation: Invitation) -> socket.socket:
     until_s = time.monotonic() + opponent.wait_s
     said = False
     while True:

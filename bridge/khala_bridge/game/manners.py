@@ -43,7 +43,7 @@ class LanPorts(NamedTuple):
         join.client_ports.add(game_port=self.guest_game, base_port=self.guest_base)
 
 
-class Asked(NamedTuple):
+class GuestRequest(NamedTuple):
     """One request: either it is passed on to the game, or here is its answer."""
 
     kind: str
@@ -67,7 +67,7 @@ class Manners:
         """Whether its game is going on."""
         return self._status == sc_pb.in_game
 
-    def read(self, data: bytes) -> Asked:
+    def read(self, data: bytes) -> GuestRequest:
         """Return what becomes of a request.
 
         Raises:
@@ -84,8 +84,8 @@ class Manners:
             answer.status = sc_pb.quit
             answer.quit.SetInParent()
         else:
-            return Asked(kind, passed=self._changed(request, data))
-        return Asked(kind, answer=answer.SerializeToString())
+            return GuestRequest(kind, passed=self._adapt(request, data))
+        return GuestRequest(kind, answer=answer.SerializeToString())
 
     def note(self, data: bytes) -> bool:
         """Take an answer of the game; return whether it is the one to the request to join."""
@@ -96,7 +96,7 @@ class Manners:
             self.refused += f": {response.join_game.error_details}" if response.join_game.error_details else ""
         return response.HasField("join_game")
 
-    def _changed(self, request: sc_pb.Request, data: bytes) -> bytes:
+    def _adapt(self, request: sc_pb.Request, data: bytes) -> bytes:
         if request.HasField("observation") and request.observation.disable_fog:
             request.observation.disable_fog = False
         elif request.HasField("join_game"):

@@ -15,7 +15,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.compat import features, run_configs, sc2_env
 from khala_bridge.errors import GameError
-from khala_bridge.game.env import Env, started
+from khala_bridge.game.env import Env, start
 from khala_bridge.game.invitation import Invitation
 from khala_bridge.game.lan import LanGame
 from khala_bridge.game.manners import LanPorts
@@ -34,8 +34,8 @@ def env_of(config: GameConfig, processes: Processes | None, invitation: Invitati
     kinds: dict[str, type[Env]] = {"guest": GuestEnv, "lan": LanEnv}
     try:
         if (kind := kinds.get(config.opponent.kind)) is None:
-            return started(object.__new__(Env), config, processes)
-        return started(object.__new__(kind), config, invitation or Invitation())
+            return start(object.__new__(Env), config, processes)
+        return start(object.__new__(kind), config, invitation or Invitation())
     finally:
         if processes is not None:
             processes.began()
@@ -61,7 +61,7 @@ class _MeetingEnv(Env):
         draws = interface.HasField("render")
         process = self._run_config.start(extra_ports=ports, want_rgb=draws, port=pick_port())
         self._sc2_procs, self._controllers = [process], [process.controller]
-        process.controller._client._sock.settimeout(None)  # noqa: SLF001  # `Patience` says how long a step may take
+        process.controller._client._sock.settimeout(None)  # noqa: SLF001  # `GamePatience` says how long a step may take
 
     def _create_join(self) -> None:
         """Join the game, and set what `SC2Env` wants to know of it."""
@@ -120,12 +120,12 @@ class GuestEnv(_MeetingEnv):
         data = self._maps[0].data(self._run_config)
         for controller in (host, theirs.controller):
             controller.save_map(self._maps[0].path, data)
-        host.create_game(self._created())
+        host.create_game(self._create_request())
         environment = self._config.environment
         guest.invite(None if environment is None else environment | {"SC2PATH": str(self._config.sc2path)})
         self._parallel.run([(host.join_game, join), guest.until_joined])
 
-    def _created(self) -> sc_pb.RequestCreateGame:
+    def _create_request(self) -> sc_pb.RequestCreateGame:
         create = sc_pb.RequestCreateGame(local_map=sc_pb.LocalMap(map_path=self._maps[0].path))
         if self._random_seed is not None:
             create.random_seed = self._random_seed

@@ -56,7 +56,7 @@ class Launched:
         """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
         check_install(sc2path)
         settle_flags()
-        with pointed_to(sc2path), explained("the game could not be started"):
+        with pointed_to(sc2path), explain_errors("the game could not be started"):
             run_config = run_configs.get()
             run_config.env = environment_of(run_config, environment)
             self._process: Any = run_config.start(want_rgb=False, connect=False, port=pick_port())
@@ -112,7 +112,7 @@ class IdleGames:
         """See `Processes`; the one that has waited least."""
         while True:
             with self._lock:
-                found = next((one for one in reversed(self._idle) if one[0] == sc2path), None)
+                found = next((idle for idle in reversed(self._idle) if idle[0] == sc2path), None)
                 if found is None:
                     return None
                 self._idle.remove(found)
@@ -210,7 +210,7 @@ def _variable(name: str, value: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def explained(what: str) -> Iterator[None]:
+def explain_errors(what: str) -> Iterator[None]:
     """Turn any exception of PySC2 into an error for the user; they have no common base class."""
     try:
         yield

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act.plan import PlanStep, Played
+from khala_bridge.act.plan import PlanResult, PlanStep
 from khala_bridge.catalogue.functions import check_against_pysc2
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError, GameMissing
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.game.meeting import env_of
-from khala_bridge.game.processes import explained
+from khala_bridge.game.processes import explain_errors
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_bridge.state.grid import NO_GRID
@@ -79,7 +79,7 @@ class PySC2Game:
         check_install(config.sc2path)
         map_data = _map_data(config)
         self._env = env_of(config, processes, invitation)
-        with explained("the game could not be asked for its version"):
+        with explain_errors("the game could not be asked for its version"):
             ping = self._env._controllers[0].ping()  # noqa: SLF001  # PySC2 tells the version nowhere else
         self._info = GameIdentity(
             version=ping.game_version,
@@ -95,7 +95,7 @@ class PySC2Game:
 
     def reset(self) -> tuple[Snapshot, ...]:
         """Begin an episode, and wait for the map's script to place its units."""
-        with explained("a new episode could not be begun"):
+        with explain_errors("a new episode could not be begun"):
             if self._config.seed is not None:
                 # `SC2Env` would begin every episode with the same seed, and has no parameter for another one
                 self._env._random_seed = self._config.seed + self._episode  # noqa: SLF001
@@ -117,7 +117,7 @@ class PySC2Game:
         players = [_Player(plan) for plan in plans]
         snapshots: tuple[Snapshot, ...] = ()
         env_steps = 0
-        with explained("the game died or broke its contract"):
+        with explain_errors("the game died or broke its contract"):
             while any(player.step for player in players) and not self._ended:
                 loops = min(player.step.loops for player in players if player.step)
                 steps = self._env.step([player.actions() for player in players], step_mul=loops)
@@ -138,7 +138,7 @@ class PySC2Game:
         if self._ended or not self._lifts_fog:
             return None
         client = self._env._controllers[0]._client  # noqa: SLF001  # see above
-        with explained("the game died when it was asked for the whole map"):
+        with explain_errors("the game died when it was asked for the whole map"):
             try:
                 answer = client.send(observation=sc_pb.RequestObservation(disable_fog=True))
             except protocol.ProtocolError as error:
@@ -205,7 +205,7 @@ class _Player:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._fresh = True
-        self.played = Played()
+        self.played = PlanResult()
         self.step: PlanStep | None = None
         self._advance(None)
 

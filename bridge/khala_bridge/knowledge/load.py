@@ -147,7 +147,7 @@ def _filler(version: str) -> Filler:
 @functools.cache
 def _units(version: str) -> dict[str, UnitFacts]:
     beaten_by = _beaten_by()
-    return {name: _described(kind, beaten_by.get(name, ()), version) for name, kind in unit_facts(version).items()}
+    return {name: _describe_unit(kind, beaten_by.get(name, ()), version) for name, kind in unit_facts(version).items()}
 
 
 def _beaten_by() -> dict[str, tuple[str, ...]]:
@@ -159,7 +159,7 @@ def _beaten_by() -> dict[str, tuple[str, ...]]:
     return {other: tuple(name for _, name in sorted(names)) for other, names in found.items()}
 
 
-def _described(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> UnitFacts:
+def _describe_unit(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> UnitFacts:
     words = unit_words()[kind.name]
     filler = _filler(version)
     traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
@@ -169,7 +169,7 @@ def _described(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> Uni
         "uses": filler.fill(words.uses, kind),
         "counters": words.beats,
         "countered_by": beaten_by,
-        "abilities": {**traits, **dict(_titled(kind, version))},
+        "abilities": {**traits, **dict(_titles(kind, version))},
     }
     return kind.model_copy(update=told)
 
@@ -187,7 +187,7 @@ def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
     return {name: tuple(allowed) for name, allowed in found.items()}
 
 
-def _titled(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
+def _titles(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
     """Yield the abilities of a type that have a title, with the words about them."""
     for number in kind.ability_ids:
         if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:
@@ -196,19 +196,19 @@ def _titled(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
 
 @functools.cache
 def _abilities(version: str) -> dict[int, AbilityFacts]:
-    return {number: _explained(ability, version) for number, ability in ability_facts(version).items()}
+    return {number: _describe_ability(ability, version) for number, ability in ability_facts(version).items()}
 
 
-def _explained(ability: AbilityFacts, version: str) -> AbilityFacts:
+def _describe_ability(ability: AbilityFacts, version: str) -> AbilityFacts:
     words = words_of(ability) if ability.melee else None
     return ability.model_copy(update={"about": _filler(version).fill(words.about, ability)}) if words else ability
 
 
 @functools.cache
 def _upgrades(version: str) -> dict[str, UpgradeFacts]:
-    return {name: _praised(upgrade, version) for name, upgrade in upgrade_facts(version).items()}
+    return {name: _describe_upgrade(upgrade, version) for name, upgrade in upgrade_facts(version).items()}
 
 
-def _praised(upgrade: UpgradeFacts, version: str) -> UpgradeFacts:
+def _describe_upgrade(upgrade: UpgradeFacts, version: str) -> UpgradeFacts:
     said = next((said for name, said in upgrade_words().items() if fnmatchcase(upgrade.name, name)), "")
     return upgrade.model_copy(update={"about": _filler(version).fill(said, upgrade)})

@@ -12,7 +12,7 @@ from khala_bridge.knowledge import prompt
 from khala_bridge.knowledge.facts import VERSION
 from khala_bridge.knowledge.load import abilities, knowledge, upgrades
 from khala_bridge.knowledge.model import AbilityFacts, UnitFacts, UpgradeFacts
-from khala_bridge.knowledge.words import listed, price
+from khala_bridge.knowledge.words import join_names, price
 from khala_bridge.knowledge.words import number as n
 from khala_protocol.errors import KhalaError
 
@@ -41,11 +41,11 @@ def find(name: str, version: str = VERSION) -> list[Known]:
     everything: list[Known] = [
         *knowledge(version).values(), *upgrades(version).values(), *abilities(version).values()
     ]  # fmt: skip
-    found = [one for one in everything if _plain(one.name) == wanted]
+    found = [facts for facts in everything if _plain(facts.name) == wanted]
     found += [ability for ability in abilities(version).values() if str(ability.id) == name.strip()]
     if found:
         return found
-    plain = {_plain(one.name): one.name for one in everything if one.melee}
+    plain = {_plain(facts.name): facts.name for facts in everything if facts.melee}
     near = [plain[name] for name in difflib.get_close_matches(wanted, plain, n=3)]
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
     raise NotKnown(f"nothing in version {version} of the game is called '{name}'{hint}")
@@ -68,11 +68,11 @@ def _plain(name: str) -> str:
 
 def _unit(kind: UnitFacts, version: str) -> list[str]:
     out = [f"{kind.name} ({'structure' if kind.structure else 'unit'}, {kind.race}, id {kind.id})"]
-    out += _told(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
+    out += _indent(kind.about, kind.uses and f"Use: {kind.uses}", "" if kind.melee else "Not in melee games.")
     out += [INDENT + prompt.body(kind) + f", sight {n(kind.sight)}"]
     out += [INDENT + prompt.weapon(weapon) for weapon in kind.weapons]
     out += [INDENT + said for said in _making(kind)]
-    out += [f"{INDENT}{what}: {', '.join(names)}" for what, names in _related(kind) if names]
+    out += [f"{INDENT}{what}: {', '.join(names)}" for what, names in _relations(kind) if names]
     out += [f"{INDENT}{title}: {said}" for title, said in kind.abilities.items()]
     better = list(_upgrades(kind, version))
     out += [f"{INDENT}Upgrades:"] * bool(better) + [INDENT * 2 + said for said in better]
@@ -93,8 +93,8 @@ def _upgrades(kind: UnitFacts, version: str) -> Iterator[str]:
 def _making(kind: UnitFacts) -> Iterator[str]:
     if kind.producers:
         needs = (*kind.requires, *((f"a {kind.addon} at the producer",) if kind.addon else ()))
-        needed = f"; needs {listed(needs)}" if needs else ""
-        yield f"Made by {listed(kind.producers)} in {n(kind.build_s)} s{needed}"
+        needed = f"; needs {join_names(needs)}" if needs else ""
+        yield f"Made by {join_names(kind.producers)} in {n(kind.build_s)} s{needed}"
     if kind.value or kind.supply:
         yield f"Worth {price(kind.minerals, kind.vespene, kind.supply)}"
     if kind.footprint:
@@ -109,7 +109,7 @@ def _making(kind: UnitFacts) -> Iterator[str]:
     yield from (f"Needs {what}" for what, is_so in ground if is_so)
 
 
-def _related(kind: UnitFacts) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def _relations(kind: UnitFacts) -> tuple[tuple[str, tuple[str, ...]], ...]:
     return (
         ("Counts also as", kind.counts_as),
         ("Allows", kind.allows),
@@ -120,22 +120,22 @@ def _related(kind: UnitFacts) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 def _upgrade(upgrade: UpgradeFacts, version: str) -> list[str]:
     out = [f"{upgrade.name} (upgrade, {upgrade.race or 'no race'}, id {upgrade.id})"]
-    out += _told(upgrade.about, "" if upgrade.melee else "Not in melee games.")
+    out += _indent(upgrade.about, "" if upgrade.melee else "Not in melee games.")
     if upgrade.at:
-        needs = f"; needs {listed(upgrade.requires)}" if upgrade.requires else ""
+        needs = f"; needs {join_names(upgrade.requires)}" if upgrade.requires else ""
         cost = price(upgrade.minerals, upgrade.vespene)
-        out.append(f"{INDENT}Researched at {listed(upgrade.at)} for {cost} in {n(upgrade.time_s)} s{needs}")
+        out.append(f"{INDENT}Researched at {join_names(upgrade.at)} for {cost} in {n(upgrade.time_s)} s{needs}")
     for name, changes in upgrade.changes.items():
         out.append(f"{INDENT}{name}: " + ", ".join(f"{what} {more:+g}" for what, more in changes.items()))
     allowed = [
         f"{abilities(version)[enable].name} ({enable})" for enable in upgrade.enables if enable in abilities(version)
     ]
-    return [*out, f"{INDENT}Allows {listed(tuple(allowed))}"] if allowed else out
+    return [*out, f"{INDENT}Allows {join_names(tuple(allowed))}"] if allowed else out
 
 
 def _ability(ability: AbilityFacts) -> list[str]:
     out = [f"{ability.name} ({'general ' if ability.special else ''}ability {ability.id})"]
-    out += _told(ability.about, "" if ability.melee else "Not in melee games.")
+    out += _indent(ability.about, "" if ability.melee else "Not in melee games.")
     out += [f"{INDENT}{what}: {said}" for what, said in _terms(ability) if said]
     if ability.figures:
         out.append(f"{INDENT}Numbers: " + ", ".join(f"{what} {value:g}" for what, value in ability.figures.items()))
@@ -154,7 +154,7 @@ def _terms(ability: AbilityFacts) -> Iterator[tuple[str, str]]:
     yield "Energy", n(ability.energy) if ability.energy else ""
     yield "Health", n(ability.life) if ability.life else ""
     yield "Ready again after", f"{n(ability.cooldown_s)} s" if ability.cooldown_s else ""
-    yield "Needs", listed((*ability.requires, *((f"a {ability.addon} of its own",) if ability.addon else ())))
+    yield "Needs", join_names((*ability.requires, *((f"a {ability.addon} of its own",) if ability.addon else ())))
     yield "Makes", f"{ability.count} {ability.produces}" if ability.produces else ""
     yield "Researches", ability.researches or ""
     yield "Takes", f"{n(ability.time_s)} s" if ability.time_s else ""
@@ -163,5 +163,5 @@ def _terms(ability: AbilityFacts) -> Iterator[tuple[str, str]]:
     yield "A case of", str(ability.general or "")
 
 
-def _told(*sentences: str) -> list[str]:
+def _indent(*sentences: str) -> list[str]:
     return [INDENT + sentence for sentence in sentences if sentence]

@@ -56,7 +56,7 @@ class Filler:
                 value = math.prod(self._value(name, record) for name in names.split("*"))
             except (LookupError, AttributeError, TypeError, ValueError) as error:
                 raise CatalogueError(f"the words about {record.name} speak of {match.group()}: no such fact") from error
-            return rounded((-value if sign else value) * (100 if percent else 1)) + percent
+            return round_number((-value if sign else value) * (100 if percent else 1)) + percent
 
         return " ".join(PLACEHOLDER.sub(found, text).split())
 
@@ -82,12 +82,12 @@ def number(value: float) -> str:
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
-def rounded(value: float) -> str:
+def round_number(value: float) -> str:
     """Return a number with three digits, as people say it: 10.7 for 10.71, and 1440."""
     return number(value) if value == int(value) else number(float(f"{value:.3g}"))
 
 
-def listed(names: tuple[str, ...]) -> str:
+def join_names(names: tuple[str, ...]) -> str:
     """Return names as a list in words: `A`, `A and B`, `A, B and C`."""
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
@@ -109,16 +109,16 @@ def _cost(ability: AbilityFacts) -> str:
 
 
 def _needs(ability: AbilityFacts) -> str:
-    needed = listed((*ability.requires, *((f"a {ability.addon} of its own",) if ability.addon else ())))
+    needed = join_names((*ability.requires, *((f"a {ability.addon} of its own",) if ability.addon else ())))
     return f"; needs {needed}" if needed else ""
 
 
 def _makes(ability: AbilityFacts) -> str:
     product = str(ability.produces)
-    return f"{ability.count} {product}s" if ability.count > 1 else _one(product)
+    return f"{ability.count} {product}s" if ability.count > 1 else _with_article(product)
 
 
-def _one(name: str) -> str:
+def _with_article(name: str) -> str:
     return f"{'an' if name[0] in 'AEIOU' or name == 'SCV' else 'a'} {name}"
 
 

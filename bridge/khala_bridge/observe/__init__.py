@@ -11,8 +11,8 @@
 Everything here is a function of snapshots and of agents' replies; no clock, no bus.
 """
 
-from khala_bridge.observe.feedback import Feedback, shortened
+from khala_bridge.observe.feedback import Feedback, shorten
 from khala_bridge.observe.observation import AgentObservation, SideObservation, TeamObservation
 from khala_bridge.observe.observer import Observer
 
-__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation", "shortened"]
+__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation", "shorten"]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from khala_bridge.auto.aims import Aim
     from khala_bridge.catalogue.action import Action
     from khala_bridge.frames import Camera, MapFrame, WorldPoint
-    from khala_bridge.rules import Ledger, Side, UnitState
+    from khala_bridge.rules import Ledger, SideState, UnitState
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Point
@@ -58,7 +58,7 @@ class Asker(NamedTuple):
     """Who asks for valid arguments: an agent's team, or the whole side, at one moment."""
 
     snapshot: Snapshot
-    side: Side
+    side: SideState
     ledger: Ledger
     around: Around
     agent: AgentConfig | None = None
@@ -75,8 +75,8 @@ class Asker(NamedTuple):
             return self._lack_of_team(action)
         doers = self._doers(action) if self.members else []
         units: list[int] | None = None
-        if action.named:
-            if len(doers) < action.named:
+        if action.actor_count:
+            if len(doers) < action.actor_count:
                 return Lack("needs two units that can")
             units = None if len(doers) == len(self.members) else [unit.tag for unit in doers]
         match action.target_kind:
@@ -123,7 +123,7 @@ class Asker(NamedTuple):
         shown = self.around.enemies if hostile else self.around.friends
         fit = {aim: tags for aim, tags in shown.items() if self._fits(action, aim, doers)}
         tags = [tag for tags in fit.values() for tag in tags]
-        if len(doers) == 1 and not action.named:
+        if len(doers) == 1 and not action.actor_count:
             tags = [tag for tag in tags if tag != doers[0].tag]
         if not tags:
             return Lack("no enemy on the screen" + (" that fits" if shown else "") if hostile else "no unit that fits")
@@ -138,7 +138,7 @@ class Asker(NamedTuple):
         if not is_attack(function):
             return True
         able = [reaches(name, aim) for name in dict.fromkeys(unit.type for unit in doers)]
-        return all(able) if action.named else any(able)
+        return all(able) if action.actor_count else any(able)
 
     # --- places -----------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.knowledge import is_armed, is_structure, is_worker, knowledge
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Army, ArmyPart, Toll
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.observe.chronicle import Chronicle, Entry, Sighting
     from khala_bridge.observe.places import Places
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state import Unit
     from khala_protocol.messages import OrderView
 
@@ -44,14 +44,14 @@ class _Seen(NamedTuple):
     unseen_s: float = 0.0
 
 
-def army(scene: Scene, places: Places, chronicle: Chronicle) -> Army:
+def army(scene: SideScene, places: Places, chronicle: Chronicle) -> Army:
     """Return the parts of the own army, its scouts, and the enemy's armed units."""
     own = [unit for unit in scene.snapshot.own if _fights(unit) and unit.build_progress >= 1]
     goals = {unit.tag: goal for unit in scene.snapshot.own if (goal := _scouting(scene, unit)) is not None}
     scouts = [unit for unit in scene.snapshot.own if unit.tag in goals]
     return Army(
-        parts=tuple(_parts(scene, places, [_at(unit) for unit in own])),
-        scouts=tuple(_parts(scene, places, [_at(unit) for unit in scouts])),
+        parts=tuple(_parts(scene, places, [_as_seen(unit) for unit in own])),
+        scouts=tuple(_parts(scene, places, [_as_seen(unit) for unit in scouts])),
         enemies=tuple(_enemies(scene, places, chronicle)),
         value=round(sum(map(_value, own))),
     )
@@ -62,8 +62,8 @@ def toll(chronicle: Chronicle, log: Sequence[Entry], since_loop: int) -> Toll:
     events = [event for entry in log for event in entry.events if event.what == "died"]
     return Toll(
         since_s=round((chronicle.loop - since_loop) / LOOPS_PER_S, 1),
-        lost=_sorted(event.type for event in events if event.alliance == "own"),
-        killed=_sorted(event.type for event in events if event.alliance == "enemy"),
+        lost=_counts(event.type for event in events if event.alliance == "own"),
+        killed=_counts(event.type for event in events if event.alliance == "enemy"),
     )
 
 
@@ -85,24 +85,24 @@ def _value(unit: Unit) -> float:
     return known.value if known else 0.0
 
 
-def _at(unit: Unit) -> _Seen:
+def _as_seen(unit: Unit) -> _Seen:
     return _Seen(unit, unit.pos.x, unit.pos.y)
 
 
-def _sorted(names: Iterable[str]) -> dict[str, int]:
+def _counts(names: Iterable[str]) -> dict[str, int]:
     return dict(sorted(Counter(names).items()))
 
 
 # --- parts ----------------------------------------------------------------------------------------------------
 
 
-def _parts(scene: Scene, places: Places, units: Sequence[_Seen]) -> list[ArmyPart]:
+def _parts(scene: SideScene, places: Places, units: Sequence[_Seen]) -> list[ArmyPart]:
     """Return units by place, those between places by nearness; the most valuable part first."""
-    parts = [_part(scene, name, group) for name, group in _grouped(places, units)]
+    parts = [_part(scene, name, group) for name, group in _group(places, units)]
     return sorted(parts, key=lambda part: (-part.value, part.minimap))
 
 
-def _grouped(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen]]]:
+def _group(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Seen]]]:
     named: dict[str, list[_Seen]] = {}
     loose: list[tuple[str, list[_Seen]]] = []
     for unit in units:
@@ -115,25 +115,25 @@ def _grouped(places: Places, units: Sequence[_Seen]) -> list[tuple[str, list[_Se
     return [*named.items(), *loose]
 
 
-def _part(scene: Scene, name: str, group: Sequence[_Seen]) -> ArmyPart:
-    x, y = (sum(values) / len(group) for values in ([one.x for one in group], [one.y for one in group]))
+def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
+    x, y = (sum(values) / len(group) for values in ([seen.x for seen in group], [seen.y for seen in group]))
     return ArmyPart(
         place=name,
-        minimap=rounded(scene.world.minimap(x, y), scene.world.minimap_size),
-        units=_sorted(one.unit.name for one in group),
-        doing=_doing(scene, [one.unit for one in group]),
-        value=round(sum(_value(one.unit) for one in group)),
-        unseen_s=round(min(one.unseen_s for one in group), 1),
+        minimap=to_tenth(scene.world.minimap(x, y), scene.world.minimap_size),
+        units=_counts(seen.unit.name for seen in group),
+        doing=_doing(scene, [seen.unit for seen in group]),
+        value=round(sum(_value(seen.unit) for seen in group)),
+        unseen_s=round(min(seen.unseen_s for seen in group), 1),
     )
 
 
-def _doing(scene: Scene, units: Sequence[Unit]) -> str:
+def _doing(scene: SideScene, units: Sequence[Unit]) -> str:
     """Return what most of some own units do."""
     said = Counter(_order(scene, unit) for unit in units if unit.is_own)
     return said.most_common(1)[0][0] if said else ""
 
 
-def _order(scene: Scene, unit: Unit) -> str:
+def _order(scene: SideScene, unit: Unit) -> str:
     orders: Sequence[OrderView] = scene.bodies[unit.tag].view.orders if unit.tag in scene.bodies else ()
     if not orders:
         return "idle"
@@ -147,7 +147,7 @@ def _order(scene: Scene, unit: Unit) -> str:
 # --- scouts ---------------------------------------------------------------------------------------------------
 
 
-def _scouting(scene: Scene, unit: Unit) -> tuple[float, float] | None:
+def _scouting(scene: SideScene, unit: Unit) -> tuple[float, float] | None:
     """Return where an own unit goes that scouts: a worker that walks far from home, or an unarmed unit."""
     if is_structure(unit.name) or not unit.orders or (_fights(unit) and is_armed(unit.name)):
         return None
@@ -163,7 +163,7 @@ def _scouting(scene: Scene, unit: Unit) -> tuple[float, float] | None:
 # --- enemies --------------------------------------------------------------------------------------------------
 
 
-def _enemies(scene: Scene, places: Places, chronicle: Chronicle) -> list[ArmyPart]:
+def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[ArmyPart]:
     found = [
         _Seen(known.unit, known.unit.pos.x, known.unit.pos.y, unseen_s)
         for known in chronicle.sightings
@@ -171,8 +171,8 @@ def _enemies(scene: Scene, places: Places, chronicle: Chronicle) -> list[ArmyPar
     ]
     halls = [hall.pos for hall in land_of(scene.snapshot).own_halls]
     parts = []
-    for name, group in _grouped(places, found):
-        away = min((math.dist((one.x, one.y), hall) for one in group for hall in halls), default=None)
+    for name, group in _group(places, found):
+        away = min((math.dist((seen.x, seen.y), hall) for seen in group for hall in halls), default=None)
         parts.append(_part(scene, name, group).but(away=None if away is None else round(away)))
     return sorted(parts, key=lambda part: (part.away or 0.0, part.minimap))
 

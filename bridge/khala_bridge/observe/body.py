@@ -47,7 +47,7 @@ def body(unit: Unit, world: MapFrame) -> Body:
     view = _BLANK.but(
         tag=hex(unit.tag),
         type=name,
-        minimap=rounded(world.minimap(x, y), world.minimap_size),
+        minimap=to_tenth(world.minimap(x, y), world.minimap_size),
         health=round(unit.health, 1),
         health_max=unit.health_max,
         shield=round(unit.shield, 1),
@@ -98,13 +98,13 @@ def _order(order: UnitOrder, world: MapFrame) -> OrderView:
     if order.target_unit_tag:
         found["target"] = hex(order.target_unit_tag)
     elif (place := order.target_world_space_pos) is not None:
-        found["minimap"] = rounded(world.minimap(place.x, place.y), world.minimap_size)
+        found["minimap"] = to_tenth(world.minimap(place.x, place.y), world.minimap_size)
     if order.progress > 0:
         found["progress"] = round(order.progress, 2)
     return _NO_ORDER.but(**found)
 
 
-def rounded(point: tuple[float, float], size: float) -> Point:
+def to_tenth(point: tuple[float, float], size: float) -> Point:
     """Return a value rounded to a tenth of a cell; a position stays within its frame, whose end is open."""
     return _tenth(point[0], size), _tenth(point[1], size)
 

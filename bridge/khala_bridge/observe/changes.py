@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.chronicle import Entry
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_protocol.messages import Event
 
 
 class Changes:
     """The changes from one moment to the present scene."""
 
-    def __init__(self, before: Mapping[str, float], scene: Scene, log: Sequence[Entry]) -> None:
+    def __init__(self, before: Mapping[str, float], scene: SideScene, log: Sequence[Entry]) -> None:
         """Take health and shield by tag at that moment, the present scene, and the log since then."""
         self._world = scene.world
         self._log = log

@@ -14,7 +14,7 @@ from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.knowledge import is_structure
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_protocol.messages import LOOPS_PER_S, EnemyCount, Event
 
 if TYPE_CHECKING:
@@ -120,13 +120,15 @@ class Chronicle:
         self._keep_account(snapshot)
         before, self._own = self._own, {unit.tag: unit for unit in snapshot.own}
         new = self._new_enemies(snapshot)
-        killed = self._killed(snapshot.dead)
-        made = [_of(unit, "finished", "own") for tag, unit in self._own.items() if self._is_new(unit, before.get(tag))]
+        killed = self._kills(snapshot.dead)
+        built = (unit for tag, unit in self._own.items() if self._is_new(unit, before.get(tag)))
+        made = [_event(unit, "finished", "own") for unit in built]
         events: tuple[Event, ...] = ()
         if self.number:
             learnt = [name for name in snapshot.upgrades if name not in self._upgrades]
             researched = [Event(what="researched", tag="", type=name, alliance="own") for name in learnt]
-            lost = [_of(unit, "died", "own") for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit)]
+            gone = (unit for tag, unit in before.items() if tag in snapshot.dead and _is_done(unit))
+            lost = [_event(unit, "died", "own") for unit in gone]
             events = (*made, *researched, *lost, *killed, *new)
         self._upgrades = frozenset(snapshot.upgrades)
         fallen = tuple(before[tag] for tag in sorted(snapshot.dead & before.keys()))
@@ -162,17 +164,17 @@ class Chronicle:
             if not unit.is_enemy or unit.name in PASSING or unit.is_hallucination:
                 continue
             if tag not in self._enemies:
-                new.append(_of(unit, "appeared", "enemy"))
+                new.append(_event(unit, "appeared", "enemy"))
             self._enemies[tag] = Sighting(unit, self.number, snapshot.game_loop)
         return new
 
-    def _killed(self, dead: frozenset[int]) -> list[Event]:
+    def _kills(self, dead: frozenset[int]) -> list[Event]:
         killed = []
         for tag in sorted(dead & self._enemies.keys()):
             known = self._enemies[tag]
             if not known.dead:
                 known.dead = True
-                killed.append(_of(known.unit, "died", "enemy"))
+                killed.append(_event(known.unit, "died", "enemy"))
         return killed
 
     @property
@@ -185,9 +187,9 @@ class Chronicle:
         by_type: dict[str, list[Sighting]] = {}
         for known in self._enemies.values():
             by_type.setdefault(known.unit.name, []).append(known)
-        return tuple(self._counted(name, by_type[name], world) for name in sorted(by_type, key=_units_first))
+        return tuple(self._enemy_count(name, by_type[name], world) for name in sorted(by_type, key=_units_first))
 
-    def _counted(self, name: str, known: Sequence[Sighting], world: MapFrame) -> EnemyCount:
+    def _enemy_count(self, name: str, known: Sequence[Sighting], world: MapFrame) -> EnemyCount:
         alive = [enemy for enemy in known if not enemy.dead]
         last = max(alive, key=lambda enemy: enemy.seen) if alive else None
         return EnemyCount(
@@ -195,12 +197,12 @@ class Chronicle:
             seen=len(known),
             in_sight=sum(enemy.seen == self.number for enemy in alive),
             dead=len(known) - len(alive),
-            minimap=rounded(world.minimap(*last.unit.pos), world.minimap_size) if last else None,
+            minimap=to_tenth(world.minimap(*last.unit.pos), world.minimap_size) if last else None,
             unseen_s=round((self.loop - last.loop) / LOOPS_PER_S, 1) if last else 0.0,
         )
 
 
-def _of(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
+def _event(unit: Unit, what: EventKind, alliance: Alliance) -> Event:
     return Event(what=what, tag=hex(unit.tag), type=unit.name, alliance=alliance)
 
 

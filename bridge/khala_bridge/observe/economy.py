@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from khala_bridge.observe.chronicle import Chronicle
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state import Unit
 
 MOST_SUPPLY = 200
 
 
-def economy(scene: Scene, chronicle: Chronicle) -> Economy:
+def economy(scene: SideScene, chronicle: Chronicle) -> Economy:
     """Return what comes in, what it is spent on, and what is short soon."""
     own, player = scene.snapshot.own, scene.snapshot.player
     halls = [unit for unit in land_of(scene.snapshot).own_halls if unit.build_progress >= 1]
@@ -32,7 +32,7 @@ def economy(scene: Scene, chronicle: Chronicle) -> Economy:
     return Economy(
         income=(round(minerals), round(vespene)),
         spending=_spending(chronicle),
-        gatherers=(_assigned(halls), _assigned(gas), sum(is_worker(u.name) and not u.orders for u in own)),
+        gatherers=(_harvesters(halls), _harvesters(gas), sum(is_worker(u.name) and not u.orders for u in own)),
         room=(_ideal(halls), _ideal(gas)),
         supply_coming=coming,
         full_in_s=_full_in_s(chronicle, min(MOST_SUPPLY, player.food_cap + coming) - player.food_used),
@@ -40,7 +40,7 @@ def economy(scene: Scene, chronicle: Chronicle) -> Economy:
     )
 
 
-def _assigned(structures: Iterable[Unit]) -> int:
+def _harvesters(structures: Iterable[Unit]) -> int:
     return sum(unit.assigned_harvesters for unit in structures)
 
 

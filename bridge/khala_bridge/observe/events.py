@@ -56,19 +56,20 @@ class Events:
             now: tags of the units that it sees now.
         """
         old = {*saw.own, *saw.allies, *saw.enemies}
-        found = self._of(now.own, frozenset(saw.own), "joined", "own")
-        found += self._of(now.allies, old, None, "ally")
-        found += self._of(now.enemies, old, "appeared", "enemy")
+        found = self._happenings(now.own, frozenset(saw.own), "joined", "own")
+        found += self._happenings(now.allies, old, None, "ally")
+        found += self._happenings(now.enemies, old, "appeared", "enemy")
         if gone := old.difference(now.own, now.allies, now.enemies):
             units = (unit for unit in chain(before.units, before.allies, before.enemies) if unit.tag in gone)
             ends = [(self._end_of(unit), unit) for unit in units]
-            found += [_event(end, one, one.alliance) for end, one in ends if end == "died" or one.alliance != "ally"]
+            news = ((end, unit) for end, unit in ends if end == "died" or unit.alliance != "ally")
+            found += [_event(end, unit, unit.alliance) for end, unit in news]
         return tuple(found)
 
     def _end_of(self, unit: UnitView) -> EventKind:
         return "died" if unit.tag in self._dead else "disappeared"
 
-    def _of(
+    def _happenings(
         self, tags: Iterable[str], old: Container[str], arrival: EventKind | None, alliance: Alliance
     ) -> list[Event]:
         """Return the events of some units that came, were hurt or were healed; without an arrival, nobody comes."""

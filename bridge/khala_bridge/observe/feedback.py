@@ -39,7 +39,7 @@ class Feedback:
     """Its standing orders, and those that have ended since it was asked."""
 
 
-def shortened(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:
+def shorten(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:
     """Return the first rejections, as far as they fit, and one that counts the others by their reasons."""
     listed = tuple(_first(rejections))
     others = Counter(rejection.reason for rejection in rejections[len(listed) :])

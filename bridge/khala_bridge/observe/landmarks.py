@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.auto.places import is_held
 from khala_bridge.knowledge import is_structure
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.observe.scene import on_screen, screen_of
 from khala_bridge.state.ground import land_of
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.frames import Camera, WorldPoint
     from khala_bridge.observe.body import Body
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state.ground import Land
     from khala_protocol.messages import OrderView
 
@@ -40,7 +40,7 @@ ON_TOP = 1.0
 """World units between the middles of a geyser and of the structure on it."""
 
 
-def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+def power_fields(scene: SideScene, camera: Camera | None) -> Iterator[Landmark]:
     """Yield the power fields, in the order of tags, with their positions on a camera's screen."""
     sources = scene.snapshot.power_sources
     radius = {source.tag: source.radius for source in sources}
@@ -52,7 +52,7 @@ def power_fields(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
             yield _landmark("power field", body, camera, ", ".join([f"radius {radius[field.tag]:g}", *states_now]))
 
 
-def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
+def free_places(scene: SideScene, camera: Camera | None) -> Iterator[Landmark]:
     """Yield free places for a base, the nearest to the own bases first, then the free geysers of own bases."""
     land = land_of(scene.snapshot)
     own = [unit.pos for unit in land.own_halls]
@@ -64,17 +64,17 @@ def free_places(scene: Scene, camera: Camera | None) -> Iterator[Landmark]:
 
 
 def _base(
-    scene: Scene, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
+    scene: SideScene, place: WorldPoint, fields: Sequence[Body], own: Sequence[tuple[float, float]]
 ) -> Iterator[Landmark]:
     nearest = min(fields, key=lambda body: (math.dist((body.x, body.y), place), body.tag), default=None)
     if nearest is not None:
         far = _nearest(place, own)
         about = f"{far:.0f} from your nearest base" if math.isfinite(far) else ""
-        middle = rounded(scene.world.minimap(*place), scene.world.minimap_size)
+        middle = to_tenth(scene.world.minimap(*place), scene.world.minimap_size)
         yield _landmark("base place", nearest, None, about).but(minimap=middle)
 
 
-def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landmark]:
+def _geysers(scene: SideScene, camera: Camera | None, land: Land) -> Iterator[Landmark]:
     built = [(b.x, b.y) for b in scene.bodies.values() if b.name.removesuffix("Rich") in GAS_STRUCTURES]
     for body in scene.resources:
         if "Geyser" not in body.name or _nearest((body.x, body.y), built) < ON_TOP:
@@ -88,7 +88,7 @@ def _geysers(scene: Scene, camera: Camera | None, land: Land) -> Iterator[Landma
 GAS_STRUCTURES = frozenset({"Assimilator", "Extractor", "Refinery"})
 
 
-def structures(scene: Scene) -> Iterator[Landmark]:
+def structures(scene: SideScene) -> Iterator[Landmark]:
     """Yield the own structures with their orders, by type and tag."""
     own = [b for b in scene.bodies.values() if b.is_own and is_structure(b.name) and b.name not in PASSING]
     for body in sorted(own, key=lambda body: (body.name, body.tag)):

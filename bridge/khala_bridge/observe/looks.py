@@ -89,7 +89,7 @@ def looks(bodies: BodyArrays, cameras: Sequence[Camera], members: Sequence[Seque
     foe = bodies.foe[row[strangers]]
     group = 2 * team[strangers] + foe  # friends of a team, its foes, friends of the next
     order = np.lexsort((distance[strangers] * foe, bodies.rank[row[strangers]], group)) + len(mine)
-    columns = [one[np.concatenate((np.arange(len(mine)), order))].tolist() for one in (row, *screen.T, distance)]
+    columns = [column[np.concatenate((np.arange(len(mine)), order))].tolist() for column in (row, *screen.T, distance)]
     bounds = [len(mine), *(len(mine) + np.cumsum(np.bincount(group, minlength=2 * len(sizes)))).tolist()]
     shown = [Shown(*[column[begin:end] for column in columns]) for begin, end in pairwise(ends + bounds[1:])]
     return [Look(camera, shown[place], *shown[len(sizes) + 2 * place :][:2]) for place, camera in enumerate(cameras)]

@@ -11,6 +11,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.events import Witnessed
+from khala_bridge.observe.feedback import Feedback
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe.picture import Picture
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
-    from khala_bridge.task.config import AgentConfig
+    from khala_bridge.task.config import AgentConfig, TeamConfig, TeamKind
     from khala_protocol.messages import TeamView, UnitView, View
 
 __all__ = ["AgentObservation", "SideObservation", "TeamObservation"]
@@ -33,8 +34,33 @@ class TeamObservation:
     camera: Camera | None
     """None for a team without units, which orders units of the whole side."""
     view: TeamView
-    tags: Witnessed = field(default_factory=Witnessed)
+    witnessed: Witnessed = field(default_factory=Witnessed)
     """Tags of the units in the view."""
+
+    @property
+    def agent(self) -> str:
+        """Name of the agent whose team it is."""
+        return self.team.agent
+
+    @property
+    def name(self) -> str:
+        """Its name, in the view as well."""
+        return self.team.name
+
+    @property
+    def kind(self) -> TeamKind:
+        """How it takes its units; a `side` team has none."""
+        return self.team.kind
+
+    @property
+    def tags(self) -> tuple[int, ...]:
+        """Its own units, the head first."""
+        return self.team.tags
+
+    @property
+    def config(self) -> TeamConfig:
+        """Its part of the task."""
+        return self.team.config
 
     def seen(self, tag: int) -> UnitView | None:
         """Return the view of a unit of the team or on its screen, except resources; None if it was not there."""
@@ -54,6 +80,8 @@ class AgentObservation:
     teams: tuple[TeamObservation, ...]
     idle_teams: tuple[str, ...]
     """Teams that have no unit now."""
+    heard: Feedback = field(default_factory=Feedback)
+    """The results of the agent's last reply, and the messages of others."""
     text: str = ""
     pictures: tuple[Picture, ...] = ()
     """Its pictures."""
@@ -74,6 +102,10 @@ class SideObservation:
     agents: Mapping[str, AgentObservation]
     """By name, in the order of the task. Each is made on first access, while the moment is the present one; later there
     are only those that were made."""
+
+    def team_now(self, seen: TeamObservation) -> Team | None:
+        """Return the present team of an observation, which may be older; None if it has no unit any more."""
+        return next((team for team in self.teams[seen.agent] if team.name == seen.name), None)
 
     def team_of(self, tag: int) -> str | None:
         """Return the name of the team that has an own unit; None if no team has it."""

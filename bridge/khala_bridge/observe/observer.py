@@ -18,13 +18,13 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.observe import army, economy, landmarks, side
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.changes import Changes
 from khala_bridge.observe.chronicle import Chronicle
 from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation, SideObservation
 from khala_bridge.observe.places import Places
-from khala_bridge.observe.scene import Scene
+from khala_bridge.observe.scene import SideScene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Page, render, sections_of
 from khala_bridge.state.teams import TeamRoster
@@ -100,7 +100,7 @@ class Observer:
             )
         changes = moment.since(moment.episode.last.get(agent.name, _NOTHING))
         seen = self._seen(moment, agent, changes)
-        page = Page(seen, self._task, moment.feedback.get(agent.name, Feedback()), changes.conditions)
+        page = Page(seen, self._task, changes.conditions)
         text = render(page, self._sections[agent.name], agent.text_tokens)
         moment.episode.last[agent.name] = moment.as_last(seen)
         return replace(seen, text=text, pictures=moment.album.pictures(seen) if moment.album else ())
@@ -113,15 +113,22 @@ class Observer:
             seen = moment.scene.team(agent, team, before.get(team.name), changes.events, resources=builds)
             task = moment.tasks.get((agent.name, team.name))
             teams.append(replace(seen, view=seen.view.but(task=task)) if task else seen)
-        view = self._view(moment, agent, changes, teams)
+        heard = moment.feedback.get(agent.name, Feedback())
+        view = self._view(moment, agent, changes, teams, heard)
         idle = moment.episode.roster.idle_teams(agent.name)
-        return AgentObservation(agent, moment.snapshot.game_loop, view, tuple(teams), idle)
+        return AgentObservation(agent, moment.snapshot.game_loop, view, tuple(teams), idle, heard)
 
-    def _view(self, moment: _Moment, agent: AgentConfig, changes: Changes, teams: Sequence[TeamObservation]) -> View:
+    def _view(
+        self,
+        moment: _Moment,
+        agent: AgentConfig,
+        changes: Changes,
+        teams: Sequence[TeamObservation],
+        heard: Feedback,
+    ) -> View:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
         scene = moment.scene
         parts = self._parts[agent.name]
-        heard = moment.feedback.get(agent.name, Feedback())
         view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=heard.standing)
         more: dict[str, object] = {}
         if "counts" in parts:
@@ -209,14 +216,14 @@ class _Moment:
         time_s = round(self.snapshot.game_loop / LOOPS_PER_S, 3)
         for team in (team for teams in self.teams.values() for team in teams if team.config.stages):
             head = self.snapshot.units[team.head].pos if team.tags else None
-            middle = rounded(world.minimap(*head), world.minimap_size) if head else None
+            middle = to_tenth(world.minimap(*head), world.minimap_size) if head else None
             self.tasks[team.agent, team.name] = self.episode.stages.task(team, middle, time_s)
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> SideScene:
         """The scene."""
         teams = (team for teams in self.teams.values() for team in teams)
-        return Scene(self.snapshot, self.task.frames, teams)
+        return SideScene(self.snapshot, self.task.frames, teams)
 
     @cached_property
     def album(self) -> Album | None:
@@ -236,7 +243,7 @@ class _Moment:
 
     def as_last(self, seen: AgentObservation) -> _Last:
         """Return what an agent's next observation needs of this one."""
-        return _Last(self.episode.chronicle.number, self.scene.totals, {team.view.name: team for team in seen.teams})
+        return _Last(self.episode.chronicle.number, self.scene.totals, {team.name: team for team in seen.teams})
 
 
 class _WhenAsked(Mapping[str, AgentObservation]):
@@ -263,7 +270,7 @@ def _parts(sections: Sequence[Section]) -> frozenset[Part]:
     return frozenset(part for section in sections for part in section.parts)
 
 
-def _landmarks(scene: Scene, parts: frozenset[Part], camera: Camera | None) -> Iterator[Landmark]:
+def _landmarks(scene: SideScene, parts: frozenset[Part], camera: Camera | None) -> Iterator[Landmark]:
     if "structures" in parts:
         yield from landmarks.structures(scene)
     if "power" in parts:

@@ -97,7 +97,7 @@ class Possible:
         judged, arguments = _with_arguments(judged, asker)
         valid = [catalogue()[name] for name, why in judged.items() if why is None]
         offers = [self._offer(action, doers[action.name]) for action in valid]
-        barred = tuple([_barred(name, why) for name, why in judged.items() if why is not None])
+        barred = tuple([_unavailable(name, why) for name, why in judged.items() if why is not None])
         paid = tuple([offer for offer in offers if offer is not None])
         return Choice(tuple([a.spec for a in valid]), paid, tuple(arguments), barred)
 
@@ -189,5 +189,5 @@ def _skills(names: tuple[str, ...]) -> dict[str, int]:
 
 
 @functools.lru_cache(4096)
-def _barred(action: str, reason: str) -> UnavailableAction:
+def _unavailable(action: str, reason: str) -> UnavailableAction:
     return UnavailableAction(action=action, reason=reason)

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.atlas import BASE_TAKEN, HOME, atlas_of
 from khala_bridge.state.ground.land import SEEN_NOW
@@ -54,7 +54,7 @@ class Places:
         return Place(
             name=place.name,
             what=place.what,
-            minimap=rounded(world.minimap(*place.at), world.minimap_size),
+            minimap=to_tenth(world.minimap(*place.at), world.minimap_size),
             start=place.start,
             holder="" if hall is None else "own" if hall.is_own else "enemy",
             unseen_s=None if seen is None else round((snapshot.game_loop - seen) / LOOPS_PER_S, 1),

@@ -6,9 +6,25 @@ with a position outside of the frame if the camera does not reach them; everythi
 (resources, rocks) and larvae are left out; builders get resources apart. A team without units of its own, which
 orders units of the whole side, has no camera and sees nothing.
 
-The common part of all teams is made once per scene, and arrays find the units on a screen, since a dozen teams look
-at a hundred units in each step. `khala_bridge.observe.side` makes views of the whole side, `khala_bridge.observe.text`
-the words; `khala_bridge.observe.observer` is above.
+A dozen teams look at a hundred units in each step, so the work has this order:
+
+1. Each unit in sight but the neutral ones becomes a `Body`, once. Its place in ascending order of tags is its *row*.
+2. With the first team that looks, arrays of all bodies and of all cameras give the rows that each team sees: its own
+   units, friends, enemies (`khala_bridge.observe.looks`). Only here are bodies compared with cameras in bulk.
+3. For each team that looks, its rows become unit views: a copy of the body's view with what depends on the team, its
+   side, its place on the screen and its distance. Offers, skills and resources are added.
+4. Events come last: they need the tags that the team witnesses now, and those of its last observation.
+
+Keep in step by hand:
+
+* `bodies`, `views`, `_order`, `_tags`, `_aim` and the arrays of `_arrays` have the same order, that of the rows.
+* `on_screen`, `khala_bridge.frames.sees` and `_shows` in `khala_bridge.act.targets` cut the same square. An agent that
+  is shown a unit may aim at it.
+* `_units` writes fields of `UnitView` by name, unchecked, for speed: a field that is renamed there is renamed here.
+* `screen_of` and `_on_screen` in `khala_bridge.observe.looks` round to the same tenth, within the frame.
+
+`khala_bridge.observe.side` makes views of the whole side, `khala_bridge.observe.text` the words;
+`khala_bridge.observe.observer` is above.
 """
 
 from __future__ import annotations
@@ -24,7 +40,7 @@ from khala_bridge.auto.aims import aim_of
 from khala_bridge.auto.warp import fields
 from khala_bridge.frames import CAMERA_WIDTH, Camera
 from khala_bridge.observe.arguments import Around
-from khala_bridge.observe.body import body, rounded
+from khala_bridge.observe.body import body, to_tenth
 from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.looks import BodyArrays, looks
 from khala_bridge.observe.observation import TeamObservation
@@ -55,7 +71,7 @@ SLACK = 1e-6
 _NO_DETAILS = UnitDetails()
 
 
-class Scene:
+class SideScene:
     """A snapshot, and the common part of all teams' views."""
 
     def __init__(self, snapshot: Snapshot, frames: Frames, teams: Iterable[Team]) -> None:
@@ -82,7 +98,7 @@ class Scene:
         members = [[index[tag] for tag in tags] for tags in self._teams.values()]
         heads = [self._order[rows[0]] for rows in members]
         cameras = [Camera(head.x, head.y, self._screen_size) for head in heads]
-        return dict(zip(self._teams, looks(_arranged(self._order), cameras, members), strict=True))
+        return dict(zip(self._teams, looks(_arrays(self._order), cameras, members), strict=True))
 
     @functools.cached_property
     def resources(self) -> tuple[Body, ...]:
@@ -138,15 +154,15 @@ class Scene:
         bodies = [self._order[row] for row in members.rows]
         around = Around(self.world, camera, self._aims(foes.rows), self._aims([*friends.rows, *members.rows]))
         view = _team_view(team.name, bodies[0].view.minimap, self.possible.for_team(agent, bodies, around)).but(
-            units=self._skilled(agent, bodies, self._units(members, "own")),
+            units=self._add_skills(agent, bodies, self._units(members, "own")),
             allies=self._units(friends, "ally"),
             enemies=self._units(foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
             bounds=_edges(camera.bounds(self.world)),
         )
-        tags = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
-        happened = events.of_team(before.view, before.tags, tags) if before else ()
-        return TeamObservation(team, camera, view.but(events=happened), tags)
+        witnessed = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
+        news = events.of_team(before.view, before.witnessed, witnessed) if before else ()
+        return TeamObservation(team, camera, view.but(events=news), witnessed)
 
     @functools.cached_property
     def _aim(self) -> list[Aim]:
@@ -165,12 +181,13 @@ class Scene:
         for row, x, y, distance in zip(*shown, strict=True):
             view = self._order[row].view
             values = view.__dict__.copy()
-            values["alliance"], values["screen"] = alliance, (x, y)
+            values["alliance"] = alliance
+            values["screen"] = (x, y)
             values["distance"] = distance if alliance == "enemy" else None
             units.append(view.having(values))
         return tuple(units)
 
-    def _skilled(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
+    def _add_skills(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
         """Return the units of a team, each with the skills that it can use now and those that only others can."""
         skills = [self.possible.skills(agent, body) for body in bodies]
         ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
@@ -184,7 +201,7 @@ class Scene:
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
 
-def _arranged(order: Sequence[Body]) -> BodyArrays:
+def _arrays(order: Sequence[Body]) -> BodyArrays:
     """Return bodies as arrays."""
     ranks = {name: rank for rank, name in enumerate(sorted({b.name for b in order}))}
     foe = [b.alliance is Alliance.ENEMY and b.name not in UNSEEN_TYPES for b in order]
@@ -214,7 +231,7 @@ def on_screen(camera: Camera, seen: Body) -> bool:
 
 def screen_of(camera: Camera, seen: Body) -> Point:
     """Return the screen position of a body, to a tenth of a cell."""
-    return rounded(camera.screen(seen.x, seen.y), camera.size)
+    return to_tenth(camera.screen(seen.x, seen.y), camera.size)
 
 
 def _edges(bounds: tuple[float, float, float, float]) -> tuple[float, float, float, float]:

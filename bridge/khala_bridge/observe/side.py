@@ -12,7 +12,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from khala_bridge.knowledge import abilities, is_structure, knowledge
-from khala_bridge.observe.body import rounded
+from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING
 from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeCount, WarpGates
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.changes import Changes
     from khala_bridge.observe.chronicle import Chronicle
-    from khala_bridge.observe.scene import Scene
+    from khala_bridge.observe.scene import SideScene
     from khala_bridge.state.teams import Team
     from khala_protocol.messages import Point, UnitView
 
@@ -32,7 +32,7 @@ WARNINGS = frozenset({"NuclearLaunchDetected", "NydusWormDetected", "MineralsExh
 """Texts of those alerts of the game that no other part shows."""
 
 
-def counts(scene: Scene, chronicle: Chronicle) -> Counts:
+def counts(scene: SideScene, chronicle: Chronicle) -> Counts:
     """Return the numbers of the side's units, of its production, and of the enemies that it has seen."""
     left_out = PASSING - COUNTED_ANYWAY
     own = [body.view for body in scene.bodies.values() if body.is_own and body.name not in left_out]
@@ -86,7 +86,7 @@ def _production(own: Iterable[UnitView]) -> Iterator[Production]:
         yield Production(order=name, progress=progress, queued=queued[name])
 
 
-def alerts(scene: Scene, changes: Changes) -> tuple[Alert, ...]:
+def alerts(scene: SideScene, changes: Changes) -> tuple[Alert, ...]:
     """Return alerts where own units lost health or died, in the order of their tags."""
     lost = changes.events.changes
     hurt = [body for body in scene.bodies.values() if body.is_own and lost.get(body.view.tag, 0) < 0]
@@ -100,7 +100,7 @@ def alerts(scene: Scene, changes: Changes) -> tuple[Alert, ...]:
     return tuple(_alert(scene, changes, group) for group in groups)
 
 
-def _alert(scene: Scene, changes: Changes, bodies: Sequence[Body]) -> Alert:
+def _alert(scene: SideScene, changes: Changes, bodies: Sequence[Body]) -> Alert:
     by, gone = changes.events.changes, changes.fallen
     fallen = sum(body.tag in gone for body in bodies)
     lost = sum(-by.get(body.view.tag, 0) for body in bodies if body.tag not in gone)
@@ -117,7 +117,7 @@ def warnings(changes: Changes) -> tuple[str, ...]:
     return tuple(dict.fromkeys(alert for alert in changes.alerts if alert in WARNINGS))
 
 
-def others(scene: Scene, teams: Mapping[str, Sequence[Team]], agent: str) -> tuple[TeamReport, ...]:
+def others(scene: SideScene, teams: Mapping[str, Sequence[Team]], agent: str) -> tuple[TeamReport, ...]:
     """Return the teams of all other agents, in the order of the task."""
     foreign = (team for other, its in teams.items() if other != agent for team in its)
     return tuple(_report(t.agent, t.name, [scene.bodies[tag] for tag in t.tags]) for t in foreign if t.tags)
@@ -135,7 +135,7 @@ def _report(agent: str, name: str, bodies: Sequence[Body]) -> TeamReport:
     )
 
 
-def warp_gates(scene: Scene) -> WarpGates | None:
+def warp_gates(scene: SideScene) -> WarpGates | None:
     """Return the number of WarpGates, and of those that can warp in now; None without WarpGates."""
     gates = [b for b in scene.bodies.values() if b.is_own and b.name == "WarpGate" and b.view.build_progress >= 1]
     if not gates:
@@ -146,6 +146,6 @@ def warp_gates(scene: Scene) -> WarpGates | None:
     return WarpGates(count=len(gates), ready=ready)
 
 
-def _middle(scene: Scene, bodies: Sequence[Body]) -> Point:
+def _middle(scene: SideScene, bodies: Sequence[Body]) -> Point:
     x, y = (sum(values) / len(bodies) for values in ([b.x for b in bodies], [b.y for b in bodies]))
-    return rounded(scene.world.minimap(x, y), scene.world.minimap_size)
+    return to_tenth(scene.world.minimap(x, y), scene.world.minimap_size)

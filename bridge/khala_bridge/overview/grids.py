@@ -24,7 +24,7 @@ _KEPT = 16
 
 
 @functools.lru_cache(maxsize=_KEPT)
-def packed(grid: Grid) -> GridView:
+def pack(grid: Grid) -> GridView:
     """Return a grid as messages have it; an empty one for a grid that the game did not send."""
     cells = np.frombuffer(grid.data, np.uint8)
     if grid.bits == 1:
@@ -34,7 +34,7 @@ def packed(grid: Grid) -> GridView:
     return GridView(width=grid.width, height=grid.height, data=data)
 
 
-def joined(grids: Iterable[Grid]) -> Grid:
+def join(grids: Iterable[Grid]) -> Grid:
     """Return a grid of one bit that is set where any of these is; those of another size than the first are left out."""
     sent = [grid for grid in grids if grid.data]
     if not sent:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.overview.grids import packed
+from khala_bridge.overview.grids import pack
 from khala_bridge.overview.marks import Pen
 from khala_protocol.messages import ResourceMark, Terrain
 
@@ -38,8 +38,8 @@ def terrain_of(
         size=info.size,
         bounds=(round(x0, 3), round(y0, 3), round(x1, 3), round(y1, 3)),
         minimap=frames.minimap,
-        height=packed(info.height),
-        walkable=packed(info.pathing),
+        height=pack(info.height),
+        walkable=pack(info.pathing),
         resources=tuple(_resources(snapshots if whole is None else [whole], pen)),
         starts=tuple(dict.fromkeys(pen.place(start) for start in _starts(snapshots))),
     )

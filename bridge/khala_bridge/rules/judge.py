@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from khala_bridge.catalogue.functions import Function
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.rules.ledger import Ledger
-    from khala_bridge.rules.values import Side, UnitState
+    from khala_bridge.rules.values import SideState, UnitState
 
 QUEUE, REACTOR_QUEUE = 5, 8
 """Orders that a structure holds, with the one at work; with a Reactor more."""
@@ -76,14 +76,14 @@ class _Case(NamedTuple):
     use: Use
     facts: AbilityFacts
     unit: UnitState
-    side: Side
+    side: SideState
     ledger: Ledger
 
 
 Reason: TypeAlias = "Callable[[_Case], Unavailable | None]"
 
 
-def why_not(use: Use, unit: UnitState, side: Side, ledger: Ledger) -> Unavailable | None:
+def why_not(use: Use, unit: UnitState, side: SideState, ledger: Ledger) -> Unavailable | None:
     """Return why a unit cannot do something now; None if it can."""
     able = unit.able
     says_yes = None if able is None or use.switch else use.ability in able
@@ -101,7 +101,7 @@ def why_not(use: Use, unit: UnitState, side: Side, ledger: Ledger) -> Unavailabl
     return next((why for why in found if why is not None), None)
 
 
-def why_no_one(use: Use, units: Sequence[UnitState], side: Side, ledger: Ledger) -> Unavailable | None:
+def why_no_one(use: Use, units: Sequence[UnitState], side: SideState, ledger: Ledger) -> Unavailable | None:
     """Return why none of some units can do something now, by the unit that is nearest to it; None if one can.
 
     There must be at least one unit.
@@ -167,7 +167,7 @@ def _lacks(need: str, researched: Collection[str]) -> bool:
 def _unfinished(case: _Case) -> Unavailable | None:
     """Return a reason if it is unfinished."""
     unit = case.unit
-    return None if unit.finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
+    return None if unit.is_finished else Unavailable("unfinished", unit.type, unit.tag, has=unit.progress)
 
 
 def _research(case: _Case) -> Unavailable | None:

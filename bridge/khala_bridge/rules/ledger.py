@@ -9,7 +9,8 @@ accounts of a snapshot.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 from khala_bridge.rules.cost import Shortfall
@@ -47,6 +48,10 @@ class Ledger:
     """Points of the world that an earlier call of this turn sent a scout to."""
     begun: set[int] = field(default_factory=set)
     """Research abilities that an earlier call of this turn began: nothing is researched twice."""
+
+    def copy(self) -> Ledger:
+        """Return accounts of the same content, which change by themselves."""
+        return Ledger(*(copy(getattr(self, account.name)) for account in fields(self)))
 
     def short_of(self, cost: Cost) -> tuple[Shortfall, ...]:
         """Return the accounts that do not suffice for a price, with the shortfalls."""

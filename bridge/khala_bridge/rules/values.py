@@ -38,7 +38,7 @@ class UnitState(NamedTuple):
     """Whether it has no orders except to gather."""
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """True if its construction is finished."""
         return self.progress >= FINISHED
 
@@ -52,7 +52,7 @@ def distinct(units: Iterable[UnitState]) -> list[UnitState]:
 
 
 @dataclass(frozen=True)
-class Side:
+class SideState:
     """The units and upgrades of a player; the accounts are in `Ledger`."""
 
     units: dict[int, UnitState]
@@ -72,7 +72,7 @@ class Side:
     @functools.cached_property
     def standing(self) -> frozenset[str]:
         """Types of the finished units and structures."""
-        return frozenset(unit.type for unit in self.units.values() if unit.finished)
+        return frozenset(unit.type for unit in self.units.values() if unit.is_finished)
 
     @functools.cached_property
     def able(self) -> frozenset[int] | None:

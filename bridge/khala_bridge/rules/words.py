@@ -50,7 +50,7 @@ def _needed_first(why: Unavailable) -> str:
     return f"{' and '.join(why.names)} {'is' if len(why.names) == 1 else 'are'} not researched"
 
 
-def _wanted(name: str) -> str:
+def _requirement(name: str) -> str:
     return f"a finished {name}" if name in knowledge() else f"the upgrade {name}"
 
 
@@ -131,7 +131,7 @@ _OF_SIDE: Final[Form] = {
     "unfinished": lambda why: f"your {why.who} is not finished yet, it is at {why.has:.0%}.",
     "researched": lambda _: "it is researched already.",
     "researching": lambda _: "it is being researched already.",
-    "requirement": lambda why: f"it needs {' and '.join(map(_wanted, why.names))} first.",
+    "requirement": lambda why: f"it needs {' and '.join(map(_requirement, why.names))} first.",
     "addon": lambda why: f"no {why.who} has a {why.names[0]}; Build_{why.names[0]}_{why.who} makes one.",
     "energy": lambda why: f"it needs {why.needs:g} energy, and your {why.who} {hex(why.tag)} has {int(why.has)}.",
     "price": _price_of_side,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.functions import functions, general
 from khala_bridge.knowledge import knowledge
-from khala_bridge.rules import Ledger, Side, UnitState
+from khala_bridge.rules import Ledger, SideState, UnitState
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import built_by
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 _GATHERING = ("Harvest_Gather_screen", "Harvest_Return_quick")
 _NOTHING: frozenset[int] = frozenset()
-_last: list[tuple[Snapshot, Side]] = []
+_last: list[tuple[Snapshot, SideState]] = []
 
 
-def side_of(snapshot: Snapshot) -> Side:
+def side_of(snapshot: Snapshot) -> SideState:
     """Return the player's side at the moment of a snapshot; cached for the last two snapshots."""
     for known, side in _last[:]:  # a copy: other threads of the process may play other matches
         if known is snapshot:
             return side
     own = snapshot.own
-    side = Side(
+    side = SideState(
         {unit.tag: _unit(snapshot, unit) for unit in own},
         frozenset(snapshot.upgrades),
         frozenset(order.ability_id for unit in own for order in unit.orders),
@@ -42,7 +42,7 @@ def side_of(snapshot: Snapshot) -> Side:
 def ledger_of(snapshot: Snapshot) -> Ledger:
     """Return the accounts at the beginning of a joint action."""
     common = snapshot.player
-    minerals, vespene = _planned(snapshot)
+    minerals, vespene = _plan_costs(snapshot)
     return Ledger(
         max(common.minerals - minerals, 0.0),
         max(common.vespene - vespene, 0.0),
@@ -75,7 +75,7 @@ def _gathers(ability: int) -> bool:
     return ability in wanted or general(ability) in wanted
 
 
-def _planned(snapshot: Snapshot) -> tuple[float, float]:
+def _plan_costs(snapshot: Snapshot) -> tuple[float, float]:
     """Return the minerals and vespene for structures that workers are on their way to build."""
     if not any(_builds(ability) for ability in side_of(snapshot).ordered):
         return 0.0, 0.0

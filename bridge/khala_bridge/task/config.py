@@ -436,9 +436,9 @@ class TaskConfig(Frozen):
             return (self,)
         spec = self.map_spec
         first, second = self.sides
-        return self._of(first, spec.race, spec.opponent), self._of(second, spec.opponent, spec.race)
+        return self._task_of(first, spec.race, spec.opponent), self._task_of(second, spec.opponent, spec.race)
 
-    def _of(self, side: SideConfig, race: Race | None, other: Race | None) -> TaskConfig:
+    def _task_of(self, side: SideConfig, race: Race | None, other: Race | None) -> TaskConfig:
         own = {name: value for name in SideConfig.model_fields if (value := getattr(side, name)) is not None}
         return self.model_copy(update=own | {"sides": (), "race": race, "opponent": Opponent(race=other)})
 

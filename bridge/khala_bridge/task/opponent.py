@@ -38,7 +38,7 @@ class Opponent(Frozen):
 
     @field_validator("command", mode="before")
     @classmethod
-    def _words(cls, command: Any) -> Any:
+    def _split_command(cls, command: Any) -> Any:
         return shlex.split(command) if isinstance(command, str) else command
 
     @field_validator("at")

@@ -13,7 +13,7 @@ import os
 import uvicorn
 
 from khala.openenv.server import OPENENV_OPEN, app_of, openenv_door, server_config
-from khala_protocol.listening import bound
+from khala_protocol.listening import bind
 
 app = app_of(door=openenv_door(is_open=os.environ.get(OPENENV_OPEN, "") not in {"", "0", "false"}))
 
@@ -24,7 +24,7 @@ def main() -> None:
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=8000)
     given = parser.parse_args()
-    with bound(given.host, given.port) as listening:
+    with bind(given.host, given.port) as listening:
         uvicorn.Server(server_config(app)).run(sockets=[listening])
 
 

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.pacing import Pacing
     from khala_orchestrator.match.scenery import Scenery
-    from khala_orchestrator.match.schedule import Asked, Decision
-    from khala_orchestrator.match.side import Side
+    from khala_orchestrator.match.schedule import Chosen
+    from khala_orchestrator.match.side import MatchSide
     from khala_orchestrator.match.turn import AgentPool, Answers, Question
     from khala_orchestrator.roster import Seat
-    from khala_protocol.messages import Advice, Briefing, Message, Report, Result
+    from khala_protocol.messages import Briefing, Message, Report, Result
 
 Phase = Literal["observe", "act", "game"]
 Asks: TypeAlias = "Callable[[StepId, Sequence[Seat]], None]"
@@ -89,7 +89,7 @@ class Match:
 
     config: MatchConfig
     game: Sides
-    sides: Sequence[Side]
+    sides: Sequence[MatchSide]
     """In the order of the game's players."""
     agents: AgentPool
     match_observer: MatchObserver
@@ -147,33 +147,33 @@ class Match:
         with watch.phase("observe"):
             for side, snapshot in zip(self.sides, snapshots, strict=True):
                 side.look(snapshot)
-            asked = self._ask(at, loop)
-            self.asks(at, asked.seats)
+            chosen = self._choose(at, loop)
+            self.asks(at, chosen.seats)
         async with self.scenery.shown(at, snapshots) if self.scenery else nullcontext():
-            answers = await self.agents.ask(self._questions(at, asked.seats, watch), wait=self.config.task.clock.waits)
+            answers = await self.agents.ask(self._questions(at, chosen.seats, watch), wait=self.config.task.clock.waits)
         self.schedule.decide(answers.by_seat, loop)
         with watch.phase("act"):
-            due = self.schedule.due(loop)
-            played = [side.act(at, *_of(side, due, answers.advice)) for side in self.sides]
-            for message in (message for one in played for message in one.post.taken):
+            due = self.schedule.take_due(loop)
+            turns = [side.act(at, due, answers.advice) for side in self.sides]
+            for message in (message for turn in turns for message in turn.post.taken):
                 await self.match_observer.message(message)
         with watch.phase("game"):
-            results = await self.game.act([one.commands for one in played], self.schedule.loops(loop))
+            results = await self.game.act([turn.commands for turn in turns], self.schedule.loops(loop))
         timings = watch.timings(answers, lag_s)
         reports: Sequence[Report] = [
-            side.report(at, does, result, timings, answers.incidents, asked.unasked)
-            for side, does, result in zip(self.sides, played, results, strict=True)
+            side.report(at, turn, result, timings, answers.incidents, chosen.unasked)
+            for side, turn, result in zip(self.sides, turns, results, strict=True)
         ]
         snapshots = [result.snapshot for result in results]
         if answers.lost or any(now.ended for now in snapshots) or at.step + 1 == self.config.task.max_steps:
             reports = self._whole(at, reports, results)
         return StepOutcome(reports, snapshots, answers.lost)
 
-    def _ask(self, at: StepId, loop: int) -> Asked:
-        return self.schedule.ask(
+    def _choose(self, at: StepId, loop: int) -> Chosen:
+        return self.schedule.choose(
             at,
             loop,
-            happened=lambda seat: self._side(seat).happened(seat.agent),
+            happened=lambda seat: self._side(seat).triggers_of(seat.agent),
             is_needed=lambda seat: self._side(seat).is_needed(seat.agent),
         )
 
@@ -181,8 +181,8 @@ class Match:
         self.schedule.begin()
         for side in self.sides:
             side.begin()
-        for one in self.briefings(episode):
-            await self.match_observer.brief(one)
+        for message in self.briefings(episode):
+            await self.match_observer.brief(message)
 
     def _questions(self, at: StepId, seats: Sequence[Seat], watch: Stopwatch) -> Iterator[Question]:
         """Yield a question per seat, made on demand: the first agent thinks while others' observations are made."""
@@ -191,27 +191,22 @@ class Match:
                 question = self._side(seat).question(seat.agent, at)
             yield question
 
-    def _tally(self, side: Side, snapshot: Snapshot) -> Tally:
+    def _tally(self, side: MatchSide, snapshot: Snapshot) -> Tally:
         others = [f"side {other.name}" for other in self.sides if other is not side]
         opponent = self.game.info.opponent or self.config.task.against or ", ".join(others)
         undecided = self.config.task.faults.undecided
         return Tally(snapshot, side.name, side.required, opponent=opponent, undecided=undecided)
 
-    def _side(self, seat: Seat) -> Side:
+    def _side(self, seat: Seat) -> MatchSide:
         return next(side for side in self.sides if side.name == seat.side)
 
     def _whole(self, at: StepId, reports: Sequence[Report], results: Sequence[StepResult]) -> Sequence[Report]:
         """Return the reports of the last step of an episode, with the decisions that were dropped."""
         loop = results[0].snapshot.game_loop
         pending = self.schedule.drop(loop)
-        dropped = [side.dropped(at, pending, loop) for side in self.sides]
+        dropped = [side.report_dropped(at, pending, loop) for side in self.sides]
         pairs = zip(reports, dropped, strict=True)
         return [report.model_copy(update={"agents": (*report.agents, *more)}) for report, more in pairs]
-
-
-def _of(side: Side, due: Sequence[Decision], advice: Sequence[Advice]) -> tuple[Sequence[Decision], Sequence[Advice]]:
-    """Return the decisions and the advice that are of one side."""
-    return [one for one in due if one.seat.side == side.name], [one for one in advice if one.side == side.name]
 
 
 class Stopwatch:

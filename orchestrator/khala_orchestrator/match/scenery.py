@@ -75,7 +75,7 @@ class Scenery:
             self._before = None
             await self._onlookers.terrain(self._terrain)
         before: Sequence[Snapshot | None] = self._before or [None] * len(snapshots)
-        sides = [Watched(*one) for one in zip(self._names, snapshots, before, strict=True)]
+        sides = [Watched(*side) for side in zip(self._names, snapshots, before, strict=True)]
         self._before = snapshots
         await self._onlookers.scene(scene_of(sides, whole, self._terrain, frames, step=at.step))
 

@@ -70,7 +70,7 @@ class Decision:
     due_loop: int
 
 
-class Asked(NamedTuple):
+class Chosen(NamedTuple):
     """Who is asked in a step, in the order of the match, and why other free agents are not."""
 
     seats: Sequence[Seat]
@@ -107,14 +107,14 @@ class Schedule:
         """Begin an episode: every agent is free, and asked at once."""
         self._places = {seat: _Place(cadence) for seat, cadence in self.cadences.items()}
 
-    def ask(
+    def choose(
         self,
         at: StepId,
         loop: int,
         happened: Callable[[Seat], Collection[Trigger]],
         is_needed: Callable[[Seat], bool] = lambda _: True,
-    ) -> Asked:
-        """Return the agents to ask now, who think from now on, and why the other free ones are not asked.
+    ) -> Chosen:
+        """Choose the agents to ask now, which think from now on; say why the other free agents are not asked.
 
         Args:
             at: the present step.
@@ -128,7 +128,7 @@ class Schedule:
         for seat in asked:
             self._places[seat].asked = (at, loop)
             self._places[seat].thinks = True
-        return Asked(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
+        return Chosen(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
 
     def decide(self, answers: Mapping[Seat, Answer], loop: int) -> None:
         """Take the answers that arrived by this loop."""
@@ -140,8 +140,8 @@ class Schedule:
             place.thinks = False
             place.decided = Decision(seat, answer, asked, asked_loop, due_loop)
 
-    def due(self, loop: int) -> Sequence[Decision]:
-        """Return the decisions that take effect now, in the order of the match; their agents are free afterwards."""
+    def take_due(self, loop: int) -> Sequence[Decision]:
+        """Take the decisions that take effect now, in the order of the match; their agents are free afterwards."""
         due = [p.decided for p in self._places.values() if p.decided is not None and p.decided.due_loop <= loop]
         for decision in due:
             place = self._places[decision.seat]

@@ -210,10 +210,10 @@ class Turn:
             asked.append(await self._publish(question, began))
             publish_s += now() - began
         began = now()
-        for one in asked:
-            one.wait_until_answered(began)
+        for open_question in asked:
+            open_question.wait_until_answered(began)
         if wait:
-            await self._settled()
+            await self._wait()
         wait_s = now() - began
         answers = self._collect()
         held_s = min(max(self._held_until - began, 0.0), wait_s)
@@ -227,7 +227,7 @@ class Turn:
         await self._show(seat, question.pictures)
         self._open[seat] = asked = _Question(observation, encode(observation), now)
         await self._publishers[seat].put(asked.payload)
-        if not self._roster.reachable(seat):
+        if not self._roster.is_reachable(seat):
             self._gone(seat)
         return asked
 
@@ -248,7 +248,7 @@ class Turn:
             asked.held_at = asyncio.get_running_loop().time()
             asked.until = asked.held_at + self._grace_s
             log.warning("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
-        elif not self._roster.present(seat):
+        elif not self._roster.is_present(seat):
             asked.waiting = False
         self._changed.set()
 
@@ -272,7 +272,7 @@ class Turn:
 
     # --- collecting ---------------------------------------------------------------------------------
 
-    async def _settled(self) -> None:
+    async def _wait(self) -> None:
         """Wait until no open question is waited for."""
         while waiting := [asked for asked in self._open.values() if asked.waiting]:
             self._check_pump()
@@ -334,7 +334,7 @@ class Turn:
             return Answer(asked.reply.status, asked.reply, asked.reply.detail, latency_s, ignored)
         if asked.fault:
             return Answer("malformed", detail=asked.fault, ignored=ignored)
-        if not self._roster.present(seat):
+        if not self._roster.is_present(seat):
             return Answer("gone", detail="its liveliness token went away", ignored=ignored)
         return Answer("late", detail="no reply before the deadline", ignored=ignored)
 

@@ -55,7 +55,7 @@ class Deeds:
             if report.reason:
                 self.words.setdefault(name, report.reason)
 
-    def undecided(self, name: str) -> tuple[int, int]:
+    def missing(self, name: str) -> tuple[int, int]:
         """Return how many decisions an agent did not make, and how many it was asked for."""
         counts = self.statuses.get(name, Counter[str]())
         return counts.total() - counts["ok"], counts.total()
@@ -82,7 +82,7 @@ def why_not_valid(
         return "; ".join(_lost(lost))
     if forfeit in NO_MERIT:
         return NO_MERIT[forfeit]
-    return "; ".join(_undecided(deeds, required, limit))
+    return "; ".join(_indecisions(deeds, required, limit))
 
 
 def _lost(lost: Mapping[Seat, str]) -> Iterator[str]:
@@ -93,9 +93,9 @@ def _lost(lost: Mapping[Seat, str]) -> Iterator[str]:
             yield f"the endpoint of {seat} will not answer it: {why}"
 
 
-def _undecided(deeds: Deeds, required: Collection[str], limit: float) -> Iterator[str]:
+def _indecisions(deeds: Deeds, required: Collection[str], limit: float) -> Iterator[str]:
     for name in required or deeds.statuses:
-        count, asked = deeds.undecided(name)
+        count, asked = deeds.missing(name)
         if not asked or (count < asked and count <= max(limit * asked, ONE)):
             continue
         causes = ", ".join(f"{number} {cause}" for cause, number in deeds.causes[name].most_common(NAMED_CAUSES))

@@ -164,7 +164,7 @@ def advice_of(config: MatchConfig, texts: Iterable[str]) -> list[Message]:
     found = [_advice(config, text) for text in texts]
     if found and config.forked.step == 0:
         raise _wrong_advice("no step comes before step 0, in which advice could arrive: fork at step 1 or later")
-    if any(sum(one.side == other.side for other in found) > MAX_MESSAGES for one in found):
+    if any(sum(message.side == other.side for other in found) > MAX_MESSAGES for message in found):
         raise _wrong_advice(f"an adviser has {MAX_MESSAGES} messages in a step")
     return found
 
@@ -250,12 +250,12 @@ def _write(
         for sample in _samples(recording, episode, until, sides):
             message = sample.message
             if isinstance(message, Report) and until is not None and message.step == until - 1:
-                heard = [one for one in advice if one.side == message.side]
-                for one in heard:
-                    key = agent_key(config.run, one.side, one.agent, Topic.MESSAGE)
-                    recorder.write(key, encode(one), log_time_ns=sample.log_time_ns)
+                heard = [advised for advised in advice if advised.side == message.side]
+                for advised in heard:
+                    key = agent_key(config.run, advised.side, advised.agent, Topic.MESSAGE)
+                    recorder.write(key, encode(advised), log_time_ns=sample.log_time_ns)
                 message = _having_heard(message, heard)
-            payload = sample.payload if message is None else encode(_renamed(message, config.run))
+            payload = sample.payload if message is None else encode(_rename(message, config.run))
             recorder.write(_key(sample.key, config.run), payload, log_time_ns=sample.log_time_ns)
 
 
@@ -279,13 +279,13 @@ def _samples(recording: Recording, episode: int, until: int | None, sides: int) 
 
 
 def _having_heard(report: Report, advice: Sequence[Message]) -> Report:
-    received = (Received(sender=one.agent, recipient=one.recipient, text=one.text) for one in advice)
+    received = (Received(sender=message.agent, recipient=message.recipient, text=message.text) for message in advice)
     return report.but(
-        messages=(*report.messages, *received), advisers=(*report.advisers, *(one.agent for one in advice))
+        messages=(*report.messages, *received), advisers=(*report.advisers, *(message.agent for message in advice))
     )
 
 
-def _renamed(message: Wire, run: str) -> Wire:
+def _rename(message: Wire, run: str) -> Wire:
     """Return a message as it would be in a match of one episode under this name."""
     changes: dict[str, object] = {"run": run}
     if hasattr(message, "episode"):

@@ -44,19 +44,19 @@ def measured_paces(calls: Iterable[ModelCall]) -> Iterator[MeasuredPace]:
         if call.status == "ok" and call.usage.prompt_tokens:
             by_model[call.model, call.endpoint].append(call)
     for (model, endpoint), answered in by_model.items():
-        pace = fitted(answered)
+        pace = fit(answered)
         errors_s = [
             abs(pace.seconds(call.usage.model_copy(update={"requests": 1})) - call.latency_s) for call in answered
         ]
         yield MeasuredPace(model, endpoint, len(answered), pace, statistics.median(errors_s))
 
 
-def fitted(calls: Iterable[ModelCall]) -> Pace:
+def fit(calls: Iterable[ModelCall]) -> Pace:
     """Return the pace that fits these calls best."""
     rows = [(1.0, call.usage.prompt_tokens, call.usage.completion_tokens, call.latency_s) for call in calls]
     table = np.array(rows, dtype=np.float64)
     constant_s, read_s, write_s = least_squares(table[:, :3], table[:, 3])
-    return Pace(latency_s=_rounded(constant_s), read_tokens_per_s=_per_s(read_s), write_tokens_per_s=_per_s(write_s))
+    return Pace(latency_s=_round(constant_s), read_tokens_per_s=_per_s(read_s), write_tokens_per_s=_per_s(write_s))
 
 
 def least_squares(columns: Floats, wanted: Floats) -> Floats:
@@ -67,11 +67,12 @@ def least_squares(columns: Floats, wanted: Floats) -> Floats:
     """
     number = columns.shape[1]
     choices = (c for size in range(number + 1) for c in itertools.combinations(range(number), size))
-    tried = (_unbounded(columns, wanted, list(chosen)) for chosen in choices)
-    return min((one for one in tried if one.min() >= 0), key=lambda one: float(((columns @ one - wanted) ** 2).sum()))
+    tried = (_least_squares(columns, wanted, list(chosen)) for chosen in choices)
+    possible = (solution for solution in tried if solution.min() >= 0)
+    return min(possible, key=lambda solution: float(((columns @ solution - wanted) ** 2).sum()))
 
 
-def _unbounded(columns: Floats, wanted: Floats, chosen: list[int]) -> Floats:
+def _least_squares(columns: Floats, wanted: Floats, chosen: list[int]) -> Floats:
     found = np.zeros(columns.shape[1])
     if chosen:
         found[chosen] = np.linalg.lstsq(columns[:, chosen], wanted, rcond=None)[0]
@@ -79,10 +80,10 @@ def _unbounded(columns: Floats, wanted: Floats, chosen: list[int]) -> Floats:
 
 
 def _per_s(seconds: float) -> float:
-    return _rounded(min(1 / seconds, UNMEASURED_PER_S)) if seconds else UNMEASURED_PER_S
+    return _round(min(1 / seconds, UNMEASURED_PER_S)) if seconds else UNMEASURED_PER_S
 
 
-def _rounded(number: float) -> float:
+def _round(number: float) -> float:
     """Return a number with the three digits that a measurement is good for."""
     return float(f"{number:.3g}")
 

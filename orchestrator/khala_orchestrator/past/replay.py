@@ -143,7 +143,7 @@ class RecordedTurn:
             seat = Seat(observation.side, observation.agent)
             outcome = self._outcomes.get((step.episode, step.step, seat))
             if outcome is None:  # the recording ends before this decision took effect
-                yield seat, self._arrived(step.episode, step.step, seat)
+                yield seat, self._answer_without_report(step.episode, step.step, seat)
             else:
                 yield seat, self._answer(step.episode, step.step, seat, outcome)
 
@@ -154,7 +154,7 @@ class RecordedTurn:
             asked = agent.asked_step
             yield seat, self._answer(step.episode, step.step if asked is None else asked, seat, agent)
 
-    def _arrived(self, episode: int, asked: int, seat: Seat) -> Answer:
+    def _answer_without_report(self, episode: int, asked: int, seat: Seat) -> Answer:
         """Return the answer to a question of which there is no report."""
         reply = self._replies.get((episode, asked, seat))
         if reply is None:

@@ -97,7 +97,7 @@ class Unfinished:
                 yield sample
 
 
-def unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfinished:
+def read_unfinished(recording: Recording, config: MatchConfig | None = None) -> Unfinished:
     """Return what is left to play of a recorded match.
 
     Args:

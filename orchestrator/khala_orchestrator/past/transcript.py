@@ -102,11 +102,11 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
                 yield table(result, named=named)
             case Observation() as seen if whole and selection.holds(seen.step, _seat(seen)):
                 title = Text.assemble(f"step {seen.step}, ", _speaker(seen, named=named), " sees")
-                yield _words(title, seen.text, "cyan")
+                yield _quotation(title, seen.text, "cyan")
                 yield from (_picture(image) for image in seen.images)
             case Reply() as reply if whole and selection.holds(reply.step, _seat(reply)):
                 title = Text.assemble(f"step {reply.step}, ", _speaker(reply, named=named), " says")
-                yield _words(title, reply.text, "magenta")
+                yield _quotation(title, reply.text, "magenta")
             case Message() as said if selection.holds(said.step, _seat(said)):
                 words = (f"{' (human)' if said.human else ''} → {visible_line(said.recipient)}: ", "magenta")
                 yield Text.assemble("  ", _speaker(said, named=named), words, visible_line(said.text))
@@ -204,7 +204,7 @@ def _picture(image: ImageRef) -> Text:
     return Text.assemble(("  picture ", "bold cyan"), f"{image.name} ({size}): ", (image.title, "dim"))
 
 
-def _words(title: Text, text: str, style: str) -> Text:
+def _quotation(title: Text, text: str, style: str) -> Text:
     body = "\n".join(f"  │ {line}" for line in text.splitlines())
     title.style = f"bold {style}"
     return Text.assemble(title, "\n", (body, "dim"))

@@ -153,7 +153,7 @@ class RecordingBus:
         address = self._known(sample.key)
         if address is None:
             return True
-        said = _said(sample.payload)
+        said = _fields(sample.payload)
         if not fits(address, *map(said.get, ("run", "side", "agent"))):
             self._foreign[sample.key] += 1
             self._note_left_out(sample.key)
@@ -310,7 +310,7 @@ class _RecordingSubscription:
         await self._subscription.close()
 
 
-def _said(payload: bytes) -> dict[str, Any]:
+def _fields(payload: bytes) -> dict[str, Any]:
     """Return the fields of a message; none if the bytes are no message."""
     try:
         said = from_json(payload)

@@ -7,7 +7,6 @@ above.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from khala_orchestrator.words.mailbox import newest
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from khala_protocol.messages import Received
 
@@ -27,7 +26,7 @@ class _Letter:
     """When it was written."""
     shown: bool = False
 
-    def at(self, loop: int) -> Received:
+    def as_read(self, loop: int) -> Received:
         """Return the message as its reader finds it at a game loop."""
         return self.received.but(age_s=round((loop - self.loop) / LOOPS_PER_S, 1), again=self.shown)
 
@@ -39,37 +38,32 @@ class _Letter:
         }
 
 
-@dataclass
+@dataclass(slots=True)
 class Letters:
-    """The open messages of all agents of a side in one episode."""
+    """The open messages of one agent in one episode."""
 
-    keep_s: Mapping[str, float]
-    """By agent, the seconds for which its messages stay; 0 for agents that are shown each once."""
-    _open: dict[str, list[_Letter]] = field(default_factory=lambda: defaultdict(list))
+    keep_s: float
+    """Seconds for which they stay; 0 if the agent is shown each once."""
+    _open: list[_Letter] = field(default_factory=list)
 
-    def clear(self) -> None:
-        """Forget the episode before."""
-        self._open.clear()
+    def close(self, recipient: str) -> None:
+        """Close the messages that the agent answers by writing to this recipient."""
+        self._open = [letter for letter in self._open if not letter.is_answered_by(recipient)]
 
-    def answered(self, agent: str, recipients: Iterable[str]) -> None:
-        """Close the messages of an agent that it answers by writing to these."""
-        for recipient in recipients:
-            self._open[agent] = [letter for letter in self._open[agent] if not letter.is_answered_by(recipient)]
+    def add(self, messages: Iterable[Received], loop: int) -> None:
+        """Keep the messages that were written to the agent at a game loop."""
+        if self.keep_s:
+            self._open += [_Letter(message, loop) for message in messages]
 
-    def arrive(self, agent: str, messages: Iterable[Received], loop: int) -> None:
-        """Keep the messages that were written to an agent at a game loop."""
-        if self.keep_s[agent]:
-            self._open[agent] += [_Letter(message, loop) for message in messages]
-
-    def of(self, agent: str, new: tuple[Received, ...], loop: int) -> tuple[Received, ...]:
-        """Return the messages that an agent finds now, the oldest first: all that are open, or the new ones alone."""
-        oldest = loop - self.keep_s[agent] * LOOPS_PER_S
-        if not self.keep_s[agent]:
+    def read(self, new: tuple[Received, ...], loop: int) -> tuple[Received, ...]:
+        """Return the messages that the agent finds now, the oldest first: all that are open, or the new ones alone."""
+        if not self.keep_s:
             return new
-        self._open[agent] = [letter for letter in self._open[agent] if letter.loop >= oldest or not letter.shown]
-        return newest([letter.at(loop) for letter in self._open[agent]])
+        oldest = loop - self.keep_s * LOOPS_PER_S
+        self._open = [letter for letter in self._open if letter.loop >= oldest or not letter.shown]
+        return newest([letter.as_read(loop) for letter in self._open])
 
-    def shown(self, agent: str) -> None:
-        """Take note that an agent was shown all of its open messages."""
-        for letter in self._open[agent]:
+    def mark_shown(self) -> None:
+        """Take note that the agent was shown all of its open messages."""
+        for letter in self._open:
             letter.shown = True

@@ -6,11 +6,10 @@ A model that orders what was refused reads the same sentence again, and orders i
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from khala_protocol.messages import Rejection
 
@@ -22,29 +21,20 @@ Key: TypeAlias = tuple[str | None, str, str]
 
 
 class Repeats:
-    """How often in a row each agent of a side was refused the same call for the same reason."""
+    """How often in a row an agent was refused the same call for the same reason."""
 
     def __init__(self) -> None:
-        self._counts: dict[str, dict[Key, int]] = defaultdict(dict)
+        self._counts: dict[Key, int] = {}
 
-    def clear(self) -> None:
-        """Forget the episode before."""
-        self._counts.clear()
-
-    def counted(
-        self, agent: str, rejections: Iterable[Rejection], offers: Mapping[str, Sequence[str]]
-    ) -> tuple[Rejection, ...]:
-        """Return the rejections of an agent's decision, with more to read where they repeat.
+    def annotate(self, rejections: Sequence[Rejection], offers: Mapping[str, Sequence[str]]) -> tuple[Rejection, ...]:
+        """Count the rejections of a decision, and return them with more to read where they repeat.
 
         Args:
-            agent: its name; a decision without a refusal ends the row.
-            rejections: of all its calls in the decision.
-            offers: by team, the actions that were possible when it decided.
+            rejections: of all calls in the decision; a decision without one ends the row.
+            offers: by team, the actions that were possible when the agent decided.
         """
-        found = tuple(rejections)
-        before = self._counts[agent]
-        self._counts[agent] = {key: before.get(key, 0) + 1 for key in map(_key, found)}
-        return tuple(_said_again(one, self._counts[agent][_key(one)], offers) for one in found)
+        self._counts = {key: self._counts.get(key, 0) + 1 for key in map(_key, rejections)}
+        return tuple(_with_count(rejection, self._counts[_key(rejection)], offers) for rejection in rejections)
 
 
 def _key(rejection: Rejection) -> Key:
@@ -53,7 +43,7 @@ def _key(rejection: Rejection) -> Key:
     return rejection.team, call, rejection.reason
 
 
-def _said_again(rejection: Rejection, times: int, offers: Mapping[str, Sequence[str]]) -> Rejection:
+def _with_count(rejection: Rejection, times: int, offers: Mapping[str, Sequence[str]]) -> Rejection:
     if times < OFTEN or not rejection.text:
         return rejection
     names = offers.get(rejection.team or "") or [name for its in offers.values() for name in its]

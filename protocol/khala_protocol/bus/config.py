@@ -132,7 +132,7 @@ def check(config: BusConfig) -> None:
     if config.mode == "router" and config.connect:
         raise BusError("a router does not connect: remove `connect`, and let clients connect to it")
     if config.exposed and not config.insecure:
-        raise BusError(_exposed(config.exposed[0], listening=config.exposed[0] in config.listen_on))
+        raise BusError(_exposure(config.exposed[0], listening=config.exposed[0] in config.listen_on))
     if config.tls is not None:
         _check_tls(config.tls)
 
@@ -221,7 +221,7 @@ def _check_endpoint(endpoint: str, *, listening: bool) -> None:
         raise BusError(f"{endpoint[:100]!r} needs a host and a port between 1 and 65535, such as tcp/127.0.0.1:7447")
 
 
-def _exposed(endpoint: str, *, listening: bool) -> str:
+def _exposure(endpoint: str, *, listening: bool) -> str:
     if listening:
         harm = "would let every machine that reaches it join without TLS"
         remedy = f"make keys with `khala keys init DIR` and say `--tls DIR --listen {_over_tls(endpoint)}`"

@@ -56,12 +56,12 @@ class Lane:
         """Call `put(payload)` and return when it has returned. If cancelled while waiting, the put may still happen."""
         size = len(payload) + HEADER_BYTES
         if self._under_way or not self._gate.fits(size):
-            future = self._thread.submit(_timed, put, payload)
+            future = self._thread.submit(_time, put, payload)
             self._under_way.add(future)
             future.add_done_callback(self._under_way.discard)
             took_s = await asyncio.wrap_future(future)
         else:
-            took_s = _timed(put, payload)
+            took_s = _time(put, payload)
         self._gate.sent(size, took_s)
 
     async def settle(self) -> None:
@@ -133,7 +133,7 @@ class Shut:
         """See `Gate`."""
 
 
-def _timed(put: Callable[[bytes], None], payload: bytes) -> float:
+def _time(put: Callable[[bytes], None], payload: bytes) -> float:
     start = time.perf_counter()
     put(payload)
     return time.perf_counter() - start

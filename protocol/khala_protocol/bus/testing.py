@@ -355,10 +355,10 @@ class BusConformance:
                 await publisher.put(b"x")
 
     async def test_closing_one_session_leaves_the_others_alone(self, connect: Connect) -> None:
-        one, two, three = await connect(), await connect(), await connect()
-        subscription = await two.subscribe("a/b", Delivery.SPEECH)
-        publisher = await three.publisher("a/b", Delivery.SPEECH)
-        await one.close()
+        leaving, listening, speaking = await connect(), await connect(), await connect()
+        subscription = await listening.subscribe("a/b", Delivery.SPEECH)
+        publisher = await speaking.publisher("a/b", Delivery.SPEECH)
+        await leaving.close()
         await publisher.put(b"x")
         assert await take(subscription, 1) == [Sample("a/b", b"x")]
 
@@ -412,11 +412,11 @@ class BusConformance:
         assert await take(watch, 1) == [Liveness("alive/a", alive=False)]
 
     async def test_tokens_are_no_samples_and_samples_no_tokens(self, connect: Connect) -> None:
-        one, two = await connect(), await connect()
-        subscription, watch = await one.subscribe("**", Delivery.STATE), await one.watch("**")
-        await two.announce("a/token")
-        await (await two.publisher("a/state", Delivery.STATE)).put(b"x")
-        await (await two.publisher("a/speech", Delivery.SPEECH)).put(b"y")
+        listening, speaking = await connect(), await connect()
+        subscription, watch = await listening.subscribe("**", Delivery.STATE), await listening.watch("**")
+        await speaking.announce("a/token")
+        await (await speaking.publisher("a/state", Delivery.STATE)).put(b"x")
+        await (await speaking.publisher("a/speech", Delivery.SPEECH)).put(b"y")
         assert {sample.key for sample in await take(subscription, 2)} == {"a/state", "a/speech"}
-        await two.announce("a/token/2")
+        await speaking.announce("a/token/2")
         assert {report.key for report in await take(watch, 2)} == {"a/token", "a/token/2"}

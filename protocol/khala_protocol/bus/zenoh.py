@@ -191,7 +191,7 @@ class ZenohBus:
             declared = (self._session.declare_subscriber(key_expr, take),)
         self._mailboxes.add(mailbox)
         self._held.add(*declared)
-        await self._settled(self._session.get, key_expr, mailbox)
+        await self._settle_or_close(self._session.get, key_expr, mailbox)
         return mailbox
 
     async def announce(self, key: str) -> Token:
@@ -215,7 +215,7 @@ class ZenohBus:
         self._sightings.add(sightings)
         self._held.add(watcher)
         # A token that ends while its session tells of it was often reported after its end, and for good.
-        await self._settled(self._session.liveliness().get, key_expr, mailbox)
+        await self._settle_or_close(self._session.liveliness().get, key_expr, mailbox)
         return mailbox
 
     async def close(self) -> None:
@@ -268,7 +268,7 @@ class ZenohBus:
         self._sightings.discard(sightings)
         self._forget(mailbox, watcher)
 
-    async def _settled(self, get: Callable[..., Any], key_expr: str, mailbox: Inbox[Any]) -> None:
+    async def _settle_or_close(self, get: Callable[..., Any], key_expr: str, mailbox: Inbox[Any]) -> None:
         """Settle what fills a mailbox, or close it."""
         try:
             await self._settle(get, key_expr)
@@ -336,9 +336,9 @@ class _Held:
         """
         self._declared.difference_update(declared)
         if not self.closed:
-            for one in reversed(declared):  # a listener goes before what it listens to
-                if not isinstance(one, AdvancedPublisher):
-                    one.undeclare()
+            for handle in reversed(declared):  # a listener goes before what it listens to
+                if not isinstance(handle, AdvancedPublisher):
+                    handle.undeclare()
 
 
 class _Publisher:

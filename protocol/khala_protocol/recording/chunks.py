@@ -101,7 +101,7 @@ class Scan:
                     channel = Channel.read(stream_of(bytes(content)))
                     self.keys[channel.id] = channel.topic
                 elif kind == Opcode.MESSAGE:
-                    sample = _placed(place, content)
+                    sample = _place(place, content)
                     if self.expected not in (-1, sample.sequence):
                         self.broken = True
                         return
@@ -135,7 +135,7 @@ def samples_of(data: bytes) -> Iterator[Placed]:
     for kind, place, content in _records(data):
         budget.take_record()
         if kind == Opcode.MESSAGE:
-            yield _placed(place, content)
+            yield _place(place, content)
 
 
 def payload_at(data: bytes, place: int) -> bytes:
@@ -192,7 +192,7 @@ def _records(data: bytes) -> Iterator[tuple[int, int, memoryview]]:
         place = start + length
 
 
-def _placed(place: int, content: memoryview) -> Placed:
+def _place(place: int, content: memoryview) -> Placed:
     number, sequence, log_time_ns, _ = _SAMPLE.unpack_from(content)
     return Placed(number, sequence, log_time_ns, place, bytes(content[_SAMPLE.size :]))
 

@@ -22,7 +22,7 @@ from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Observation, Reply, Report, Result, Run, Wire
 from khala_protocol.recording.recorder import KINDS, LEFT_OUT, LIBRARY, METADATA, Recorder
 from khala_protocol.recording.speaker import is_said_by
-from khala_protocol.recording.unpack import BROKEN, unpacked
+from khala_protocol.recording.unpack import BROKEN, unpack
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -262,7 +262,7 @@ def _records(path: Path) -> Iterator[Recorded | McapRecord]:
     expected: Iterator[int] = itertools.repeat(-1)
     with path.open("rb") as file:
         try:
-            for record in unpacked(file):
+            for record in unpack(file):
                 match record:
                     case Header() if record.library.startswith(LIBRARY):
                         expected = itertools.count()

@@ -85,7 +85,8 @@ class Summary:
         chunks: list[tuple[int, frozenset[int]]] = []
         counts: Counter[str] = Counter()
         times = (0, 0)
-        for group in sorted((one for one in groups if one.group_opcode in _READ), key=lambda one: one.group_opcode):
+        read = [group for group in groups if group.group_opcode in _READ]
+        for group in sorted(read, key=lambda group: group.group_opcode):
             for kind, content in _records(file, group.group_start, group.group_start + group.group_length):
                 match kind:
                     case Opcode.CHANNEL:
@@ -96,7 +97,8 @@ class Summary:
                     case Opcode.STATISTICS:
                         found = Statistics.read(stream_of(content))
                         times = found.message_start_time, found.message_end_time
-                        counts.update({keys[one]: n for one, n in found.channel_message_counts.items() if one in keys})
+                        by_id = found.channel_message_counts.items()
+                        counts.update({keys[number]: count for number, count in by_id if number in keys})
         return cls(path, size, True, keys, counts, *times, tuple(chunks))
 
     @classmethod

@@ -34,7 +34,7 @@ BROKEN = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError,
 """Errors of bytes that are not an MCAP file, or that unpack beyond the limits; found by mutating one."""
 
 
-def unpacked(file: BinaryIO) -> Iterator[McapRecord]:
+def unpack(file: BinaryIO) -> Iterator[McapRecord]:
     """Yield the records of a file, those in chunks too, in its order.
 
     Raises:

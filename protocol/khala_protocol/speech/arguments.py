@@ -138,17 +138,17 @@ def _read_one(piece: str) -> str | Point:
 
 def _point(match: re.Match[str]) -> Point | None:
     """Return the point of a match; None if a number is too large to be one."""
-    one, other = float(match["one"]), float(match["other"])
-    if not (math.isfinite(one) and math.isfinite(other)):
+    left, right = float(match["one"]), float(match["other"])
+    if not (math.isfinite(left) and math.isfinite(right)):
         return None
     swapped = (match["first"] or "x").lower() == "y" and (match["second"] or "y").lower() == "x"
-    return (other, one) if swapped else (one, other)
+    return (right, left) if swapped else (left, right)
 
 
 def _in_order(match: re.Match[str]) -> str:
     """Return two named coordinates as a point (rule A11)."""
-    one, other = match["one"], match["other"]
-    return f"[{other}, {one}]" if match["first"].lower() == "y" else f"[{one}, {other}]"
+    left, right = match["one"], match["other"]
+    return f"[{right}, {left}]" if match["first"].lower() == "y" else f"[{left}, {right}]"
 
 
 def _join_coordinates(arguments: list[str | Point]) -> Iterator[str | Point]:

@@ -57,7 +57,7 @@ def _as_long(match: re.Match[str]) -> str:
     return mark.ljust(len(escape)) if mark == "<" else mark.rjust(len(escape))
 
 
-def unescaped(words: str) -> str:
+def unescape(words: str) -> str:
     """Return the text of a message: without blanks around it, and with the characters that escapes stand for."""
     if "&" in words:
         words = _CHARACTER.sub(lambda match: html.unescape(match[0]), words).strip(QUOTES + " \t\n")

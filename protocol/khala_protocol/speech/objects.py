@@ -100,7 +100,7 @@ def _first(found: object, keys: tuple[str, ...]) -> object:
 def _values(given: object) -> list[str | Point]:
     """Return the arguments in JSON: from a list, an object of named ones, a single one, or text of one of these."""
     if isinstance(given, str) and given.lstrip()[:1] in ("{", "["):
-        given = _loaded(given)
+        given = _load(given)
     match given:
         case None | "":
             return []
@@ -114,7 +114,7 @@ def _values(given: object) -> list[str | Point]:
             return list(read_arguments(given if isinstance(given, str) else json.dumps(given)))
 
 
-def _loaded(given: str) -> object:
+def _load(given: str) -> object:
     try:
         found = json.loads(given)
     except (ValueError, RecursionError):

@@ -94,7 +94,7 @@ class MessageReader:
         recipient = (to["quoted"] or to["plain"]).strip(" \t*_[]{}\\") if to else ""
         if to is None or not recipient:
             raise MalformedCall(f"a message needs a recipient and a text: {_SAMPLE}")
-        start, stop, end = self._words(to.end(), f"the message to {recipient[:SHORT]}", _SAMPLE, naked=naked)
+        start, stop, end = self._bounds(to.end(), f"the message to {recipient[:SHORT]}", _SAMPLE, naked=naked)
         return Addressed(recipient, start, stop, end)
 
     def note(self, at: int, *, naked: bool = False) -> Addressed:
@@ -105,7 +105,7 @@ class MessageReader:
         """
         keyword = _KEYWORD.match(self._text, at)
         assert keyword is not None, "it matches nothing as well"
-        return Addressed("", *self._words(keyword.end(), "the note", _SAMPLE_NOTE, naked=naked))
+        return Addressed("", *self._bounds(keyword.end(), "the note", _SAMPLE_NOTE, naked=naked))
 
     def noted_element(self, at: int) -> Addressed | None:
         """Return the note between `<Note>`, which ends here, and `</Note>`."""
@@ -113,7 +113,7 @@ class MessageReader:
         words = end and self._text[at : end.start()].strip(QUOTES + " \t\n")
         return Addressed("", at, end.start(), end.end()) if end and words else None
 
-    def _words(self, at: int, what: str, sample: str, *, naked: bool) -> tuple[int, int, int]:
+    def _bounds(self, at: int, what: str, sample: str, *, naked: bool) -> tuple[int, int, int]:
         """Return where quoted or other words begin and end, and where the call around them ends."""
         quote = _QUOTE.match(self._text, at)
         found = quote and self._quoted_end(quote, naked=naked)

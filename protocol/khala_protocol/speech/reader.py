@@ -46,7 +46,7 @@ from khala_protocol.speech.headings import (
     json_heading_at,
     tag_heading_at,
 )
-from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescaped
+from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescape
 from khala_protocol.speech.objects import ObjectMessage, object_at
 from khala_protocol.speech.orders import numbers_in, standing_at
 from khala_protocol.speech.quoting import MessageReader
@@ -177,7 +177,7 @@ class _Walk:
         return mark.end() if end is None else self._headings(end, line_start=False)
 
     def quoted(self, mark: re.Match[str]) -> int:
-        return self._naked(mark.end()) or mark.end()
+        return self._read_naked(mark.end()) or mark.end()
 
     def angle(self, mark: re.Match[str]) -> int:
         return self._angle(mark.start())
@@ -206,7 +206,7 @@ class _Walk:
             else:
                 break
             line_start = False
-        while self._plain[at : at + 1] not in _NO_HEADING and (naked := self._naked(at)):
+        while self._plain[at : at + 1] not in _NO_HEADING and (naked := self._read_naked(at)):
             at = naked
         return at
 
@@ -270,7 +270,7 @@ class _Walk:
             self._fault(start, found.end, found.name, str(error))
         return found.end
 
-    def _naked(self, at: int) -> int | None:
+    def _read_naked(self, at: int) -> int | None:
         """Read a call without angle brackets; return None if there is none."""
         talk = naked_talk_at(self._plain, at)
         naked = naked_at(self._plain, at)
@@ -280,7 +280,7 @@ class _Walk:
         name = found["name"]
         try:
             if talk:
-                return self._words(name, start, talk.end(), naked=True)
+                return self._read_words(name, start, talk.end(), naked=True)
             if not stands_alone(self._plain, found.end()):
                 self._fault(start, found.end(), name, f"a call stands in angle brackets: write <{name[:SHORT]}(...)>")
             elif is_talk(name):
@@ -313,7 +313,7 @@ class _Walk:
             return self._without_parentheses(start, opening)
         name = opening.name
         if name.lower() in _OF_WORDS:
-            return self._words(name, start, opening.end)
+            return self._read_words(name, start, opening.end)
         inner_end, end = close_parentheses(self._plain, opening)
         inside = self._plain[opening.end : inner_end]
         if is_talk(name):
@@ -332,7 +332,7 @@ class _Walk:
         if name.lower() == NOTE and end is not None and (noted := self._messages.noted_element(end)):
             return self._note(start, noted)
         found_at = loose_arguments(self._plain, opening.end) if end is None else element_at(self._plain, end, name)
-        if found_at and "_" in name and (args := self._typed(*found_at[:2])):
+        if found_at and "_" in name and (args := self._typed_arguments(*found_at[:2])):
             self._add_call(name, args, start, found_at[2])
             return found_at[2]
         if end is None:
@@ -344,12 +344,12 @@ class _Walk:
                 self._add_call(name, (), start, end)
         return end
 
-    def _typed(self, start: int, stop: int) -> tuple[str | Point, ...]:
+    def _typed_arguments(self, start: int, stop: int) -> tuple[str | Point, ...]:
         """Return the arguments at this place, if all of them are tags and points; otherwise none."""
         args = read_arguments(self._plain[start:stop])
         return args if all(not isinstance(arg, str) or arg.startswith("0x") for arg in args) else ()
 
-    def _words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
+    def _read_words(self, name: str, start: int, at: int, *, naked: bool = False) -> int:
         """Read a message, a note or a standing order, whose words begin at `at`."""
         if name.lower() in MESSAGE_NAMES:
             return self._message(start, self._messages.read(at, naked=naked))
@@ -360,7 +360,7 @@ class _Walk:
         return found.end
 
     def _note(self, start: int, found: Addressed) -> int:
-        text = unescaped(self._text[found.start : found.stop]).strip(QUOTES + " \t\n")
+        text = unescape(self._text[found.start : found.stop]).strip(QUOTES + " \t\n")
         self._add(Note(text, start, found.end), ReplySection.NONE, start)
         return found.end
 
@@ -369,7 +369,7 @@ class _Walk:
         self._add(Standing(call, until, start, end), ReplySection.ACTIONS, start)
 
     def _message(self, start: int, found: Addressed) -> int:
-        text = unescaped(self._text[found.start : found.stop])
+        text = unescape(self._text[found.start : found.stop])
         self._add(MessageTo(found.recipient, text, start, found.end), ReplySection.COMMUNICATIONS, start)
         return found.end
 

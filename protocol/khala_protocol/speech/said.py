@@ -159,7 +159,7 @@ class Gathering:
 
     def speech(self) -> Speech:
         """Return what counts of it."""
-        repeated = self._repeated()
+        repeated = self._repeats()
         said: list[Item] = []
         mentioned: list[Call] = []
         for found in self._found:
@@ -180,14 +180,14 @@ class Gathering:
             mentions=tuple(mentioned),
         )
 
-    def _repeated(self) -> set[tuple[ReplySection, int]]:
+    def _repeats(self) -> set[tuple[ReplySection, int]]:
         """Return the blocks that repeat an earlier one under the same heading (rule S27)."""
         if len(set(self._titles)) == len(self._titles):
             return set()
         blocks: dict[tuple[ReplySection, int], list[tuple[object, ...]]] = {}
         for found in self._found:
             if not (found.taken_back or found.in_prose):
-                blocks.setdefault((found.kind, found.block), []).append(_words(found.item))
+                blocks.setdefault((found.kind, found.block), []).append(_content(found.item))
         seen: set[tuple[object, ...]] = set()
         repeated = set()
         for (kind, block), words in blocks.items():
@@ -198,7 +198,7 @@ class Gathering:
         return repeated
 
 
-def _words(item: Item) -> tuple[object, ...]:
+def _content(item: Item) -> tuple[object, ...]:
     """Return the words of an item, without its place."""
     match item:
         case Call():

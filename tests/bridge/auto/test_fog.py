@@ -101,7 +101,7 @@ def outcomes(task: TaskConfig, seen: SideObservation) -> Iterator[str]:
     for agent in ("Developer", "Commander", "Builder", "Fighter"):
         for team in seen.agents[agent].teams:
             for call in calls(seen, [spec.name for spec in team.view.actions], team.camera is not None):
-                said = parse(f"Actions:\n    Team {team.view.name}:\n        {call}")
+                said = parse(f"Actions:\n    Team {team.name}:\n        {call}")
                 joint = actor.joint(seen, {agent: said})
                 orders = [(c.function.name, c.units, c.target) for c in joint.commands]
                 yield f"{agent} {call} {orders} {[one.message for one in joint.rejections[agent]]}"

@@ -196,16 +196,16 @@ def test_what_stands_is_taken_and_what_is_planned_is_not_free(make_game: Callabl
 
 def test_a_pylon_powers_its_circle_and_a_nexus_powers_nothing(make_game: Callable[..., Game]) -> None:
     game = make_game("Flat64")
-    assert not land_of(game.snapshot).powered(corner=True).any()
+    assert not land_of(game.snapshot).power_cells(corner=True).any()
     tag = game.put("Pylon", 30, 30)
     land = land_of(game.snapshot)
-    x, y = np.argwhere(land.powered(corner=False)).T
+    x, y = np.argwhere(land.power_cells(corner=False)).T
     assert np.hypot(x + 0.5 - 30, y + 0.5 - 30).max() <= 6.5
-    assert land.powered(corner=False).sum() == sum(
+    assert land.power_cells(corner=False).sum() == sum(
         math.hypot(i + 0.5, j + 0.5) <= 6.5 for i in range(-8, 8) for j in range(-8, 8)
     )
-    assert (land.powered(corner=True, by=tag) == land.powered(corner=True)).all()
-    assert not land.powered(corner=True, by=1).any()
+    assert (land.power_cells(corner=True, by=tag) == land.power_cells(corner=True)).all()
+    assert not land.power_cells(corner=True, by=1).any()
 
 
 def test_ways_of_workers_and_places_of_town_halls_are_kept_free(make_game: Callable[..., Game]) -> None:

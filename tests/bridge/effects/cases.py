@@ -139,16 +139,16 @@ def task_of(case: Case) -> TaskConfig:
 
 def replies(case: Case, stage: Stage, observation: SideObservation) -> Iterator[str]:
     """Yield what a model could say so that the action is done, the most promising first."""
-    teams = (t for t in observation.agents[AGENT].teams if not t.team.tags or stage.caster in t.team.tags)
+    teams = (t for t in observation.agents[AGENT].teams if not t.tags or stage.caster in t.tags)
     team = next(teams, None)
     if team is None:
         return
     named = [hex(stage.caster)]
     if case.action.subject == "two_units":
-        named.append(hex(next(tag for tag in team.team.tags if tag != stage.caster)))
-    named = named[: case.action.named]
+        named.append(hex(next(tag for tag in team.tags if tag != stage.caster)))
+    named = named[: case.action.actor_count]
     for target in _targets(case.action, stage, team, observation):
-        yield f"Actions:\n    Team {team.view.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
+        yield f"Actions:\n    Team {team.name}:\n        <{case.action.name}({', '.join([*named, *target])})>"
 
 
 def _targets(action: Action, stage: Stage, team: TeamObservation, observation: SideObservation) -> Iterator[list[str]]:

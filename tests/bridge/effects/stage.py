@@ -27,7 +27,7 @@ from .effect import Seen
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala_bridge.act.plan import Plan, Played
+    from khala_bridge.act.plan import Plan, PlanResult
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.world import World
 
@@ -172,7 +172,7 @@ class Stage:
             process.playing = current
         return self._idle[loops]
 
-    def play(self, plan: Plan) -> tuple[Played, int]:
+    def play(self, plan: Plan) -> tuple[PlanResult, int]:
         """Play a plan from now on; return what was played, and its number of loops."""
         step, loops = next(plan), 0
         while True:

@@ -8,7 +8,7 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2
 
 from khala_bridge.act import Actor
-from khala_bridge.act.plan import PlanStep, Played
+from khala_bridge.act.plan import PlanResult, PlanStep
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.act.screen import ScreenExecutor
 from khala_bridge.compat import actions as pysc2
@@ -155,7 +155,7 @@ def test_a_team_is_recalled_by_its_control_group(game: PySC2Game) -> None:
 
 def _select_others() -> Plan:
     yield PlanStep((pysc2.FUNCTIONS.select_army("select"),), 1)
-    return Played()
+    return PlanResult()
 
 
 def test_what_units_can_do_is_asked_once_an_observation_and_not_after_the_end(game: PySC2Game) -> None:
@@ -187,7 +187,7 @@ def _set_up(game: PySC2Game, play: Play) -> Snapshot:
 
 def _say(
     game: PySC2Game, play: Play, executor: Executor, now: Snapshot, control_group: int | None = None
-) -> tuple[Played, Snapshot]:
+) -> tuple[PlanResult, Snapshot]:
     """Play a reply of an agent and some loops."""
     kinds = tuple(dict.fromkeys(kind for kind, owner, _, _ in play.units if owner == OWN))
     if play.action.startswith(("Warp_", "Train_")):

@@ -8,12 +8,12 @@ import pytest
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.game.manners import Asked, LanPorts, Manners
+from khala_bridge.game.manners import GuestRequest, LanPorts, Manners
 
 PORTS = LanPorts(5000, 5001, 5002, 5003, 5004, 5005)
 
 
-def read(manners: Manners, **request: Any) -> Asked:
+def read(manners: Manners, **request: Any) -> GuestRequest:
     return manners.read(sc_pb.Request(id=7, **request).SerializeToString())
 
 
@@ -23,7 +23,7 @@ def note(manners: Manners, status: Any = sc_pb.in_game, **response: Any) -> bool
 
 def test_what_a_player_asks_is_passed_on_as_it_is() -> None:
     request = sc_pb.Request(step=sc_pb.RequestStep(count=4)).SerializeToString()
-    assert Manners(PORTS).read(request) == Asked("step", passed=request)
+    assert Manners(PORTS).read(request) == GuestRequest("step", passed=request)
 
 
 def test_a_guest_joins_on_the_ports_of_the_host_whatever_it_made_of_the_first_one() -> None:

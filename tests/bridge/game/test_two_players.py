@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_bridge.act import PlanStep, Played
+from khala_bridge.act import PlanResult, PlanStep
 from khala_bridge.errors import GameError
 from khala_bridge.frames import WorldPoint
 from khala_bridge.game.game import GameConfig
@@ -63,7 +63,7 @@ def cross(now: Snapshot) -> Any:
 
 def plan(actions: Any, loops: int) -> Plan:
     yield PlanStep(tuple(actions), loops)
-    return Played()
+    return PlanResult()
 
 
 def act(game: PySC2Game, now: tuple[Snapshot, ...], *acts: Act, loops: int = 40) -> tuple[Snapshot, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act import PlanStep, Played
+from khala_bridge.act import PlanResult, PlanStep
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError
 from khala_bridge.game.game import GameConfig
@@ -54,7 +54,7 @@ def attack(now: Snapshot) -> Plan:
     """Send everybody to where the other player begins."""
     start = now.info.starts[0]
     yield PlanStep((unit_order(ATTACK, [unit.tag for unit in now.own], start),), 40)
-    return Played()
+    return PlanResult()
 
 
 def observations(game: PySC2Game, look: Callable[[], object]) -> list[bytes]:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from khala_bridge.observe import Observer
 from khala_bridge.observe.image import titles
-from khala_bridge.observe.image.encoding import encoded
+from khala_bridge.observe.image.encoding import encode
 from khala_bridge.observe.image.screen import Legend
 from khala_bridge.task.images import ImageSpec
 from khala_orchestrator.config import load_task
@@ -91,7 +91,7 @@ def test_pictures_decode_in_the_form_and_size_that_was_asked_for(
 
 def test_png_keeps_every_pixel() -> None:
     image = np.random.default_rng(1).integers(0, 255, (64, 64, 3), np.uint8)
-    decoded = cv2.imdecode(np.frombuffer(encoded(image, "n", "t", "png").data, np.uint8), cv2.IMREAD_COLOR)
+    decoded = cv2.imdecode(np.frombuffer(encode(image, "n", "t", "png").data, np.uint8), cv2.IMREAD_COLOR)
     assert decoded is not None
     assert np.array_equal(decoded, image)
 

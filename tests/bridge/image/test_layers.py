@@ -10,7 +10,7 @@ from s2clientprotocol import spatial_pb2
 
 from khala_bridge.frames import Camera
 from khala_bridge.observe.image import features, own
-from khala_bridge.observe.image.layers import LAYERS, FeatureLayer, coloured, explain
+from khala_bridge.observe.image.layers import LAYERS, FeatureLayer, colour, explain
 from khala_bridge.observe.image.moment import Moment
 from khala_bridge.observe.image.palette import LIVERIES
 from khala_bridge.task.images import DRAWN_LAYERS, GAME_LAYERS, MINIMAP_LAYERS
@@ -96,18 +96,18 @@ def test_units_on_one_point_are_counted(snapshot: Snap, unit: Unit) -> None:
 @pytest.mark.parametrize("layer", [layer for layer in LAYERS.values() if layer.colours], ids=lambda layer: layer.name)
 def test_values_have_the_colours_of_the_legend(layer: FeatureLayer) -> None:
     cells = np.array([[value for value, _, _ in layer.colours]], np.uint8)
-    assert coloured(layer, cells)[0].tolist() == [list(colour) for _, _, colour in layer.colours]
+    assert colour(layer, cells)[0].tolist() == [list(colour) for _, _, colour in layer.colours]
 
 
 def test_scalars_grow_lighter(snapshot: Snap) -> None:
-    ramp = coloured(LAYERS["unit_hit_points_ratio"], np.arange(1, 256, dtype=np.uint8)[None])
+    ramp = colour(LAYERS["unit_hit_points_ratio"], np.arange(1, 256, dtype=np.uint8)[None])
     grey = ramp[0] @ np.array([0.114, 0.587, 0.299])
     assert (np.diff(grey) > -1).all()
     assert grey[-1] - grey[0] > 120
 
 
 def test_the_legend_is_written_into_the_picture() -> None:
-    image = coloured(LAYERS["player_relative"], np.zeros((SIZE, SIZE), np.uint8))
+    image = colour(LAYERS["player_relative"], np.zeros((SIZE, SIZE), np.uint8))
     explain(image, LAYERS["player_relative"])
     for name in ("team", "enemy"):
         assert (image == np.array(LIVERIES[name].body)).all(axis=2).sum() == 8 * 7

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from khala_bridge.observe import shortened
+from khala_bridge.observe import shorten
 from khala_bridge.observe.feedback import MAX_CHARACTERS
 from khala_bridge.observe.text import reply
 from khala_protocol.messages import Received, Rejection
@@ -19,24 +19,24 @@ def rejection(text: str = "<Go()>", **fields: Any) -> Rejection:
 
 
 def test_few_rejections_are_listed_as_they_are() -> None:
-    assert shortened([rejection()] * 10) == (rejection(),) * 10
+    assert shorten([rejection()] * 10) == (rejection(),) * 10
 
 
 def test_of_many_rejections_the_others_are_counted_by_reason() -> None:
-    *listed, last = shortened([rejection()] * 4_600 + [rejection(reason="malformed")])
+    *listed, last = shorten([rejection()] * 4_600 + [rejection(reason="malformed")])
     assert listed == [rejection()] * 10
     assert (last.reason, last.text) == ("unknown_action", "")
     assert last.message == "4591 more are not listed: 4590 unknown_action, 1 malformed."
 
 
 def test_long_words_are_cut() -> None:
-    (short,) = shortened([rejection("x" * 60_000, message="y" * 60_000, team="z" * 60_000)])
+    (short,) = shorten([rejection("x" * 60_000, message="y" * 60_000, team="z" * 60_000)])
     assert (len(short.text), len(short.message), len(short.team or "")) == (120, 400, 60)
     assert short.text[-1] == "…"
 
 
 def test_all_rejections_together_have_only_so_many_characters() -> None:
-    found = shortened([rejection("x" * 60_000, message="y" * 60_000)] * 4_600)
+    found = shorten([rejection("x" * 60_000, message="y" * 60_000)] * 4_600)
     assert sum(len(one.text) + len(one.message) for one in found) < MAX_CHARACTERS + 100
 
 

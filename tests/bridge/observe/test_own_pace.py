@@ -9,7 +9,7 @@ import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.observe import Observer
-from khala_bridge.observe.scene import Scene
+from khala_bridge.observe.scene import SideScene
 from khala_orchestrator.config import load_task
 from khala_protocol.messages import Alert
 
@@ -118,7 +118,7 @@ def test_a_stage_is_reached_though_nobody_looks(unit: Any, look: Any, paces: Any
 def test_nothing_is_made_for_agents_that_do_not_look(unit: Any, snapshot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     observer = Observer(load_task("2s3z_pair"))
     made: list[int] = []
-    monkeypatch.setattr("khala_bridge.observe.observer.Scene", lambda *_: made.append(1))
+    monkeypatch.setattr("khala_bridge.observe.observer.SideScene", lambda *_: made.append(1))
     moments = [observer.observe(snapshot([unit(1, "Stalker", 10, 16)], loop=loop)) for loop in range(3)]
     assert made == []
     assert [team.name for team in moments[-1].teams["Stalkers"]] == ["Stalker-1"]
@@ -149,9 +149,9 @@ def test_the_side_knows_teams_and_the_dead_without_any_agents_observation(unit: 
 
 def test_no_scene_outlives_its_moment_for_an_agent_that_is_never_asked_again(unit: Any, snapshot: Any) -> None:
     observer = Observer(load_task("2s3z_pair"))
-    before = sum(isinstance(thing, Scene) for thing in gc.get_objects())
+    before = sum(isinstance(thing, SideScene) for thing in gc.get_objects())
     observer.observe(snapshot([unit(1, "Stalker", 10, 16), unit(2, "Zealot", 14, 16)])).agents["Zealots"]
     for loop in range(5):
         observer.observe(snapshot([unit(1, "Stalker", 10, 16)], loop=loop)).agents["Stalkers"]
     gc.collect()
-    assert sum(isinstance(thing, Scene) for thing in gc.get_objects()) - before <= 1
+    assert sum(isinstance(thing, SideScene) for thing in gc.get_objects()) - before <= 1

@@ -207,7 +207,7 @@ def calls(observation: SideObservation, action: Action) -> list[str]:
     """Return an action as it may be written: by each unit that it may name, at each target that there is."""
     tags = observation.agents["A"].teams[0].team.tags
     listed, units = observation.agents["A"].agent.actions, observation.agents["A"].teams[0].view.units
-    named = [unit.tag for unit in units if action.name in listed[unit.type]] if action.named else [""]
+    named = [unit.tag for unit in units if action.name in listed[unit.type]] if action.actor_count else [""]
     targets = {
         None: [""],
         "screen": ["[12, 12]"],

@@ -65,7 +65,7 @@ def idle(lab: Lab) -> Samples:
     unit="world units",
     exact=False,
 )
-def engaged(lab: Lab) -> Samples:
+def engage(lab: Lab) -> Samples:
     """Let a Marine fire at a structure, and six Marines walk through it."""
     places = lab.ground.places(24, 10)[:8]
     puts = []
@@ -171,8 +171,8 @@ def hover(lab: Lab) -> Samples:
         tags = lab.make(*(Put(kind, place) for place in places for _ in range(2)))
         for loops, since in ((8, 8), (32, 24), (128, 96)):
             lab.step(since)
-            for one, other in zip(tags[::2], tags[1::2], strict=True):
-                yield f"{kind} after {loops}", math.dist(lab.at(one), lab.at(other))
+            for left, right in zip(tags[::2], tags[1::2], strict=True):
+                yield f"{kind} after {loops}", math.dist(lab.at(left), lab.at(right))
         lab.clear()
 
 
@@ -257,4 +257,4 @@ def firing_line(lab: Lab) -> Samples:
         lab.clear()
 
 
-PROBES = (idle, engaged, crossing, arrival, hover, gap, surround, firing_line)
+PROBES = (idle, engage, crossing, arrival, hover, gap, surround, firing_line)

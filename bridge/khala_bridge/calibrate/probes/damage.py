@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from khala_bridge.calibrate.cast import apart, armed, fact, known, targets
+from khala_bridge.calibrate.cast import apart, armed_types, fact, known, targets
 from khala_bridge.calibrate.lab import ATTACK, ENEMY, Put
 from khala_bridge.calibrate.probe import Samples, probe
-from khala_bridge.calibrate.probes.pairs import attack, hits, period_loops, staged
+from khala_bridge.calibrate.probes.pairs import attack, hits, period_loops, stage
 
 if TYPE_CHECKING:
     from khala_bridge.calibrate.lab import Lab
@@ -34,16 +34,16 @@ def pair(lab: Lab) -> Samples:
     """Let each fire, and count until half a period after the first hit."""
     wanted = [
         (attacker, target)
-        for attacker in known(lab, armed())
+        for attacker in known(lab, armed_types())
         for target in known(lab, targets())
         if fact(attacker).hits(fact(target))
     ]
-    for pairs in staged(lab, wanted):
+    for pairs in stage(lab, wanted):
         firing = attack(lab, pairs)
-        for one, found in hits(lab, firing, _WAIT_LOOPS).items():
+        for pair, found in hits(lab, firing, _WAIT_LOOPS).items():
             if found:
-                end = found[0][0] + 0.5 * period_loops(lab, one.kind)
-                yield f"{one.kind} > {one.against}", sum(lost for loop, lost in found if loop <= end)
+                end = found[0][0] + 0.5 * period_loops(lab, pair.kind)
+                yield f"{pair.kind} > {pair.against}", sum(lost for loop, lost in found if loop <= end)
 
 
 @probe(

@@ -45,7 +45,7 @@ def _workers(lab: Lab, fields: list[int], kind: str = "SCV") -> list[int]:
     return tags
 
 
-def _banked(lab: Lab, *, vespene: bool = False) -> float:
+def _bank(lab: Lab, *, vespene: bool = False) -> float:
     details = lab.observation.observation.score.score_details
     return float(details.collected_vespene if vespene else details.collected_minerals)
 
@@ -65,9 +65,9 @@ def line(lab: Lab) -> Samples:
         _workers(lab, [fields[i % len(fields)] for i in range(count)])
         lab.step(_WARM_UP)
         for _ in range(8):
-            before = _banked(lab)
+            before = _bank(lab)
             lab.step(_MINUTE // 2)
-            yield f"{count} workers", 2 * (_banked(lab) - before)
+            yield f"{count} workers", 2 * (_bank(lab) - before)
         lab.clear()
 
 
@@ -95,13 +95,14 @@ def trip(lab: Lab) -> Samples:
     exact=False,
     setting=MELEE,
 )
-def shared(lab: Lab) -> Samples:
+def share(lab: Lab) -> Samples:
     """Measure sixteen deliveries, two by two, so that unequal ones even out."""
     for count in (2, 3):
         _workers(lab, [_fields(lab)[0]] * count)
         lab.step(_WARM_UP)
         found = _deliveries(lab, 16)
-        yield from ((f"{count} workers", (one + other) / 2) for one, other in zip(found[::2], found[1::2], strict=True))
+        pairs = zip(found[::2], found[1::2], strict=True)
+        yield from ((f"{count} workers", (first + second) / 2) for first, second in pairs)
         lab.clear()
 
 
@@ -109,11 +110,11 @@ def _deliveries(lab: Lab, count: int, *, vespene: bool = False) -> list[int]:
     """Return the loops between so many deliveries."""
     found: list[int] = []
     last = 0
-    bank = _banked(lab, vespene=vespene)
+    bank = _bank(lab, vespene=vespene)
     end = lab.loop + 300 * (count + 2)
     while len(found) < count and lab.loop < end:
         lab.step()
-        if (now := _banked(lab, vespene=vespene)) > bank:
+        if (now := _bank(lab, vespene=vespene)) > bank:
             if last:
                 found.append(lab.loop - last)
             last = lab.loop
@@ -138,7 +139,7 @@ def gas(lab: Lab) -> Samples:
         lab.step(_WARM_UP)
         found = _deliveries(lab, 16, vespene=True)
         yield from (
-            (f"{count} workers", (one + other) / 2) for one, other in zip(found[::2], found[1::2], strict=False)
+            (f"{count} workers", (first + second) / 2) for first, second in zip(found[::2], found[1::2], strict=False)
         )
         lab.clear()
 
@@ -183,4 +184,4 @@ def wander(lab: Lab) -> Samples:
         yield "made 8 south of it", math.dist(lab.at(hall), lab.at(stray)) if stray in lab.units else 0.0
 
 
-PROBES = (line, trip, shared, gas, mule, wander)
+PROBES = (line, trip, share, gas, mule, wander)

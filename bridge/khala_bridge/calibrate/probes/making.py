@@ -29,13 +29,13 @@ def making(lab: Lab) -> Samples:
     lab.cheat("tech_tree", "food")
     lab.earn()
     x, y = (float(int(part)) for part in lab.ground.places(*_PLACE)[0])
-    zergling, one, other, gate, _ = lab.make(
+    zergling, templar, other_templar, gate, _ = lab.make(
         Put("Zergling", (x - 9, y)), Put("HighTemplar", (x - 6, y)), Put("HighTemplar", (x - 5, y)),
         Put("WarpGate", (x + 0.5, y + 0.5)), Put("Pylon", (x + 5, y)),
     )  # fmt: skip
     lab.step(8)
     lab.order(_MORPH_BANELING, zergling)
-    lab.order(_MERGE_ARCHON, [one, other])
+    lab.order(_MERGE_ARCHON, [templar, other_templar])
     lab.order(_WARP_ZEALOT, gate, point=(x + 5, y - 3))
     found: dict[str, float] = {}
     for _ in range(60):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from khala_bridge.calibrate.cast import apart, armed, fact, known, reach, sturdy
+from khala_bridge.calibrate.cast import apart, armed_types, fact, known, reach, sturdy
 from khala_bridge.calibrate.lab import ATTACK, Put
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Pair(NamedTuple):
     """Of the target."""
 
 
-def staged(
+def stage(
     lab: Lab,
     wanted: Sequence[tuple[str, str]],
     *,
@@ -66,7 +66,7 @@ def staged(
 
 def everyone(lab: Lab) -> list[tuple[str, str]]:
     """Return each armed type with a sturdy target."""
-    return [(kind, sturdy(kind)) for kind in known(lab, armed())]
+    return [(kind, sturdy(kind)) for kind in known(lab, armed_types())]
 
 
 def period_loops(lab: Lab, kind: str) -> float:

@@ -46,7 +46,7 @@ def unit(lab: Lab) -> Samples:
                 else:
                     lab.kill(maker)  # a Gateway that has begun to become a Warp Gate; the next one may be in time
         counts = {kind: len(lab.of(kind)) for kind in begun}
-        yield from _finished(lab, begun, _is_there(lab, counts))
+        yield from _loops_until_done(lab, begun, _is_there(lab, counts))
         lab.clear()
         _produce(lab)
 
@@ -81,7 +81,7 @@ def _batches(lab: Lab, kinds: Sequence[str]) -> list[tuple[Sequence[str], list[P
     return [(kinds[i : i + len(places)], places) for i in range(0, len(kinds), len(places))]
 
 
-def _finished(lab: Lab, begun: dict[str, tuple[int, int]], is_done: Callable[[str, int], bool]) -> Samples:
+def _loops_until_done(lab: Lab, begun: dict[str, tuple[int, int]], is_done: Callable[[str, int], bool]) -> Samples:
     """Yield the loops until each is done, from its own beginning; what is not by the longest time is left out."""
     end = lab.loop + _LONGEST_LOOPS
     while begun and lab.loop < end:
@@ -123,12 +123,12 @@ def structure(lab: Lab) -> Samples:
         begun = lab.loop
         for _ in range(2400):
             lab.step()
-            for tag, one in lab.units.items():
+            for tag, unit in lab.units.items():
                 if (
                     tag not in old
                     and tag not in seen
-                    and one.build_progress < 1
-                    and lab.name_of.get(one.unit_type) in batch
+                    and unit.build_progress < 1
+                    and lab.name_of.get(unit.unit_type) in batch
                 ):
                     seen[tag] = lab.loop
             for tag in [tag for tag in seen if tag in lab.units and lab.units[tag].build_progress >= 1]:
@@ -150,11 +150,11 @@ def structure(lab: Lab) -> Samples:
 def research(lab: Lab) -> Samples:
     """Give each a laboratory of its own; levels above the first are left out, for they must follow it."""
     wanted = {
-        name: one
-        for name, one in upgrade_facts(VERSION).items()
-        if one.melee and one.at and one.ability and not name.endswith(("Level2", "Level3"))
+        name: facts
+        for name, facts in upgrade_facts(VERSION).items()
+        if facts.melee and facts.at and facts.ability and not name.endswith(("Level2", "Level3"))
     }
-    names = [name for name, one in wanted.items() if lab.has(one.at[0])]
+    names = [name for name, facts in wanted.items() if lab.has(facts.at[0])]
     _produce(lab)
     for batch, places in _batches(lab, names):
         puts = []
@@ -166,7 +166,7 @@ def research(lab: Lab) -> Samples:
             for name, maker in zip(batch, makers[::2], strict=False)
             if lab.order(wanted[name].ability, maker)
         }
-        yield from _finished(lab, begun, lambda _, maker: not lab.units[maker].orders)
+        yield from _loops_until_done(lab, begun, lambda _, maker: not lab.units[maker].orders)
         lab.clear()
         _produce(lab)
 
@@ -217,13 +217,13 @@ def regeneration(lab: Lab) -> Samples:
                         "Queen", "Medivac", "Raven", "Sentry", "Infestor", "Viper"))  # fmt: skip
     tags = lab.make(*(Put(kind, at) for kind, at in zip(kinds, lab.ground.places(8, 6), strict=False)))
     for kind, tag in zip(kinds, tags, strict=False):
-        one = fact(kind)
-        if one.shield:
+        facts = fact(kind)
+        if facts.shield:
             lab.set(tag, Shields=1.0)
-        if one.energy:
+        if facts.energy:
             lab.set(tag, Energy=20.0)
-        if one.race == "zerg":
-            lab.set(tag, Life=one.health / 2)
+        if facts.race == "zerg":
+            lab.set(tag, Life=facts.health / 2)
     lab.step(16)
     before = {tag: lab.units[tag] for tag in tags}
     lab.step(224)

@@ -80,7 +80,7 @@ def _cast(
         names: of spells.
         around: distances from the target at which there are others of its type, one in each direction.
     """
-    spells = [one for one in SPELLS if lab.has(one.caster, one.target) and (not names or one.name in names)]
+    spells = [spell for spell in SPELLS if lab.has(spell.caster, spell.target) and (not names or spell.name in names)]
     places = lab.ground.places(*_PLACE)
     for start in range(0, len(spells), len(places)):
         batch = list(zip(spells[start : start + len(places)], places, strict=False))
@@ -269,7 +269,8 @@ def tumor(lab: Lab) -> Samples:
         lab.step()
         grown = [lab.at(tag) for kind in ("CreepTumorBurrowed", "CreepTumor") for tag in lab.of(kind)
                  if lab.units[tag].build_progress >= 1]  # fmt: skip
-        for distance in [one for one, at in left.items() if any(math.dist(at, other) < 1.5 for other in grown)]:
+        reached = (distance for distance, at in left.items() if any(math.dist(at, other) < 1.5 for other in grown))
+        for distance in list(reached):
             del left[distance]
             yield str(distance), lab.loop - begun
     lab.clear()

@@ -45,8 +45,8 @@ def choice(lab: Lab) -> Samples:
         for _ in range(30):
             lab.step()
             for i in range(len(batch)):
-                one, other, _ = tags[3 * i : 3 * i + 3]
-                for tag, value in ((one, 1.0), (other, 0.0)):
+                first, second, _ = tags[3 * i : 3 * i + 3]
+                for tag, value in ((first, 1.0), (second, 0.0)):
                     if lab.life(tag) < before[tag] - 0.4:
                         shot.setdefault(i, value)
         for i, ((far, near), _) in enumerate(batch):

@@ -18,7 +18,7 @@ from khala_bridge.calibrate.probes.pairs import (
     hits,
     period_loops,
     shots,
-    staged,
+    stage,
 )
 
 if TYPE_CHECKING:
@@ -44,12 +44,12 @@ _MISSILES = (
 )
 def period(lab: Lab) -> Samples:
     """Let each fire at a target that does not die."""
-    for pairs in staged(lab, everyone(lab)):
+    for pairs in stage(lab, everyone(lab)):
         firing = attack(lab, pairs)
         for pair, found in hits(lab, firing, 14 * 40, refill=True).items():
             begun = shots(found, 0.5 * period_loops(lab, pair.kind))
-            for one, other in islice(pairwise(begun[1:]), _SHOTS):
-                yield pair.kind, other - one
+            for shot, next_shot in islice(pairwise(begun[1:]), _SHOTS):
+                yield pair.kind, next_shot - shot
 
 
 @probe(
@@ -61,7 +61,7 @@ def period(lab: Lab) -> Samples:
 )
 def delay(lab: Lab) -> Samples:
     """Let each fire once, so that it faces its target, wait, and order it again."""
-    for pairs in staged(lab, everyone(lab)):
+    for pairs in stage(lab, everyone(lab)):
         for pair, found in _second_shots(lab, pairs).items():
             if found:
                 yield pair.kind, found[0][0]
@@ -77,7 +77,7 @@ def delay(lab: Lab) -> Samples:
 def missile(lab: Lab) -> Samples:
     """Stage them at a distance."""
     wanted = [(kind, sturdy(kind)) for kind in known(lab, _MISSILES)]
-    for pairs in staged(lab, wanted, gap=lambda kind: _longest(kind) - 0.5, place=LONG_PAIR):
+    for pairs in stage(lab, wanted, gap=lambda kind: _longest(kind) - 0.5, place=LONG_PAIR):
         for pair, found in _second_shots(lab, pairs).items():
             if found:
                 yield pair.kind, found[0][0]
@@ -106,7 +106,7 @@ def _second_shots(lab: Lab, pairs: list[Pair]) -> dict[Pair, list[tuple[int, flo
 def reach(lab: Lab) -> Samples:
     """Send each from beyond its range."""
     wanted = [(kind, target) for kind, target in everyone(lab) if fact(kind).speed]
-    for pairs in staged(lab, wanted, gap=lambda kind: _longest(kind) + 3, place=LONG_PAIR):
+    for pairs in stage(lab, wanted, gap=lambda kind: _longest(kind) + 3, place=LONG_PAIR):
         waiting = {pair: lab.life(pair.target) for pair in attack(lab, pairs)}
         for _ in range(_APPROACH_LOOPS):
             lab.step()
@@ -133,10 +133,10 @@ def _until_hit(lab: Lab, victim: int) -> bool:
     unit="loops",
     resolution=1.0,
 )
-def interrupted(lab: Lab) -> Samples:
+def interrupt(lab: Lab) -> Samples:
     """Use types with a late damage point."""
     kinds = [kind for kind in ("Zealot", "Stalker", "Ultralisk", "Thor", "Roach") if lab.has(kind)]
-    for pairs in staged(lab, [(kind, sturdy(kind)) for kind in kinds]):
+    for pairs in stage(lab, [(kind, sturdy(kind)) for kind in kinds]):
         firing = attack(lab, pairs)
         hits(lab, firing, 12)
         lab.order(STOP, [pair.attacker for pair in firing])
@@ -160,7 +160,7 @@ def interrupted(lab: Lab) -> Samples:
 def backswing(lab: Lab) -> Samples:
     """Queue a move behind the attack."""
     kinds = [kind for kind in ("Marine", "Zealot", "Zergling", "Hellion", "Roach", "Immortal") if lab.has(kind)]
-    for pairs in staged(lab, [(kind, "SCV") for kind in kinds]):
+    for pairs in stage(lab, [(kind, "SCV") for kind in kinds]):
         for pair in pairs:
             lab.set(pair.target, Life=1.0)
             x, y = lab.at(pair.attacker)
@@ -187,7 +187,7 @@ def backswing(lab: Lab) -> Samples:
 def dead_attacker(lab: Lab) -> Samples:
     """Kill a Marauder and a Tempest whose shot is in the air, and a Zealot after its first hit."""
     for kind in known(lab, ("Marauder", "Tempest", "Zealot")):
-        for (pair,) in staged(lab, [(kind, sturdy(kind))], gap=lambda kind: 0.05 if kind == "Zealot" else 5.0):
+        for (pair,) in stage(lab, [(kind, sturdy(kind))], gap=lambda kind: 0.05 if kind == "Zealot" else 5.0):
             (first,) = _second_shots(lab, [pair]).values()
             if not first:
                 continue
@@ -209,7 +209,7 @@ def dead_attacker(lab: Lab) -> Samples:
     unit="loops",
     exact=False,
 )
-def shared(lab: Lab) -> Samples:
+def share(lab: Lab) -> Samples:
     """Have each fire at one, then at the other."""
     for kind in (kind for kind in ("Thor", "Queen", "Tempest", "Cyclone") if lab.has(kind)):
         for place in lab.ground.places(16, 16)[:8]:
@@ -256,4 +256,4 @@ def bunker(lab: Lab) -> Samples:
     yield "Marine", farthest
 
 
-PROBES = (period, delay, missile, reach, interrupted, backswing, dead_attacker, shared, bunker)
+PROBES = (period, delay, missile, reach, interrupt, backswing, dead_attacker, share, bunker)

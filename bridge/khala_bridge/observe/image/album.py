@@ -15,8 +15,8 @@ import cv2
 
 from khala_bridge.observe.image import features, minimap, own, screen, titles
 from khala_bridge.observe.image.canvas import Canvas, inner_px
-from khala_bridge.observe.image.encoding import encoded
-from khala_bridge.observe.image.layers import LAYERS, coloured, explain
+from khala_bridge.observe.image.encoding import encode
+from khala_bridge.observe.image.layers import LAYERS, colour, explain
 from khala_bridge.observe.image.minimap import TeamMark
 from khala_bridge.observe.image.moment import Moment
 
@@ -61,13 +61,13 @@ class Album:
     def pictures(self, seen: AgentObservation) -> tuple[Picture, ...]:
         """Return all pictures of an agent, in the order of its configuration."""
         return tuple(
-            encoded(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
+            encode(drawing.image, drawing.name, drawing.title, spec.format, spec.quality)
             for spec in seen.agent.images
-            for drawing in drawn(spec, self._moment, self._world, seen)
+            for drawing in draw(spec, self._moment, self._world, seen)
         )
 
 
-def drawn(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentObservation) -> Iterator[Drawing]:
+def draw(spec: ImageSpec, moment: Moment, world: MapFrame, seen: AgentObservation) -> Iterator[Drawing]:
     """Yield the drawings of one specification."""
     teams = [_Looker(t.view.name, t.camera, frozenset(t.team.tags)) for t in seen.teams if t.camera is not None]
     if spec.what == "minimap":
@@ -103,7 +103,7 @@ def _minimap(
     if pixels is None and not spec.is_drawn:
         return
     sites = [TeamMark(team.name, team.camera) for team in teams]
-    tags = _commanded(moment, teams, seen)
+    tags = _own_tags(moment, teams, seen)
     alerts = [alert.minimap for alert in seen.view.alerts]
     others = [(other.name, other.minimap) for other in seen.view.others]
     image, legend = minimap.draw(
@@ -112,9 +112,9 @@ def _minimap(
     yield Drawing(image, "minimap", titles.of_minimap(world.minimap_size, legend))
 
 
-def _commanded(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
+def _own_tags(moment: Moment, teams: list[_Looker], seen: AgentObservation) -> frozenset[int]:
     """Return the agent's own units: those of its teams, or all, if it orders the whole side."""
-    if any(team.team.kind == "side" for team in seen.teams):
+    if any(team.kind == "side" for team in seen.teams):
         return frozenset(subject.tag for subject in moment.subjects if subject.side == "own")
     return frozenset(tag for team in teams for tag in team.tags)
 
@@ -146,7 +146,7 @@ def _features(spec: ImageSpec, moment: Moment, team: _Looker) -> Iterator[Drawin
 
 
 def _on_canvas(spec: ImageSpec, layer: FeatureLayer, extent: float, values: Cells) -> Image:
-    canvas = Canvas.on(coloured(layer, values), spec.size_px, extent)
+    canvas = Canvas.on(colour(layer, values), spec.size_px, extent)
     if spec.grid:
         canvas.rule()
     explain(canvas.inner, layer)

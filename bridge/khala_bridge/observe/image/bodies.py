@@ -15,7 +15,7 @@ import numpy as np
 
 from khala_bridge.observe.image import palette
 from khala_bridge.observe.image.lettering import Stamp, stamp_of, written
-from khala_bridge.observe.image.palette import LIVERIES, mixed
+from khala_bridge.observe.image.palette import LIVERIES, mix
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,14 +102,14 @@ def body(look: BodyLook) -> Stamp:
     covered = np.where(opacity, np.uint8(255), np.uint8(0))
     cover = np.asarray(cv2.resize(covered, (size, size), interpolation=cv2.INTER_AREA), np.uint8)
     share = _GHOST if look.ghost else _UNFINISHED if look.unfinished else 1.0
-    stamp = stamp_of(_unfringed(small, cover), np.asarray(alpha * share, np.uint8))
-    return _lettered(stamp, look, half) if look.code else stamp
+    stamp = stamp_of(_remove_fringe(small, cover), np.asarray(alpha * share, np.uint8))
+    return _add_letters(stamp, look, half) if look.code else stamp
 
 
 def _draw_solid(colours: Image, opacity: Mask, look: BodyLook) -> None:
     livery = LIVERIES[look.side]
     fill = _NEUTRAL.get(look.shape, livery.body)
-    rim = mixed(fill, (0, 0, 0), 0.6) if look.side == "neutral" else livery.rim
+    rim = mix(fill, (0, 0, 0), 0.6) if look.side == "neutral" else livery.rim
     width = max(1.4, 0.12 * look.radius_px)
     outline = _corners(look, 1.0 - width / look.radius_px)  # the rim ends where the body does
     if look.shape == "air":  # its shadow lies below it, to the right
@@ -119,9 +119,9 @@ def _draw_solid(colours: Image, opacity: Mask, look: BodyLook) -> None:
     _fill(colours, opacity, outline, rim, 255, grow_px=width)
     _fill(colours, opacity, outline, fill, 255)
     if look.shape == "structure":
-        _fill(colours, opacity, _corners(look, 0.66), mixed(fill, (0, 0, 0), 0.42), 255)
+        _fill(colours, opacity, _corners(look, 0.66), mix(fill, (0, 0, 0), 0.42), 255)
     if look.shape == "geyser":
-        _fill(colours, opacity, _corners(look, 0.55), mixed(fill, (0, 0, 0), 0.5), 255)
+        _fill(colours, opacity, _corners(look, 0.55), mix(fill, (0, 0, 0), 0.5), 255)
 
 
 def _draw_field(colours: Image, opacity: Mask, look: BodyLook) -> None:
@@ -151,13 +151,13 @@ def _fill(
             cv2.polylines(image, [outline], True, value, round(2 * grow_px * _FINER), cv2.LINE_8, _SHIFT)
 
 
-def _unfringed(colours: Image, cover: Mask) -> Image:
+def _remove_fringe(colours: Image, cover: Mask) -> Image:
     """Return the colours without the black that shrinking has mixed into the edge."""
     share = np.maximum(cover, 1).astype(np.float32)[..., None] / 255
     return np.asarray(np.clip(colours / share, 0, 255), np.uint8)
 
 
-def _lettered(stamp: Stamp, look: BodyLook, half: int) -> Stamp:
+def _add_letters(stamp: Stamp, look: BodyLook, half: int) -> Stamp:
     """Return a stamp with the letters of its type, upright and as large as the body allows."""
     room = look.radius_px * (0.66 if look.shape == "air" else 0.86)
     if look.radius_px < LETTERS_FROM_PX:

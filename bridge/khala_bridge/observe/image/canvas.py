@@ -99,7 +99,7 @@ def _label(image: Image, text: str, height: int, at: int, margin: int, *, horizo
     size = image.shape[0]
     stamp = written(text, height, palette.LABEL)
     width, high = stamp.size
-    tick: Colour = palette.mixed(palette.LABEL, palette.VOID, 0.4)
+    tick: Colour = palette.mix(palette.LABEL, palette.VOID, 0.4)
     line = min(at, size - 1)
     if horizontal:
         stamp.press(image, min(max(at - width // 2, 0), size - width), (margin - 3 - high) // 2)

@@ -19,7 +19,7 @@ _PNG_EFFORT = 1
 """Of 9: files with these flat colours grow by a tenth, and encoding takes a third of the time."""
 
 
-def encoded(image: Image, name: str, title: str, format_: ImageFormat = "jpeg", quality: int = 85) -> Picture:
+def encode(image: Image, name: str, title: str, format_: ImageFormat = "jpeg", quality: int = 85) -> Picture:
     """Return the picture of an image.
 
     Args:

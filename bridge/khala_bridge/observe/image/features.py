@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_bridge.observe.image import palette
-from khala_bridge.observe.image.layers import LAYERS, coloured
+from khala_bridge.observe.image.layers import LAYERS, colour
 from khala_bridge.observe.image.lettering import written
 
 if TYPE_CHECKING:
@@ -37,6 +37,6 @@ def draw(values: Mapping[str, Cells], size_px: int) -> Image:
     image = np.full((size_px, size_px, 3), palette.VOID, np.uint8)
     for number, name in enumerate(SHOWN):
         top, left = (k * (tile + _GAP) for k in divmod(number, _COLUMNS))
-        image[top : top + tile, left : left + tile] = coloured(LAYERS[name], values[name])
+        image[top : top + tile, left : left + tile] = colour(LAYERS[name], values[name])
         written(name, 7, palette.LABEL, palette.INK).press(image, left + 3, top + 3)
     return image

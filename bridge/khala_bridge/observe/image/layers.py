@@ -83,8 +83,8 @@ def _of_units(value: Callable[[Subject], int]) -> Values:
     def values(moment: Moment, camera: Camera, size_px: int) -> Mask:
         image = np.zeros((size_px, size_px), np.uint8)
         scale = size_px / CAMERA_WIDTH
-        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
-            _body(image, one, camera, scale, value(one))
+        for subject in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
+            _body(image, subject, camera, scale, value(subject))
         return image
 
     return values
@@ -93,18 +93,18 @@ def _of_units(value: Callable[[Subject], int]) -> Values:
 def _density(moment: Moment, camera: Camera, size_px: int) -> Mask:
     image = np.zeros((size_px, size_px), np.uint8)
     scale = size_px / CAMERA_WIDTH
-    for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
+    for subject in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2):
         alone = np.zeros_like(image)
-        _body(alone, one, camera, scale, 1)
+        _body(alone, subject, camera, scale, 1)
         cv2.add(image, alone, dst=image)
     return image
 
 
-def _body(image: Mask, one: Subject, camera: Camera, scale: float, value: int) -> None:
-    x, y = camera.screen(one.x, one.y)
+def _body(image: Mask, subject: Subject, camera: Camera, scale: float, value: int) -> None:
+    x, y = camera.screen(subject.x, subject.y)
     unit = CAMERA_WIDTH / camera.size
     at = round(x * unit * scale - 0.5), round(y * unit * scale - 0.5)
-    cv2.circle(image, at, max(2, round(one.radius * scale)), value, -1)
+    cv2.circle(image, at, max(2, round(subject.radius * scale)), value, -1)
 
 
 def _effects(moment: Moment, camera: Camera, size_px: int) -> Mask:
@@ -144,30 +144,30 @@ LAYERS: dict[str, FeatureLayer] = {
         FeatureLayer("height_map", _heights, "scalar", "height of the ground, light is high"),
         FeatureLayer("visibility_map", _sight, "categorical", "what is seen", _SIGHT),
         _switch("creep", _of_land(lambda m: m.land.creep), "creep", "no creep", "creep"),
-        _switch("power", _of_land(lambda m: m.land.powered(corner=False)), "power fields", "no power", "power"),
+        _switch("power", _of_land(lambda m: m.land.power_cells(corner=False)), "power fields", "no power", "power"),
         _switch("pathable", _of_land(lambda m: m.land.open), "where one can walk", "blocked", "walkable"),
         _switch("buildable", _of_land(lambda m: m.land.free), "where one can build", "not free", "buildable"),
         FeatureLayer(
             "player_relative",
-            _of_units(lambda one: _SIDE_NUMBERS.get(one.side, 0)),
+            _of_units(lambda unit: _SIDE_NUMBERS.get(unit.side, 0)),
             "categorical",
             "whose units are where",
             _SIDES,
         ),
         FeatureLayer(
-            "unit_type", _of_units(lambda one: one.type_id % 254 + 1), "types", "a colour for each type of unit"
+            "unit_type", _of_units(lambda unit: unit.type_id % 254 + 1), "types", "a colour for each type of unit"
         ),
         FeatureLayer(
-            "unit_hit_points_ratio", _of_units(lambda one: _percent(one.health)), "scalar", "health, light is full"
+            "unit_hit_points_ratio", _of_units(lambda unit: _percent(unit.health)), "scalar", "health, light is full"
         ),
         FeatureLayer(
-            "unit_shields_ratio", _of_units(lambda one: _percent(one.shield)), "scalar", "shields, light is full"
+            "unit_shields_ratio", _of_units(lambda unit: _percent(unit.shield)), "scalar", "shields, light is full"
         ),
         FeatureLayer(
-            "unit_energy_ratio", _of_units(lambda one: _percent(one.energy)), "scalar", "energy, light is full"
+            "unit_energy_ratio", _of_units(lambda unit: _percent(unit.energy)), "scalar", "energy, light is full"
         ),
         FeatureLayer(
-            "build_progress", _of_units(lambda one: _percent(one.built)), "scalar", "how far built, light is done"
+            "build_progress", _of_units(lambda unit: _percent(unit.built)), "scalar", "how far built, light is done"
         ),
         FeatureLayer("unit_density", _density, "scalar", "how many units are on a point, light is many"),
         FeatureLayer("effects", _effects, "types", "a colour for each effect on the ground"),
@@ -198,32 +198,32 @@ _MOST = frozenset(
 # --- colours ------------------------------------------------------------------------------------------------
 
 
-def coloured(layer: FeatureLayer, values: Cells) -> Image:
+def colour(layer: FeatureLayer, values: Cells) -> Image:
     """Return the picture of a layer's values."""
     table = np.zeros((256, 3), np.uint8)
     if layer.kind == "scalar":
-        return _graded(layer, values)
+        return _shade(layer, values)
     if layer.kind == "types":
-        return _mapped(np.where(values, values % 254 + 1, 0), _hues())
+        return _apply_table(np.where(values, values % 254 + 1, 0), _hues())
     table[:] = _DARK
     for value, _, colour in layer.colours:
         table[value] = colour
-    return _mapped(np.clip(values, 0, 255), table)
+    return _apply_table(np.clip(values, 0, 255), table)
 
 
-def _mapped(values: Cells, table: Image) -> Image:
+def _apply_table(values: Cells, table: Image) -> Image:
     """Return an image with the numbers replaced by the colours of a table, (256, 3)."""
     return np.asarray(cv2.applyColorMap(values.astype(np.uint8), table[:, None]), np.uint8)
 
 
-def _graded(layer: FeatureLayer, values: Cells) -> Image:
+def _shade(layer: FeatureLayer, values: Cells) -> Image:
     """Return values as shades from dark to light, over their range in the picture or in the layer."""
     low, high = 0, 255
     if layer.name in _MOST:
         high = max(int(values.max()), 1)
     elif layer.name == "height_map" and int(values.max()) - int(values.min()) >= _CLIFF // 2:
         low, high = int(values.min()), int(values.max())
-    image = _mapped(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
+    image = _apply_table(np.clip((values - float(low)) * (255 / (high - low)), 0, 255), _viridis())
     if layer.name != "height_map":
         image[values == 0] = _DARK  # 0 stands for nothing
     return image

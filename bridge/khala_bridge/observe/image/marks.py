@@ -72,22 +72,22 @@ def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], heig
     """
     height, width = image.shape[:2]
     hidden, covered = _Plan(width, height), _Plan(width, height)
-    for one in bodies:
-        r = round(one.radius * 0.8)
-        covered.add(max(one.x - r, 0), max(one.y - r, 0), 2 * r, 2 * r)
+    for body in bodies:
+        r = round(body.radius * 0.8)
+        covered.add(max(body.x - r, 0), max(body.y - r, 0), 2 * r, 2 * r)
     spots = []
-    for one in marked:
-        stamp = written(one.text, height_px, LIVERIES[one.side].mark, palette.INK)
-        spot = _on_body(one, stamp, hidden) or _spot(one, stamp, hidden, covered)
+    for thing in marked:
+        stamp = written(thing.text, height_px, LIVERIES[thing.side].mark, palette.INK)
+        spot = _on_body(thing, stamp, hidden) or _spot(thing, stamp, hidden, covered)
         if spot is not None:
             hidden.add(spot.left, spot.top, *stamp.size)
-            spots.append((one, stamp, spot))
-    for one, _, spot in spots:
+            spots.append((thing, stamp, spot))
+    for thing, _, spot in spots:
         if spot.ring:
-            _lead(image, one, spot)
+            _lead(image, thing, spot)
     for _, stamp, spot in spots:
         stamp.press(image, spot.left, spot.top)
-    return [one for one, _, _ in spots]
+    return [thing for thing, _, _ in spots]
 
 
 class _Spot(NamedTuple):
@@ -128,14 +128,16 @@ _WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))
 """Beside a body, right first: y downwards, so that bars above it stay free."""
 
 
-def _on_body(one: Marked, stamp: Stamp, hidden: _Plan) -> _Spot | None:
+def _on_body(thing: Marked, stamp: Stamp, hidden: _Plan) -> _Spot | None:
     """Return the place below the letters of a large body, if it is free."""
     width, height = stamp.size
-    left, top = one.x - width // 2, one.y + round(0.5 * one.radius) - height // 2
+    left, top = thing.x - width // 2, thing.y + round(0.5 * thing.radius) - height // 2
     is_inside = 0 <= left <= hidden.width - width and 0 <= top <= hidden.height - height
-    if one.radius < _ROOMY_PX or not is_inside or hidden.taken >> hidden.at(left, top) & hidden.bits(width, height)[0]:
+    if thing.radius < _ROOMY_PX or not is_inside:
         return None
-    return _Spot(left, top, 0, (one.x, one.y))
+    if hidden.taken >> hidden.at(left, top) & hidden.bits(width, height)[0]:
+        return None
+    return _Spot(left, top, 0, (thing.x, thing.y))
 
 
 class _Try(NamedTuple):
@@ -161,7 +163,7 @@ def _tries(radius: int, width: int, height: int) -> tuple[_Try, ...]:
     return tuple(tries)
 
 
-def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
+def _spot(thing: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | None:
     """Return the place where a mark hides least; None if every place covers other marks."""
     width, height = stamp.size
     bits, count = hidden.bits(width, height)
@@ -169,10 +171,10 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
     right_most, lowest = hidden.width - width, hidden.height - height
     best = None
     least = math.inf
-    for right, down, ring, cost in _tries(one.radius, width, height):
+    for right, down, ring, cost in _tries(thing.radius, width, height):
         if cost >= least:
             break  # all that follows costs more than the best, even if it hides nothing
-        left, top = one.x + right, one.y + down
+        left, top = thing.x + right, thing.y + down
         if not (0 <= left <= right_most and 0 <= top <= lowest):
             continue
         at = top // _CELL * stride + left // _CELL
@@ -193,8 +195,8 @@ def _spot(one: Marked, stamp: Stamp, hidden: _Plan, covered: _Plan) -> _Spot | N
     return best
 
 
-def _lead(image: Image, one: Marked, spot: _Spot) -> None:
+def _lead(image: Image, thing: Marked, spot: _Spot) -> None:
     """Draw a line from a body to its mark."""
-    colour = palette.mixed(LIVERIES[one.side].mark, palette.INK, 0.25)
-    cv2.line(image, (one.x, one.y), spot.middle, palette.INK, 2)
-    cv2.line(image, (one.x, one.y), spot.middle, colour, 1)
+    colour = palette.mix(LIVERIES[thing.side].mark, palette.INK, 0.25)
+    cv2.line(image, (thing.x, thing.y), spot.middle, palette.INK, 2)
+    cv2.line(image, (thing.x, thing.y), spot.middle, colour, 1)

@@ -38,7 +38,7 @@ _DOTS: dict[str, Colour] = {
     "minerals": palette.MINERALS,
     "rich": palette.RICH_MINERALS,
     "geyser": palette.VESPENE,
-    "stone": palette.mixed(palette.HIGH, palette.INK, 0.3),
+    "stone": palette.mix(palette.HIGH, palette.INK, 0.3),
 }
 
 
@@ -121,19 +121,19 @@ def _ground(painting: Painting, width: int, height: int) -> Image:
     return np.asarray(cv2.resize(painting.image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _dot(image: Image, one: Subject, side: Side, at: tuple[int, int], scale: float) -> None:
+def _dot(image: Image, subject: Subject, side: Side, at: tuple[int, int], scale: float) -> None:
     """Draw a unit: a square if it cannot move, else a disc; never too small to see."""
     x, y = at
-    radius = one.radius * scale
+    radius = subject.radius * scale
     if side == "neutral":
         half = max(1, round(0.8 * radius))
-        colour = _DOTS.get(one.shape, _DOTS["stone"])
+        colour = _DOTS.get(subject.shape, _DOTS["stone"])
         image[max(y - half, 0) : y + half + 1, max(x - half, 0) : x + half + 1] = colour
         return
     livery = LIVERIES[side]
-    if one.shape == "structure":
+    if subject.shape == "structure":
         half = max(3, round(0.85 * radius))
-        colour = palette.mixed(livery.body, palette.INK, 0.5) if one.ghost else livery.body
+        colour = palette.mix(livery.body, palette.INK, 0.5) if subject.ghost else livery.body
         image[max(y - half, 0) : y + half + 1, max(x - half, 0) : x + half + 1] = livery.rim
         image[max(y - half + 1, 0) : y + half, max(x - half + 1, 0) : x + half] = colour
         return
@@ -156,9 +156,9 @@ def _name_teams(
             cv2.rectangle(image, (x - half, y - half), (x + half, y + half), palette.LINE, 1)
         marked.append(Marked(team.name, "neutral", x, y, _CROSS_PX))
     marked += (Marked(name, "own", *canvas.pixel(*point), _CROSS_PX) for name, point in others)
-    for one in marked:
-        colour = palette.LINE if one.side == "neutral" else LIVERIES[one.side].mark
+    for mark in marked:
+        colour = palette.LINE if mark.side == "neutral" else LIVERIES[mark.side].mark
         for right, down in ((_CROSS_PX, 0), (0, _CROSS_PX)):
-            cv2.line(image, (one.x - right, one.y - down), (one.x + right, one.y + down), palette.INK, 3)
-            cv2.line(image, (one.x - right, one.y - down), (one.x + right, one.y + down), colour, 1)
+            cv2.line(image, (mark.x - right, mark.y - down), (mark.x + right, mark.y + down), palette.INK, 3)
+            cv2.line(image, (mark.x - right, mark.y - down), (mark.x + right, mark.y + down), colour, 1)
     place(image, marked, marked, 7 if canvas.image.shape[0] < SMALL_PX else 9)

@@ -114,8 +114,8 @@ class Moment:
         """Every unit that is shown or remembered, in the order of drawing."""
         units = self.snapshot.known
         found = (_subject(unit, units) for unit in units.values())
-        drawn = [one for one in found if one.name not in UNDRAWN]
-        return tuple(sorted(drawn, key=lambda one: (one.level, -one.radius, one.tag)))
+        drawn = [subject for subject in found if subject.name not in UNDRAWN]
+        return tuple(sorted(drawn, key=lambda subject: (subject.level, -subject.radius, subject.tag)))
 
     @cached_property
     def places(self) -> NDArray[np.float64]:

@@ -30,7 +30,7 @@ def screen(snapshot: Snapshot, camera: Camera, size_px: int) -> Image | None:
     width = snapshot.info.pictures.render_width or CAMERA_WIDTH
     if pixels is None or not is_near(snapshot, camera):
         return None
-    return np.asarray(_moved(pixels, snapshot, camera, width, size_px, cv2.INTER_LINEAR), np.uint8)
+    return np.asarray(_shift(pixels, snapshot, camera, width, size_px, cv2.INTER_LINEAR), np.uint8)
 
 
 def minimap(snapshot: Snapshot, size_px: int) -> Image | None:
@@ -45,7 +45,7 @@ def layer(snapshot: Snapshot, name: str, camera: Camera, size_px: int) -> NDArra
     if values is None or not is_near(snapshot, camera):
         return None
     width = snapshot.info.pictures.layer_width or CAMERA_WIDTH
-    moved = _moved(values.astype(np.float32), snapshot, camera, width, size_px, cv2.INTER_NEAREST)
+    moved = _shift(values.astype(np.float32), snapshot, camera, width, size_px, cv2.INTER_NEAREST)
     return np.asarray(moved, np.int32)
 
 
@@ -64,7 +64,7 @@ def is_near(snapshot: Snapshot, camera: Camera) -> bool:
     return abs(real.x - camera.x) <= NEAR and abs(real.y - camera.y) <= NEAR
 
 
-def _moved(
+def _shift(
     pixels: NDArray[np.uint8] | NDArray[np.float32],
     snapshot: Snapshot,
     camera: Camera,

@@ -107,17 +107,17 @@ def _painting(ground: MapGround, playable: tuple[int, int, int, int]) -> Paintin
     x0, y0, x1, y1 = playable
     inside = np.zeros((height, width), np.bool_)
     inside[max(height - y1, 0) : height - y0, x0:x1] = True
-    image = _painted(upright(ground.height), walkable, walkable & ~upright(ground.buildable), inside)
+    image = _paint(upright(ground.height), walkable, walkable & ~upright(ground.buildable), inside)
     return Painting(width, height, image)
 
 
-def _painted(
+def _paint(
     heights: NDArray[np.float32], walkable: NDArray[np.bool_], unbuildable: NDArray[np.bool_], inside: NDArray[np.bool_]
 ) -> Image:
     """Return the ground in colours: high ground is light, unwalkable ground dark, with light from the upper left."""
     rows, columns = heights.shape
     size = (columns * FINE, rows * FINE)
-    level = _smooth(_levelled(heights, inside & walkable), size)
+    level = _smooth(_level(heights, inside & walkable), size)
     walk, ramp = _edge(_smooth(walkable, size)), _edge(_smooth(unbuildable, size))
     ground = _lerp(_flat(palette.LOW), _flat(palette.HIGH), level)
     ground = _lerp(ground, _flat(palette.RAMP), 0.28 * ramp * walk)
@@ -134,7 +134,7 @@ def _painted(
     return np.clip(ground, 0, 255).astype(np.uint8)
 
 
-def _levelled(heights: NDArray[np.float32], used: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _level(heights: NDArray[np.float32], used: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return heights from 0 to 1 over the walkable part of the map, so that deep chasms do not reduce the contrast."""
     values = heights[used] if used.any() else heights
     low, high = (float(np.percentile(values, share)) for share in (1, 99)) if values.size else (0.0, 1.0)

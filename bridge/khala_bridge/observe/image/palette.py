@@ -69,7 +69,7 @@ def health_colour(share: float) -> Colour:
     return HEALTHY if share > 2 / 3 else HURT if share > 1 / 3 else DYING
 
 
-def mixed(one: Colour, other: Colour, part: float) -> Colour:
+def mix(start: Colour, end: Colour, part: float) -> Colour:
     """Return a mix of two colours; at 0 the first one."""
-    first, second, third = (round(a + (b - a) * part) for a, b in zip(one, other, strict=True))
+    first, second, third = (round(a + (b - a) * part) for a, b in zip(start, end, strict=True))
     return first, second, third

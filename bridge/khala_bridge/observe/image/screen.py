@@ -77,13 +77,13 @@ def draw(
     place_of = _placing(canvas, camera)
     draw_patches(image, moment.power, place_of, scale, names=False)
     seen = _seen(canvas, moment, camera, team)
-    draw_orders(image, (one.subject for one in seen if one.side == "team"), place_of)
-    for one in seen:
-        stamp = body(_look(one, lettered=marks))
-        stamp.press(image, one.x - stamp.size[0] // 2, one.y - stamp.size[1] // 2)
+    draw_orders(image, (drawn.subject for drawn in seen if drawn.side == "team"), place_of)
+    for drawn in seen:
+        stamp = body(_look(drawn, lettered=marks))
+        stamp.press(image, drawn.x - stamp.size[0] // 2, drawn.y - stamp.size[1] // 2)
     draw_patches(image, moment.effects, place_of, scale, names=True)
-    for one in seen:
-        _bars(image, one)
+    for drawn in seen:
+        _bars(image, drawn)
     return canvas.image, _legend(seen, _mark(canvas, seen) if marks else _Marks(), lettered=marks)
 
 
@@ -118,24 +118,29 @@ def _seen(canvas: Canvas, moment: Moment, camera: Camera, team: frozenset[int]) 
     scale = canvas.inner.shape[0] / CAMERA_WIDTH
     place_of = _placing(canvas, camera)
     seen = [
-        _Drawn(one, "team" if one.tag in team else one.side, *place_of(one.x, one.y), max(3, round(one.radius * scale)))
-        for one in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
+        _Drawn(
+            subject,
+            "team" if subject.tag in team else subject.side,
+            *place_of(subject.x, subject.y),
+            max(3, round(subject.radius * scale)),
+        )
+        for subject in moment.around(camera.x, camera.y, CAMERA_WIDTH / 2)
     ]
-    return sorted(seen, key=lambda one: (one.subject.level, one.side == "team"))
+    return sorted(seen, key=lambda drawn: (drawn.subject.level, drawn.side == "team"))
 
 
-def _look(one: _Drawn, *, lettered: bool) -> BodyLook:
-    unit = one.subject
+def _look(drawn: _Drawn, *, lettered: bool) -> BodyLook:
+    unit = drawn.subject
     direction = direction_of(unit.facing, unit.shape)
     return BodyLook(
-        unit.shape, one.side, one.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1
+        unit.shape, drawn.side, drawn.radius, direction, unit.code if lettered else "", unit.ghost, unit.built < 1
     )
 
 
-def _bars(image: Image, one: _Drawn) -> None:
+def _bars(image: Image, drawn: _Drawn) -> None:
     """Draw bars: construction, health and shield above a hurt unit, and the energy of the team's own units."""
-    unit = one.subject
-    if one.side == "neutral" or unit.health < 0:
+    unit = drawn.subject
+    if drawn.side == "neutral" or unit.health < 0:
         return
     rows: list[tuple[float, Colour]] = []
     if unit.built < 1:
@@ -143,10 +148,10 @@ def _bars(image: Image, one: _Drawn) -> None:
     if unit.health < 1 or 0 <= unit.shield < 1:
         rows += [(unit.shield, palette.SHIELD)] if unit.shield >= 0 else []
         rows.append((unit.health, palette.health_colour(unit.health)))
-    if unit.energy >= 0 and one.side == "team":
+    if unit.energy >= 0 and drawn.side == "team":
         rows.append((unit.energy, palette.ENERGY))
-    width = max(2 * one.radius, 12)
-    left, top = one.x - width // 2, one.y - one.radius - 2 - _BAR_PX * len(rows)
+    width = max(2 * drawn.radius, 12)
+    left, top = drawn.x - width // 2, drawn.y - drawn.radius - 2 - _BAR_PX * len(rows)
     if rows:
         _fill(image, left - 1, top - 1, width + 2, _BAR_PX * len(rows) + 1, palette.INK)
     for number, (share, colour) in enumerate(rows):
@@ -169,15 +174,15 @@ def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
     """Draw the marks."""
     image = canvas.inner
     size = image.shape[0]
-    inside = [one for one in seen if 0 <= one.x < size and 0 <= one.y < size]
-    wanting = [one for one in inside if one.side != "neutral" and one.subject.shape != "field"]
-    wanting.sort(key=lambda one: (RANK[one.side], abs(2 * one.x - size) + abs(2 * one.y - size), one.subject.tag))
-    texts = marks_of(one.subject.tag for one in wanting)
+    inside = [drawn for drawn in seen if 0 <= drawn.x < size and 0 <= drawn.y < size]
+    wanting = [drawn for drawn in inside if drawn.side != "neutral" and drawn.subject.shape != "field"]
+    wanting.sort(key=lambda it: (RANK[it.side], abs(2 * it.x - size) + abs(2 * it.y - size), it.subject.tag))
+    texts = marks_of(drawn.subject.tag for drawn in wanting)
     tags = {text: tag for tag, text in texts.items()}
     placed = place(
         image,
-        [Marked(texts[one.subject.tag], one.side, one.x, one.y, one.radius) for one in wanting],
-        [Marked("", one.side, one.x, one.y, one.radius) for one in inside],
+        [Marked(texts[drawn.subject.tag], drawn.side, drawn.x, drawn.y, drawn.radius) for drawn in wanting],
+        [Marked("", drawn.side, drawn.x, drawn.y, drawn.radius) for drawn in inside],
         6 if canvas.image.shape[0] < SMALL_PX else 8,
     )
     example = (placed[0].text, tags[placed[0].text]) if placed else None
@@ -186,8 +191,8 @@ def _mark(canvas: Canvas, seen: Sequence[_Drawn]) -> _Marks:
 
 def _legend(seen: Sequence[_Drawn], marks: _Marks, *, lettered: bool) -> Legend:
     """Return the facts about the picture."""
-    sides = tuple(sorted({one.side for one in seen}, key=RANK.__getitem__))
-    readable = (one.subject for one in seen if lettered and one.subject.code and one.radius >= LETTERS_FROM_PX)
+    sides = tuple(sorted({drawn.side for drawn in seen}, key=RANK.__getitem__))
+    readable = (drawn.subject for drawn in seen if lettered and drawn.subject.code and drawn.radius >= LETTERS_FROM_PX)
     codes = {subject.code: subject.name for subject in readable}
     ordered = dict(sorted(codes.items(), key=lambda item: item[1]))
     return Legend(sides, ordered, marks.example, marks.left_out)

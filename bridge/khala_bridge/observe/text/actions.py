@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, listed, n, point
+from khala_bridge.observe.text.words import INDENT, INDENT2, n, point, under_heading
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def valid_actions(page: Page) -> Iterator[str]:
     """Show the valid actions of each team, and their costs; the briefing says what each does."""
     yield from _calls(page)
-    yield from listed("What they cost:", (f"{offer.action}: {_price(offer)}" for offer in _offers(page)))
+    yield from under_heading("What they cost:", (f"{offer.action}: {_price(offer)}" for offer in _offers(page)))
 
 
 def _calls(page: Page) -> Iterator[str]:

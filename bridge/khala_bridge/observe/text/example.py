@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import is_armed, knowledge
-from khala_bridge.observe.feedback import Feedback
 from khala_bridge.observe.observation import AgentObservation
 from khala_bridge.observe.text.page import Page, find_sections, render
 from khala_protocol.messages import (
@@ -81,7 +80,7 @@ def example(task: TaskConfig, agent: AgentConfig) -> Example | None:
         return None
     view, sections, reply = made
     observation = AgentObservation(agent, game_loop=0, view=view, teams=(), idle_teams=())
-    page = Page(observation, task, Feedback())
+    page = Page(observation, task)
     return Example(observation=render(page, find_sections(sections)), reply=reply.text())
 
 
@@ -92,7 +91,7 @@ def _foe(task: TaskConfig) -> str:
     return _FOES.get(str(task.map_spec.opponent), "Zergling")
 
 
-def _named(actions: Sequence[str]) -> frozenset[str]:
+def _action_names(actions: Sequence[str]) -> frozenset[str]:
     return frozenset(catalogue()[name].name for name in actions)
 
 
@@ -127,22 +126,24 @@ def _fight(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     if team is None:
         return None
     kind = team.unit_types[0]
-    can = _named(agent.actions[kind])
+    can = _action_names(agent.actions[kind])
     foe = _foe(task)
     own = [_unit(kind, _OWN_TAGS[0], (12, 12))]
     if team.kind != "select":
         own.append(_unit(kind, _OWN_TAGS[1], (13, 12.5), share=0.25))
     foes = (_unit(foe, _FOE_TAGS[0], (17, 12), distance=4.6), _unit(foe, _FOE_TAGS[1], (18, 13), 0.4, distance=5.6))
-    view = View(time_s=95, teams=(TeamView(name=_called(team), minimap=(30.0, 22.0), units=tuple(own), enemies=foes),))
+    view = View(
+        time_s=95, teams=(TeamView(name=_team_name(team), minimap=(30.0, 22.0), units=tuple(own), enemies=foes),)
+    )
     reply = _fighting(kind, can if len(own) > 1 else can - {"Select_Unit_Move_Screen"}, foe)
     if reply is None:
         return None
     said = _first_contact(task, agent, f"{agent.name} meets 2 {foe} at [30, 22] of the minimap.")
     calls = reply.calls[: task.max_actions_of(agent)]
-    return view, ("game", "teams"), reply._replace(team=_called(team), calls=calls, message=said)
+    return view, ("game", "teams"), reply._replace(team=_team_name(team), calls=calls, message=said)
 
 
-def _called(team: TeamConfig) -> str:
+def _team_name(team: TeamConfig) -> str:
     return f"{team.name}-1" if team.kind == "select" else team.name
 
 
@@ -180,7 +181,7 @@ def _economy(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     if race not in _RACES or team is None:
         return None
     names = _RACES[race]
-    can = _named(team.actions)
+    can = _action_names(team.actions)
     train = f"Train_{names.worker}"
     calls = [f"<{name}()>" for name in (names.supply, train) if name in can]
     if not calls:
@@ -223,7 +224,7 @@ def _army(task: TaskConfig, agent: AgentConfig) -> _Made | None:
 
 def _attack(task: TaskConfig, agent: AgentConfig, analysis: str) -> _Reply | None:
     team = _side_team(agent)
-    if team is not None and "All_Units_Attack" in _named(team.actions):
+    if team is not None and "All_Units_Attack" in _action_names(team.actions):
         said = _first_contact(task, agent, "The army attacks Base 2 now; more units, please.")
         return _Reply(analysis, ["<All_Units_Attack()>"], team.name, said)
     group = next((other for other in task.correspondents(agent) if other.kind == "combat_group"), None)
@@ -244,7 +245,7 @@ def _site(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     if race not in _RACES or team is None:
         return None
     names = _RACES[race]
-    can = _named(agent.actions[team.unit_types[0]])
+    can = _action_names(agent.actions[team.unit_types[0]])
     build = f"Build_{names.production}_Screen"
     if build not in can:
         return None
@@ -260,7 +261,10 @@ def _site(task: TaskConfig, agent: AgentConfig) -> _Made | None:
         resources=Resources(minerals=210, supply_used=15, supply_cap=23),
         teams=(
             TeamView(
-                name=_called(team), minimap=(30.0, 22.0), units=(worker,), allies=(hall, pylon) if powered else (hall,)
+                name=_team_name(team),
+                minimap=(30.0, 22.0),
+                units=(worker,),
+                allies=(hall, pylon) if powered else (hall,),
             ),
         ),
         landmarks=(field,) if powered else (),
@@ -268,4 +272,4 @@ def _site(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     where = "3 cells below the Pylon, within its field" if powered else "10 cells from the town hall, off the minerals"
     analysis = f"210 minerals pay for a {names.production}; [15, 12] is free, {where}."
     said = _first_contact(task, agent, f"I build a {names.production}.")
-    return view, ("game", "teams", "places"), _Reply(analysis, [f"<{build}([15, 12])>"], _called(team), said)
+    return view, ("game", "teams", "places"), _Reply(analysis, [f"<{build}([15, 12])>"], _team_name(team), said)

@@ -21,7 +21,7 @@ def game(page: Page) -> Iterator[str]:
     yield "Game"
     yield f"{INDENT}Time: {minutes(view.time_s)}"
     if used.minerals or used.vespene or page.observation.agent.kind != "combat_group":
-        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promised(used)}"
+        yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promise(used)}"
         yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
     if view.upgrades:
         yield f"{INDENT}Upgrades: {', '.join(view.upgrades)}"
@@ -29,7 +29,7 @@ def game(page: Page) -> Iterator[str]:
         yield f"{INDENT}Teams without units: {', '.join(page.observation.idle_teams)}"
 
 
-def _promised(resources: Resources) -> str:
+def _promise(resources: Resources) -> str:
     amounts = zip(resources.promised, ("minerals", "vespene"), strict=True)
     parts = [f"{amount} {what}" for amount, what in amounts if amount]
     return f" ({' and '.join(parts)} of it for what workers are on their way to build)" if parts else ""
@@ -42,7 +42,7 @@ def task(page: Page) -> Iterator[str]:
     yield f"{INDENT}{one_line(page.task.task)}"
     if page.observation.agent.task:
         yield f"{INDENT}{one_line(page.observation.agent.task)}"
-    always = {team.team.config.name: team.team.config.task for team in page.observation.teams}
+    always = {team.config.name: team.config.task for team in page.observation.teams}
     yield from (f"{INDENT}Team {name}: {one_line(words)}" for name, words in always.items() if words)
     yield from (f"{INDENT}Team {team.name}: {one_line(team.task)}" for team in page.teams if team.task)
 

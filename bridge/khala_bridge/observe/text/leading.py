@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.knowledge import knowledge
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, ago, counted, listed, minutes, n, point
+from khala_bridge.observe.text.words import INDENT, ago, count_words, minutes, n, point, under_heading
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -31,7 +31,7 @@ def map_(page: Page) -> Iterator[str]:
         yield f"{INDENT}The enemy's race: {view.enemy_race}"
     x0, y0, x1, y1 = map(n, view.bounds)
     yield f"{INDENT}On the minimap, the playable map is x {x0} to {x1}, y {y0} to {y1}"
-    yield from listed(_PLACES, map(_place, view.places))
+    yield from under_heading(_PLACES, map(_place, view.places))
 
 
 @shorter("map", rank=45, says="ramps and passages of the map")
@@ -39,7 +39,7 @@ def bases_alone(page: Page) -> Iterator[str]:
     """Show the bases only."""
     if page.view.places:
         yield "Map"
-        yield from listed(_PLACES, (_place(place) for place in page.view.places if place.what == "base"))
+        yield from under_heading(_PLACES, (_place(place) for place in page.view.places if place.what == "base"))
 
 
 _PLACES = "Places, numbered by the way from where you began:"
@@ -52,11 +52,11 @@ def _place(place: Place) -> str:
     if place.about:
         parts.append(place.about)
     if place.what == "base" and place.holder != "own":
-        parts.append(_looked(place))
+        parts.append(_last_look(place))
     return ", ".join(parts)
 
 
-def _looked(place: Place) -> str:
+def _last_look(place: Place) -> str:
     if place.unseen_s is None:
         return "never seen"
     return "in sight" if not place.unseen_s else f"last seen {ago(place.unseen_s)}"
@@ -73,17 +73,17 @@ def army(page: Page) -> Iterator[str]:
         return
     yield "Armies"
     if found.parts:
-        yield from listed(f"Yours, worth {found.value} minerals and vespene:", map(_own_part, found.parts))
+        yield from under_heading(f"Yours, worth {found.value} minerals and vespene:", map(_own_part, found.parts))
     else:
         yield f"{INDENT}Yours: none"
-    yield from listed("Scouts on their way:", map(_own_part, found.scouts))
+    yield from under_heading("Scouts on their way:", map(_own_part, found.scouts))
     yield from _enemies(found)
     yield from _toll(page)
 
 
 def _own_part(part: ArmyPart) -> str:
     doing = f": {part.doing}" if part.doing else ""
-    return f"{_where(part)}: {counted(part.units)}{doing}"
+    return f"{_where(part)}: {count_words(part.units)}{doing}"
 
 
 def _where(part: ArmyPart) -> str:
@@ -96,20 +96,20 @@ def _enemies(found: Army) -> Iterator[str]:
         return
     worth = sum(part.value for part in found.enemies)
     heading = f"The enemy's, seen in the last three minutes, worth {worth}, the nearest to your bases first:"
-    yield from listed(heading, map(_enemy_part, found.enemies))
+    yield from under_heading(heading, map(_enemy_part, found.enemies))
 
 
 def _enemy_part(part: ArmyPart) -> str:
     away = "" if part.away is None else f", {part.away:.0f} from your nearest base"
     when = "in sight" if not part.unseen_s else f"seen {ago(part.unseen_s)}"
-    return f"{_where(part)}{away}: {counted(part.units)}, {when}"
+    return f"{_where(part)}{away}: {count_words(part.units)}, {when}"
 
 
 def _toll(page: Page) -> Iterator[str]:
     toll = page.view.toll
     if toll is None:
         return
-    lost, killed = counted(toll.lost) or "nothing", counted(toll.killed) or "nothing"
+    lost, killed = count_words(toll.lost) or "nothing", count_words(toll.killed) or "nothing"
     yield f"{INDENT}Since your last order, {ago(toll.since_s)}: lost {lost}; killed {killed}"
 
 
@@ -130,7 +130,7 @@ def economy(page: Page) -> Iterator[str]:
     energies = [f"{name} {', '.join(map(str, energy))}" for name, energy in found.casters.items()]
     if energies:
         yield f"{INDENT}Energy: {'; '.join(energies)}"
-    yield from listed("Against what the enemy was seen to have:", _answers(page))
+    yield from under_heading("Against what the enemy was seen to have:", _answers(page))
 
 
 def _workers(found: Economy) -> str:
@@ -150,7 +150,7 @@ def _supply(page: Page, found: Economy) -> str:
 def _answers(page: Page) -> Iterator[str]:
     """Yield, for each armed type of the enemy, the own race's types that beat it."""
     counts = page.view.counts
-    mine = _trained(page)
+    mine = _trainable(page)
     for enemy in counts.enemies if counts else ():
         known = knowledge().get(enemy.type)
         if known is None or not known.weapons or known.worker or known.structure:
@@ -160,7 +160,7 @@ def _answers(page: Page) -> Iterator[str]:
             yield f"{enemy.type}: {', '.join(good)}"
 
 
-def _trained(page: Page) -> frozenset[str]:
+def _trainable(page: Page) -> frozenset[str]:
     """Return the types that the agent's orders train or warp in, now or later."""
-    names: Iterable[str] = (name for team in page.observation.teams for name in team.team.config.actions)
+    names: Iterable[str] = (name for team in page.observation.teams for name in team.config.actions)
     return frozenset(name.partition("_")[2] for name in names if name.startswith(("Train_", "Warp_", "Morph_")))

@@ -23,7 +23,6 @@ from khala_protocol.trust import import_trusted
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from khala_bridge.observe.feedback import Feedback
     from khala_bridge.observe.observation import AgentObservation
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import TeamView, View
@@ -42,7 +41,6 @@ class Page:
 
     observation: AgentObservation
     task: TaskConfig
-    feedback: Feedback
     conditions: dict[str, str] = field(default_factory=dict)
     """By tag, the written condition of a unit, and its changes: pages of one moment that tell of the same changes share
     it, see `units`."""
@@ -169,7 +167,7 @@ def render(page: Page, sections: Sequence[Section], budget: int | None = None) -
     """
     blocks = [_block(section.write, page) for section in sections]
     if budget is not None:
-        blocks = _shortened(page, sections, blocks, budget)
+        blocks = _shorten(page, sections, blocks, budget)
     return _BETWEEN.join(block for block in blocks if block) + "\n"
 
 
@@ -177,7 +175,7 @@ def _block(write: Write, page: Page) -> str:
     return "\n".join(write(page))
 
 
-def _shortened(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
+def _shorten(page: Page, sections: Sequence[Section], blocks: list[str], budget: int) -> list[str]:
     """Return the blocks with as many shorter forms as needed, in the order of ranks, and a notice of the rest."""
     costs = [tokens(block + _BETWEEN) for block in blocks]
     missing: dict[str, str] = {}

@@ -20,26 +20,28 @@ _QUOTES = re.compile("'{3,}")
 @section("last_actions")
 def last_actions(page: Page) -> Iterator[str]:
     """Show the calls of the last reply that were carried out."""
-    if page.feedback.accepted:
+    if page.observation.heard.accepted:
         yield "Your last actions"
-        yield from (f"{INDENT}accepted: {call}" for call in page.feedback.accepted)
+        yield from (f"{INDENT}accepted: {call}" for call in page.observation.heard.accepted)
         yield f"{INDENT}Check whether the accepted ones are done, go on by themselves, or need another order."
 
 
 @section("rejections")
 def rejections(page: Page) -> Iterator[str]:
     """Show the calls that were not carried out, and why."""
-    if page.feedback.rejections:
+    if page.observation.heard.rejections:
         yield "Your last errors"
-    yield from (f"{INDENT}{_rejection(fault)}" for fault in page.feedback.rejections)
+    yield from (f"{INDENT}{_rejection(fault)}" for fault in page.observation.heard.rejections)
 
 
 @section("messages")
 def messages(page: Page) -> Iterator[str]:
     """Show the messages of others."""
-    if page.feedback.messages:
+    if page.observation.heard.messages:
         yield "Messages"
-    yield from (f"{INDENT}{_message(message, page.observation.agent.name)}" for message in page.feedback.messages)
+    yield from (
+        f"{INDENT}{_message(message, page.observation.agent.name)}" for message in page.observation.heard.messages
+    )
 
 
 @section("communication")

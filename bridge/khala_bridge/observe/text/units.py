@@ -42,13 +42,13 @@ def near_units(page: Page) -> list[str]:
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
 def few_units(page: Page) -> list[str]:
     """Show the blocks with a few enemies, and events without tags."""
-    return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEW)), _counted_events)
+    return _blocks(page, lambda page, team: _groups(page, team, _nearest(team, FEW)), _counted_events)
 
 
 @shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
 def fewest_units(page: Page) -> list[str]:
     """Show the blocks with a handful of enemies, and no events."""
-    return _blocks(page, lambda page, team: _grouped(page, team, _nearest(team, FEWEST)), _no_events)
+    return _blocks(page, lambda page, team: _groups(page, team, _nearest(team, FEWEST)), _no_events)
 
 
 def _blocks(
@@ -66,12 +66,12 @@ def _blocks(
             x0, y0, x1, y1 = map(n, team.bounds)
             lines.append(f"{INDENT}Screen on the map: x {x0} to {x1}, y {y0} to {y1}")
         lines += units(page, team)
-        lines += _listed("Resources on the screen:", _resource_lines(team.resources))
-        lines += _listed("Since the last observation:", events(page, team.events))
+        lines += _under_heading("Resources on the screen:", _resource_lines(team.resources))
+        lines += _under_heading("Since the last observation:", events(page, team.events))
     return lines
 
 
-def _listed(heading: str, lines: list[str]) -> list[str]:
+def _under_heading(heading: str, lines: list[str]) -> list[str]:
     """Return a heading with indented lines below it; nothing without lines."""
     return [f"{INDENT}{heading}", *lines] if lines else lines
 
@@ -84,10 +84,10 @@ def _all_units(page: Page, team: TeamView) -> list[str]:
         return _near(page, team, team.enemies)
     workers = [unit for unit in team.allies if is_worker(unit.type)]
     return [
-        *_listed("Your units:", _own_lines(page, team)),
-        *_listed("Allied units:", _lines(page, _without(team.allies, workers) if workers else team.allies)),
-        *_listed("Allied workers:", _group_lines(workers)),
-        *_listed("Enemy units:", _lines(page, team.enemies)),
+        *_under_heading("Your units:", _own_lines(page, team)),
+        *_under_heading("Allied units:", _lines(page, _without(team.allies, workers) if workers else team.allies)),
+        *_under_heading("Allied workers:", _group_lines(workers)),
+        *_under_heading("Enemy units:", _lines(page, team.enemies)),
     ]
 
 
@@ -95,21 +95,21 @@ def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
     """Return own units and some enemies one by one, others by type; builders also get structures one by one."""
     standing = [unit for unit in team.allies if is_structure(unit.type) and page.observation.agent.kind == "builder"]
     return [
-        *_listed("Your units:", _own_lines(page, team)),
-        *_listed("Allied structures:", _lines(page, standing)),
-        *_listed("Allied units by type:", _group_lines(_without(team.allies, standing))),
-        *_listed("Enemy units:", _lines(page, told)),
-        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
+        *_under_heading("Your units:", _own_lines(page, team)),
+        *_under_heading("Allied structures:", _lines(page, standing)),
+        *_under_heading("Allied units by type:", _group_lines(_without(team.allies, standing))),
+        *_under_heading("Enemy units:", _lines(page, told)),
+        *_under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
     ]
 
 
-def _grouped(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
+def _groups(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
     """Return own units and some enemies one by one; others by type."""
     return [
-        *_listed("Your units:", _own_lines(page, team)),
-        *_listed("Allied units by type:", _group_lines(team.allies)),
-        *_listed("Enemy units:", _lines(page, told)),
-        *_listed("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
+        *_under_heading("Your units:", _own_lines(page, team)),
+        *_under_heading("Allied units by type:", _group_lines(team.allies)),
+        *_under_heading("Enemy units:", _lines(page, told)),
+        *_under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, ago, counted, listed, percent, point, whole
+from khala_bridge.observe.text.words import INDENT, INDENT2, ago, count_words, percent, point, under_heading, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,11 +24,11 @@ def counts(page: Page) -> Iterator[str]:
     yield from _line("Your units", [_ready(count) for count in found.units if count.ready])
     yield from _line("Your structures", [_ready(count) for count in found.structures if count.ready])
     yield from _line("Under construction", [_under_way(count) for count in found.structures if count.under_way])
-    yield from _line("Going to be built by workers on their way", [counted(found.planned)] if found.planned else [])
+    yield from _line("Going to be built by workers on their way", [count_words(found.planned)] if found.planned else [])
     yield from _line("Coming in", [_under_way(count) for count in found.units if count.under_way])
     yield from _line("In production", [_production(made) for made in found.production])
     if found.enemies:
-        yield from listed("Enemies spotted so far:", map(_enemy, found.enemies))
+        yield from under_heading("Enemies spotted so far:", map(_enemy, found.enemies))
     else:
         yield f"{INDENT}Enemies spotted so far: none"
 
@@ -79,7 +79,7 @@ def alerts(page: Page) -> Iterator[str]:
     for alert in view.alerts:
         died = f", {alert.died} died" if alert.died else ""
         lost = f", lost {whole(alert.lost)} health and shield" if alert.lost else ""
-        yield f"{INDENT}Under attack at minimap {point(alert.minimap)}: {counted(alert.units)}{lost}{died}"
+        yield f"{INDENT}Under attack at minimap {point(alert.minimap)}: {count_words(alert.units)}{lost}{died}"
     yield from (f"{INDENT}{warning}" for warning in view.warnings)
 
 
@@ -103,7 +103,7 @@ def events(page: Page) -> Iterator[str]:
         yield "Since the last observation"
     for what in _HAPPENED.values():
         if what in by_kind:
-            names = ", ".join(by_kind[what]) if what == "Researched" else counted(by_kind[what])
+            names = ", ".join(by_kind[what]) if what == "Researched" else count_words(by_kind[what])
             yield f"{INDENT}{what}: {names}"
 
 
@@ -118,7 +118,7 @@ def others(page: Page) -> Iterator[str]:
             agent = team.agent
             yield f"{INDENT}{agent}"
         where = f"minimap {point(team.minimap)}"
-        yield f"{INDENT2}{team.name}: {counted(team.units)} at {where}, {percent(team.health)} of health and shield"
+        yield f"{INDENT2}{team.name}: {count_words(team.units)} at {where}, {percent(team.health)} of health and shield"
 
 
 @shorter("others", rank=100, says="the single teams of other agents")
@@ -130,7 +130,7 @@ def others_in_short(page: Page) -> Iterator[str]:
         for name, count in team.units.items():
             units[name] = units.get(name, 0) + count
     yield from ["Teams of other agents"] if by_agent else []
-    yield from (f"{INDENT}{agent}: {counted(units)}" for agent, units in by_agent.items())
+    yield from (f"{INDENT}{agent}: {count_words(units)}" for agent, units in by_agent.items())
 
 
 # --- landmarks ------------------------------------------------------------------------------------------------
@@ -163,7 +163,7 @@ def warp(page: Page) -> Iterator[str]:
     if gates is not None:
         ready = "" if gates.ready is None else f", {gates.ready} ready now"
         yield f"{INDENT}WarpGates: {gates.count}{ready}"
-    yield from listed("Power fields:", map(_place, fields))
+    yield from under_heading("Power fields:", map(_place, fields))
 
 
 @section("places", parts=("places", "power"))
@@ -172,9 +172,9 @@ def places(page: Page) -> Iterator[str]:
     bases, geysers, fields = (_marks(page, what) for what in ("base place", "geyser", "power field"))
     if bases or geysers or fields:
         yield "Places to build at"
-    yield from listed("Free places for a base, each named by a resource beside it:", map(_place, bases))
-    yield from listed("Free geysers:", map(_place, geysers))
-    yield from listed("Power fields, which most structures need:", map(_place, fields))
+    yield from under_heading("Free places for a base, each named by a resource beside it:", map(_place, bases))
+    yield from under_heading("Free geysers:", map(_place, geysers))
+    yield from under_heading("Power fields, which most structures need:", map(_place, fields))
 
 
 def _place(mark: Landmark) -> str:

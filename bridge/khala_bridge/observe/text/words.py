@@ -40,12 +40,12 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def counted(numbers: dict[str, int]) -> str:
+def count_words(numbers: dict[str, int]) -> str:
     """Return counts in words: `3 Stalker, 1 Zealot`."""
     return ", ".join(f"{count} {what}" for what, count in numbers.items())
 
 
-def listed(heading: str, lines: Iterable[str]) -> Iterator[str]:
+def under_heading(heading: str, lines: Iterable[str]) -> Iterator[str]:
     """Yield a heading with lines below it; nothing without lines."""
     found = list(lines)
     if found:

@@ -87,10 +87,14 @@ def atlas_of(ground: MapGround, bases: tuple[Base, ...], home: WorldPoint) -> At
         NamedPlace(f"Base {number}", "base", at, start=_is_start(at, home, ground.starts))
         for number, at in enumerate(in_order, start=1)
     ]
-    named += _numbered("Ramp", "ramp", _ramps(ground), ways)
+    named += _number("Ramp", "ramp", _ramps(ground), ways)
     for goal in ground.starts:
-        found = [at for at in _passages(ground, home, goal) if all(math.dist(at[0], one.at) > APART for one in named)]
-        named += _numbered("Passage", "passage", found, ways, after=sum(one.what == "passage" for one in named))
+        found = [
+            (middle, width)
+            for middle, width in _passages(ground, home, goal)
+            if all(math.dist(middle, place.at) > APART for place in named)
+        ]
+        named += _number("Passage", "passage", found, ways, after=sum(place.what == "passage" for place in named))
     return Atlas(ground, home, tuple(named))
 
 
@@ -98,10 +102,10 @@ def _is_start(at: WorldPoint, home: WorldPoint, starts: Sequence[WorldPoint]) ->
     return any(math.dist(at, start) < 1 for start in (home, *starts))
 
 
-def _numbered(
+def _number(
     name: str, what: Feature, found: Sequence[tuple[WorldPoint, int]], ways: Floats, after: int = 0
 ) -> Iterator[NamedPlace]:
-    in_order = sorted(found, key=lambda one: (_way(ways, one[0]), one))
+    in_order = sorted(found, key=lambda opening: (_way(ways, opening[0]), opening))
     for number, (at, width) in enumerate(in_order, start=1 + after):
         yield NamedPlace(f"{name} {number}", what, at, width=width)
 

@@ -35,12 +35,12 @@ class Footprint(Frozen):
     @functools.cached_property
     def cells(self) -> Cells:
         """(dx, dy) of every cell that it stands on, from the cell that `cell` returns."""
-        return self._marked("x")
+        return self._cells_of("x")
 
     @functools.cached_property
     def near(self) -> Cells:
         """(dx, dy) of every cell on which no town hall may stand, its own cells included."""
-        return self._marked("xo")
+        return self._cells_of("xo")
 
     @functools.cached_property
     def size(self) -> tuple[int, int]:
@@ -57,7 +57,7 @@ class Footprint(Frozen):
         width, height = self.size
         return WorldPoint(cell[0] + (width % 2) / 2, cell[1] + (height % 2) / 2)
 
-    def _marked(self, marks: str) -> Cells:
+    def _cells_of(self, marks: str) -> Cells:
         width, height = self.size
         return tuple(
             (column - width // 2, height - 1 - row - height // 2)

@@ -75,7 +75,7 @@ class Land:
     def standing_on(self, cells: Iterable[tuple[int, int]]) -> Unit | None:
         """Return a unit that stands on any of some cells: the one with the least tag."""
         wanted = set(cells)
-        return next((u for _, f, u in self._standing if not wanted.isdisjoint(_covered(f, u))), None)
+        return next((u for _, f, u in self._standing if not wanted.isdisjoint(_footprint_cells(f, u))), None)
 
     # --- things on the ground ---------------------------------------------------------------------------------
 
@@ -189,7 +189,7 @@ class Land:
         unit = self.unit(tag)
         return "" if unit is None else unit.name
 
-    def powered(self, *, corner: bool, by: int | None = None) -> Bools:
+    def power_cells(self, *, corner: bool, by: int | None = None) -> Bools:
         """Return the cells (w, h) where a structure's middle would be in a power field.
 
         Args:
@@ -255,7 +255,7 @@ class Land:
         return kept
 
 
-def _covered(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
+def _footprint_cells(footprint: Footprint, unit: Unit) -> list[tuple[int, int]]:
     x, y = footprint.cell(unit.pos.x, unit.pos.y)
     return [(x + dx, y + dy) for dx, dy in footprint.cells]
 
