@@ -14,7 +14,8 @@ import statistics
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from bench.results import RESULTS, ROOT, SHORT, every
+from bench.paths import RESULTS, ROOT
+from bench.results import SHORT, every
 from docs.pages import markdown
 from khala.experiment.report.figures import COLOURS, FAINT, MARKS, STYLE
 

@@ -20,14 +20,13 @@ import psutil
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.figures import Better
+from bench.paths import RESULTS, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bench.figures import Figure
 
-ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "bench" / "results"
 SHORT = 8
 """Characters of a commit in names."""
 CPUINFO = Path("/proc/cpuinfo")

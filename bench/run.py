@@ -11,7 +11,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Final
 
-from bench.results import ROOT
+from bench.paths import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from bench.doors.rows import Row
-from bench.money import KINDS, spend
+from bench.survival.money import KINDS, spend
 
 if TYPE_CHECKING:
     from pathlib import Path

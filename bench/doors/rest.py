@@ -25,7 +25,7 @@ from cryptography.x509.oid import NameOID
 
 from bench.doors.files import EVIL, GAME, FullFile, printed
 from bench.doors.rows import Row
-from bench.doors.trust import GOLDEN
+from bench.paths import GOLDEN
 from khala.calibrate import commands as calibrating
 from khala.commands.advise import Adviser, Advising, told
 from khala.knowledge import cli as knowledge

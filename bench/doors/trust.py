@@ -10,12 +10,12 @@ import os
 import shutil
 import sys
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import yaml
 
 from bench.doors.rows import Row
+from bench.paths import GOLDEN
 from khala.service.orders import match_of
 from khala_configs import CONFIGS
 from khala_protocol.codec import decode, encode
@@ -25,11 +25,11 @@ from khala_protocol.recording import Recorder, Recording
 from khala_protocol.service import Submit
 
 if TYPE_CHECKING:
+    from pathlib import Path
     from collections.abc import Callable, Iterator
 
     Json = dict[str, Any]
 
-GOLDEN: Final = Path(__file__).parent.parent.parent / "tests" / "khala" / "golden.mcap"
 MODULE: Final = "open('it-ran', 'w').close()\n"
 SECTIONS: Final = ["foreign_code:mine"]
 PATIENCE_S: Final = 60.0

@@ -98,7 +98,7 @@ def test_figures_are_kept_when_a_measurement_fails_and_the_exit_code_says_so(
     def fail_once(name: str, _: Any) -> list[Figure]:
         asked.append(name)
         if asked == ["turn", "bus"]:
-            raise subprocess.CalledProcessError(2, ["bench.bus"])
+            raise subprocess.CalledProcessError(2, ["bench.turns.bus"])
         return [Figure(f"figure of {name}", "ms", (float(len(asked)),))]
 
     monkeypatch.setattr(command, "figures_of", fail_once)

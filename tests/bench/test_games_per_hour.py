@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench.games_per_hour import TASKS, measures, planned
+from bench.matches.games_per_hour import TASKS, measures, planned
 from khala_orchestrator.config import load_task
 
 

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from bench.messages import GOAL, Transcript, Turn, UnknownMessage, judge, measure
+from bench.language.messages import GOAL, Transcript, Turn, UnknownMessage, judge, measure
 from khala_agents.scripted.reading import read
 from khala_agents.scripted.skilled import skilled
 from khala_protocol.speech import parse
