@@ -12,13 +12,13 @@ each side (`python -m bench --times 3`): values inside of one run scatter less t
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import statistics
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
+from bench.command_line import make_parser
 from bench.ratios import ratio_of_means
 from bench.results import find, read
 from bench.tables import print_table
@@ -108,13 +108,10 @@ def _finite(factor: Interval) -> dict[str, float | None]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print how two results differ."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench compare", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__)
     parser.add_argument("a", help="a file, or the beginning of a commit or a date")
     parser.add_argument("b", help="the same")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="measurements to compare")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args(arguments)
     a, b = read(find(given.a)), read(find(given.b))
     found = list(changes(a, b, given.only))
@@ -125,7 +122,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"A: {a.title}; {a.machine}\nB: {b.title}; {b.machine}\n")
     print_table(COLUMNS, rows(found))
     print("".join(f"\n* {remark}" for remark in remarks(a, b, found)))
-
-
-if __name__ == "__main__":
-    main()

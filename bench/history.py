@@ -187,7 +187,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     kept = kept_results()
     first, *rest = write(kept)
     print(f"{first.relative_to(ROOT)}: {len(kept)} results, {len(rest)} pictures")
-
-
-if __name__ == "__main__":
-    main()

@@ -7,13 +7,13 @@ is 1. `python -m bench limits bus` checks those of one measurement, `--json` pri
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
+from bench.command_line import make_parser
 from bench.ratios import mean_ratio
 from bench.run import figures_of
 from bench.tables import print_table
@@ -73,11 +73,8 @@ def rows(judged: Sequence[Judged]) -> Iterator[tuple[str, ...]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print the ratios, and return 1 if a limit is broken."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench limits", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(LIMITED)}; all if none is given")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args(arguments)
     if unknown := [name for name in given.names if name not in LIMITED]:
         parser.error(f"{unknown[0]!r} has no limits; {', '.join(LIMITED)} have")
@@ -99,7 +96,3 @@ def _row(one: Judged) -> dict[str, object]:
         "measurement": one.bench, "ratio": one.figure.name, "measured": one.ratio.value, "limit": one.figure.limit,
         "values": one.figure.values, "verdict": one.verdict, "skipped": one.figure.skipped,
     }  # fmt: skip
-
-
-if __name__ == "__main__":
-    sys.exit(main())

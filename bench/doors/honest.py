@@ -1,7 +1,7 @@
 """How long honest clients of the HTTP doors wait while others attack.
 
-    python -m bench.doors.honest                two seconds calm and two under attack for each server
-    python -m bench.doors.honest --seconds 10
+    python -m bench doors.honest                two seconds calm and two under attack for each server
+    python -m bench doors.honest --seconds 10
 
 The attackers are a process of their own: eight connections that send requests of foreign pages, of foreign names and
 with wrong tokens, one after the other, and 100 connections that say nothing. The honest client asks a hundred times a
@@ -10,7 +10,6 @@ second, at most.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import logging
@@ -21,6 +20,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from bench.command_line import make_parser
 from bench.doors.http_doors import SERVERS, Target, send
 from bench.tables import print_table
 
@@ -89,9 +89,7 @@ def _quantiles(times: Sequence[float]) -> tuple[str, str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench.doors.honest", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--seconds", type=float, default=2.0, help="of each measurement")
     given = parser.parse_args(arguments)
     logging.disable(logging.ERROR)
@@ -104,7 +102,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows,
     )  # fmt: skip
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""An endpoint that bills, in every kind of trouble: no cent over the cap. `python -m bench.money` has the table."""
+"""An endpoint that bills, in every kind of trouble: no cent over the cap. `python -m bench money` has the table."""
 
 from __future__ import annotations
 

@@ -25,8 +25,8 @@ from khala_protocol.recording import Recorder, Recording
 from khala_protocol.service import Submit
 
 if TYPE_CHECKING:
-    from pathlib import Path
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     Json = dict[str, Any]
 

@@ -1,8 +1,8 @@
 """Measure steps a second of numeric environments: ours, SMAC's package on the simulator, and SMAClite.
 
-    python -m bench.env                                                     ours alone
-    python -m bench.env --smac ~/smac --smaclite ~/smaclite --smaclite-python ~/lite/bin/python
-    python -m bench.env --maps 2s3z corridor --seconds 10 --rounds 5 --json
+    python -m bench env                                                     ours alone
+    python -m bench env --smac ~/smac --smaclite ~/smaclite --smaclite-python ~/lite/bin/python
+    python -m bench env --maps 2s3z corridor --seconds 10 --rounds 5 --json
 
 The paths are checkouts of https://github.com/oxwhirl/smac and https://github.com/uoe-agents/smaclite; the Python for
 the second has what it asks for. Each environment has a process (SMAC's has the game's beside it). They are
@@ -24,6 +24,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.command_line import make_parser
 from bench.environments.smac import package_root
 from bench.figures import Figure
 from bench.paths import ROOT
@@ -134,7 +135,7 @@ def _line(worker: subprocess.Popen[str]) -> str:
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--maps", nargs="+", default=["2s3z", "10m_vs_11m"])
     parser.add_argument("--seconds", type=float, default=5.0, help="of a round")
     parser.add_argument("--rounds", type=int, default=3)
@@ -142,7 +143,6 @@ def main() -> None:
     parser.add_argument("--smaclite", type=Path, help="a checkout of SMAClite")
     parser.add_argument("--smaclite-python", type=Path, default=Path(sys.executable))
     parser.add_argument("--at-once", type=int, nargs="+", default=[1, 8], help="how many environments play at a time")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     options = parser.parse_args()
     kinds = list(kinds_of(options))
     if not options.json:
@@ -157,7 +157,3 @@ def main() -> None:
                     print(text, flush=True)
     if options.json:
         print(json.dumps({"rows": rows}))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """Play random episodes on SMAC's package and on `khala.env.numeric` at once, and compare everything.
 
-    python -m bench.env_parity ~/smac                             23 maps, 500 episodes in all
-    python -m bench.env_parity ~/smac --maps 3m MMM --episodes 50
+    python -m bench env_parity ~/smac                             23 maps, 500 episodes in all
+    python -m bench env_parity ~/smac --maps 3m MMM --episodes 50
 
 The path is a checkout of https://github.com/oxwhirl/smac. SMAC plays through PySC2 on the simulator's server, ours in
 this process, with the same seed and actions. Compared after each step, to the bit: observations, state, available
@@ -11,7 +11,6 @@ played again from its replay, since a server does not tell its own.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bench.command_line import make_parser
 from bench.environments.smac import package_root
 from khala.env.numeric import MAPS, StarCraft2Env
 from khala.playing import games
@@ -92,7 +92,7 @@ def _same_worlds(replay: Replay, ends: list[tuple[int, str]]) -> int:
 
 def main() -> None:
     """Compare what the command line asks for; exit with 1 if anything differs."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("path", type=Path)
     parser.add_argument("--maps", nargs="+", default=list(MAPS))
     parser.add_argument("--episodes", type=int, default=EPISODES, help="of all maps together")
@@ -109,7 +109,3 @@ def main() -> None:
         wrong |= found.differences > 0 or found.worlds < found.episodes
         print(f"| {map_name} | {found.episodes} | {found.steps} | {found.differences} | {found.worlds} |", flush=True)
     sys.exit(wrong)
-
-
-if __name__ == "__main__":
-    main()

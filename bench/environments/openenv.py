@@ -1,8 +1,8 @@
 """Measure the server of OpenEnv: sessions and steps a second with 1, 8 and 32 clients, and memory.
 
-    python -m bench.openenv                              a table
-    python -m bench.openenv --clients 1 8 --steps 5      fewer clients, shorter episodes
-    python -m bench.openenv --json                       one JSON object
+    python -m bench openenv                              a table
+    python -m bench openenv --clients 1 8 --steps 5      fewer clients, shorter episodes
+    python -m bench openenv --json                       one JSON object
 
 The server is `khala openenv` in a process of its own, and each client has a session. `sessions` are whole
 ones a second: a client connects, begins an episode of 2s3z with a seed, plays some steps without orders,
@@ -13,7 +13,6 @@ processes share count once: of the server, and of a game, at their highest.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import statistics
@@ -26,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 from openenv.core.generic_client import GenericEnvClient
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 
 if TYPE_CHECKING:
@@ -45,11 +45,10 @@ class Counts:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--clients", type=int, nargs="+", default=CLIENTS)
     parser.add_argument("--steps", type=int, default=10, help="of an episode")
     parser.add_argument("--seconds", type=float, default=20.0, help="how long to measure each number of clients")
-    parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     found = {"steps": given.steps, "rows": [of_clients(count, given.steps, given.seconds) for count in given.clients]}
     if given.json:
@@ -166,7 +165,3 @@ def measures(found: dict[str, Any]) -> Iterator[Figure]:
         yield Figure(f"{name}, steps", "/s", (row["steps_per_s"],), "more")
         yield Figure(f"{name}, memory of the server", "MB", (row["server_mb"],))
         yield Figure(f"{name}, memory of a game", "MB", (row["game_mb"],))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,8 @@
 """Play SMAC's own environments, as its package makes them, on the simulator: every map, two agents, many episodes.
 
-    python -m bench.smac ~/smac                                    23 maps, random and heuristic agents, 3 episodes
-    python -m bench.smac ~/smac --episodes 50 --maps MMM MMM2
-    python -m bench.smac ~/smac --json                             one JSON object a line on stdout
+    python -m bench smac ~/smac                                    23 maps, random and heuristic agents, 3 episodes
+    python -m bench smac ~/smac --episodes 50 --maps MMM MMM2
+    python -m bench smac ~/smac --json                             one JSON object a line on stdout
 
 The path is a checkout of https://github.com/oxwhirl/smac, or where pip has put the package; it is no dependency of this
 project. Each map has a process of its own that may take so many seconds an episode, so that a hang is seen. Checked
@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bench.command_line import make_parser
 from khala_simulator.process.install import install
 
 AGENTS = ("random", "heuristic")
@@ -150,14 +151,13 @@ def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: ar
 
 def main() -> None:
     """Play what the command line asks for; exit with 1 if anything was wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("path", type=Path)
     parser.add_argument("--maps", nargs="+")
     parser.add_argument("--agents", nargs="+", choices=AGENTS, default=AGENTS)
     parser.add_argument("--episodes", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--patience-s", type=float, default=120.0, help="for one episode")
-    parser.add_argument("--json", action="store_true")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     root = package_root(options.path)
@@ -186,7 +186,3 @@ def _row(p: Played) -> str:
         f"| {p.map} | {p.agent} | {p.won} of {p.episodes} | {p.reward:.1f} | {p.most:.1f} | {p.steps:.0f} | {p.obs} | "
         f"{p.state} | {p.actions} | {p.wall_s:.0f} | {p.trouble} |"
     )
-
-
-if __name__ == "__main__":
-    main()

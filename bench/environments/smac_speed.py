@@ -1,10 +1,10 @@
 """Measure how many steps a second SMAC's own package makes on the simulator, and which part of them is whose.
 
-    python -m bench.smac_speed ~/smac                         2s3z, 3s5z and 2c_vs_64zg, with their goals
-    python -m bench.smac_speed ~/smac --maps MMM2 --steps 1000
-    python -m bench.smac_speed ~/smac --floor                 also with a server that answers at once
+    python -m bench smac_speed ~/smac                         2s3z, 3s5z and 2c_vs_64zg, with their goals
+    python -m bench smac_speed ~/smac --maps MMM2 --steps 1000
+    python -m bench smac_speed ~/smac --floor                 also with a server that answers at once
 
-The path is that of `python -m bench.smac`. Agents act at random. `steps/s` counts `StarCraft2Env.step` alone, which is
+The path is that of `python -m bench smac`. Agents act at random. `steps/s` counts `StarCraft2Env.step` alone, which is
 three requests and what SMAC makes of their answers; `all` also the choice of actions, observations, state and resets.
 `client` and `server` are the processor time of the two processes a step, in ms, of all that; on a busy machine they are
 more reliable than wall time.
@@ -12,7 +12,6 @@ more reliable than wall time.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -25,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.command_line import make_parser
 from bench.environments.smac import package_root
 from bench.simulator.at_once import floor
 from bench.simulator.env_games import CpuTime
@@ -72,7 +72,7 @@ def _choose(env: Any, rng: np.random.Generator) -> list[int]:
 
 def main() -> None:
     """Print one line per map."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("path", type=Path)
     parser.add_argument("--maps", nargs="+", default=list(GOALS))
     parser.add_argument("--steps", type=int, default=500, help="of each map")
@@ -80,7 +80,6 @@ def main() -> None:
     parser.add_argument(
         "--floor", action="store_true", help="also the steps a second with a server that answers at once"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     options = parser.parse_args()
     sys.path.insert(0, str(package_root(options.path)))
     rows: dict[str, dict[str, float | None]] = {}
@@ -97,7 +96,3 @@ def main() -> None:
     for name, row in rows.items():
         cells = ("" if value is None else f"{value:.2f}" for value in row.values())
         print(f"{name:<14}" + "".join(f"{cell:>9}" for cell in cells))
-
-
-if __name__ == "__main__":
-    main()

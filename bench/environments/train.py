@@ -1,8 +1,8 @@
 """Train a team on a SMAC map through `khala.env.numeric`, and draw how its win rate grows.
 
-    python -m bench.train                                           3m, one seed, ten minutes
-    python -m bench.train 3m --minutes 10 --seeds 1 2 3
-    python -m bench.train 2s3z --minutes 30 --envs 16 --out curve.svg
+    python -m bench train                                           3m, one seed, ten minutes
+    python -m bench train 3m --minutes 10 --seeds 1 2 3
+    python -m bench train 2s3z --minutes 30 --envs 16 --out curve.svg
 
 The learner is PPO with shared weights (`bench.environments.ppo`), in this process, with all environments in turn. Printed are the
 win rate of the last 200 episodes as they were sampled, and, at the end, that of 100 new battles in which each agent
@@ -12,7 +12,6 @@ the training, and what there is is drawn.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections import deque
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.command_line import make_parser
 from bench.environments.ppo import Learner, Rollout
 from khala.env.numeric import CentralEnv
 
@@ -141,13 +141,12 @@ def draw(runs: list[Run], path: Path) -> None:
 
 def main() -> None:
     """Train as the command line asks."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("map", nargs="?", default="3m")
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--out", type=Path, help="where to draw the curve: .svg or .png")
-    parser.add_argument("--json", action="store_true", help="one JSON object a seed on stdout, at its end")
     options = parser.parse_args()
     runs = []
     for seed in options.seeds:
@@ -170,7 +169,3 @@ def _tell(run: Run) -> None:
         f"seed {run.seed}  {run.minutes[-1]:5.2f} min  {run.steps[-1]:8d} steps  {run.episodes:6d} episodes  "
         f"won {run.won[-1]:.2f}", flush=True,
     )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """How true the messages of the scripted player are: each is judged by what its sender saw and its reader then did.
 
-    python -m bench.messages                                       SCEB and ECEB, three races, 200 decisions each
-    python -m bench.messages --tasks simple64_sceb --steps 300 --show 20
+    python -m bench messages                                       SCEB and ECEB, three races, 200 decisions each
+    python -m bench messages --tasks simple64_sceb --steps 300 --show 20
 
 A report must say what stands in the observation of its sender. An order must name a place that this observation gives
 a reason for, and its reader must carry it out: by its next replies its units are there, on their way, or in a fight.
@@ -11,15 +11,14 @@ message that no rule knows is an error.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import re
-import sys
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from bench.command_line import make_parser
 from bench.matches.ladder import TASKS, Pairing, witnessed
 from khala_agents.scripted.reading import points, read
 from khala_agents.scripted.skilled.kinds import fights
@@ -249,12 +248,11 @@ def report(name: str, verdict: Verdict, show: int) -> Iterator[str]:
 
 def main() -> int:
     """Play the tasks that the options name; the exit code is 1 if too many messages of any are false."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = make_parser(__doc__)
     options.add_argument("--tasks", nargs="+", default=TASKS, metavar="TASK")
     options.add_argument("--steps", type=int, default=200, help="decisions of each game at most")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--show", type=int, default=0, help="false messages to print for each task")
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = options.parse_args()
     found: dict[str, Verdict] = {}
     for name in given.tasks:
@@ -273,7 +271,3 @@ def main() -> int:
         }
         print(json.dumps(rows))
     return int(any(one.share < GOAL for one in found.values()))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,10 +1,10 @@
 """How honest the offers are: random choices among what a text calls valid, and the share that is refused.
 
-    python -m bench.offers                                   the full games, 150 decisions of each, three races
-    python -m bench.offers --task simple64_ecsb --seeds 1 2  one task, two games
-    python -m bench.offers --after 220                       the same, after `skilled` has built for 220 decisions
-    python -m bench.offers --judged                          every offer, along a game of the player `skilled`
-    python -m bench.offers --json                            one JSON object on stdout
+    python -m bench offers                                   the full games, 150 decisions of each, three races
+    python -m bench offers --task simple64_ecsb --seeds 1 2  one task, two games
+    python -m bench offers --after 220                       the same, after `skilled` has built for 220 decisions
+    python -m bench offers --judged                          every offer, along a game of the player `skilled`
+    python -m bench offers --json                            one JSON object on stdout
 
 First `random-legal` plays, from the text alone as a model does: what the host or the game refuses of its calls is
 counted by action and reason. A random player has little after the first minute, so with `--after` it takes over a
@@ -14,16 +14,15 @@ snapshot, with arguments drawn at random, and not carried out.
 
 from __future__ import annotations
 
-import argparse
 import json
 import logging
 import random
 import re
-import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from bench.command_line import make_parser
 from khala.playing import games
 from khala_agents.scripted.players import PLAYERS, random_calls
 from khala_agents.scripted.reading import read
@@ -163,14 +162,13 @@ def report(name: str, tally: Tally, most: int) -> Iterator[str]:
 
 def main() -> int:
     """Play the tasks that the options name; the exit code is 1 if any offers more than 2 % in vain."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = make_parser(__doc__)
     options.add_argument("--task", nargs="+", default=list(TASKS), metavar="TASK", help="names of tasks")
     options.add_argument("--steps", type=int, default=STEPS, help="decisions of each game")
     options.add_argument("--seeds", type=int, nargs="+", default=[1], help="a game for each")
     options.add_argument("--after", type=int, default=0, help="decisions of `skilled` before those that count")
     options.add_argument("--judged", action="store_true", help="judge every offer along a game of `skilled`")
     options.add_argument("--most", type=int, default=12, help="kinds of refusals to print for each task")
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = options.parse_args()
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns of every ability that is newer than itself
     found: dict[str, Tally] = {}
@@ -191,7 +189,3 @@ def main() -> int:
         }
         print(json.dumps(rows))
     return 1 if any(one.dishonest > 2 for one in found.values()) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,8 +1,8 @@
 """Read the corpus of replies, and measure how much of their meaning is understood.
 
-    python -m bench.recognition            a table
-    python -m bench.recognition --misses   and every reply that is not read as a person would read it
-    python -m bench.recognition --json     one JSON object on stdout
+    python -m bench recognition            a table
+    python -m bench recognition --misses   and every reply that is not read as a person would read it
+    python -m bench recognition --json     one JSON object on stdout
 
 The corpus (`tests/bridge/corpus/*.yaml`) holds replies as models write them, and what a reasonable person would
 understand: calls with team, name and arguments, messages, channels, and the rejections. It was written by
@@ -12,7 +12,6 @@ hand, before the reader was measured with it. `found` is the share of the meant 
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import Counter
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from pydantic import BaseModel, ConfigDict
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.command_line import make_parser
 from bench.paths import TESTS
 from khala_bridge.act import Actor
 from khala_bridge.knowledge import knowledge
@@ -202,8 +202,7 @@ def _snapshot() -> Snapshot:
 
 def main() -> None:
     """Print the figures."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    options = make_parser(__doc__)
     options.add_argument("--misses", action="store_true", help="show replies that are not read as meant")
     chosen = options.parse_args()
     found = scores(list(corpus().items()))
@@ -220,7 +219,3 @@ def main() -> None:
     for name, score in found.items() if chosen.misses else ():
         for miss in score.misses:
             print(f"{name}: {miss}")
-
-
-if __name__ == "__main__":
-    main()

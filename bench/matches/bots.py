@@ -1,9 +1,9 @@
 """Play python-sc2's example bots against the computer players of ten levels, each game in a process of its own.
 
-    python -m bench.bots ~/python-sc2                       four rushes, ten levels, one game each
-    python -m bench.bots ~/python-sc2 --bots worker_rush --levels 4 5 --games 3
-    python -m bench.bots ~/python-sc2 --log won.jsonl       games in the file are not played again
-    python -m bench.bots ~/python-sc2 --maps ~/Maps --map Simple128
+    python -m bench bots ~/python-sc2                       four rushes, ten levels, one game each
+    python -m bench bots ~/python-sc2 --bots worker_rush --levels 4 5 --games 3
+    python -m bench bots ~/python-sc2 --log won.jsonl       games in the file are not played again
+    python -m bench bots ~/python-sc2 --maps ~/Maps --map Simple128
 
 The path is a checkout of https://github.com/BurnySc2/python-sc2, whose examples are not in its package; the package
 itself comes with `make install`. The computer plays the race that the example's own `main` asks for. The examples name
@@ -25,6 +25,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from bench.command_line import make_parser
 from khala_simulator.process.install import install, link_maps
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ def table(won: dict[tuple[str, int, int], dict[str, Any]], levels: list[int]) ->
 
 def main() -> None:
     """Play what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("path", type=Path)
     parser.add_argument("--bots", nargs="+", choices=sorted(BOTS), default=list(BOTS))
     parser.add_argument("--levels", nargs="+", type=int, default=list(range(1, 11)))
@@ -162,7 +163,3 @@ def main() -> None:
                     with options.log.open("a") as log:
                         log.write(line + "\n")
     sys.stdout.write("\n".join(table(won, options.levels)) + "\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,12 +5,11 @@ The scripted model plays through its HTTP endpoint, in one process with the host
 the hashes over all observations must be equal. Each recorded match, `realtime` included, is then played again from its
 recording: no observation may differ.
 
-Run `python -m bench.clocks`; `--json` for one JSON object. The exit code is not 0 if a promise is broken.
+Run `python -m bench clocks`; `--json` for one JSON object. The exit code is not 0 if a promise is broken.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import hashlib
 import json
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from khala.playing import games
 from khala.playing.hosting import game_of
 from khala.testing import replay_host
@@ -156,10 +156,9 @@ def table(rows: Iterable[Row]) -> Table:
 
 def main() -> None:
     """Play, print a table or a JSON object, and fail if a promise is broken."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--task", default="2s3z_pair")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as directory:
         rows = asyncio.run(measure(options.task, options.seeds, Path(directory)))
@@ -170,7 +169,3 @@ def main() -> None:
         Console(width=150).print(table(rows))
     if violations:
         raise SystemExit("\n".join(violations))
-
-
-if __name__ == "__main__":
-    main()

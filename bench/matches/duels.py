@@ -1,8 +1,8 @@
 """Play duels of two models or scripted players, with sides swapped, and tabulate who wins.
 
-    python -m bench.duels                                               skilled against focus-fire, 20 games
-    python -m bench.duels --task duel_8m --games 40 --a skilled --b skilled
-    python -m bench.duels --a openai --b anthropic/claude-opus-4 --json
+    python -m bench duels                                               skilled against focus-fire, 20 games
+    python -m bench duels --task duel_8m --games 40 --a skilled --b skilled
+    python -m bench duels --a openai --b anthropic/claude-opus-4 --json
 
 Each seed is played twice, in the second game with sides swapped, so that neither ground nor seed favours one of them;
 a player against itself plays each seed once. `a` and `b` are what `khala run --blue` takes, and both have the same
@@ -11,7 +11,6 @@ clock. The intervals are Wilson's, of 95 %. A game that is not valid is not coun
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.command_line import make_parser
 from khala.experiment.statistics import wilson
 from khala_orchestrator.config import load_task
 
@@ -123,14 +123,13 @@ def _share(won: int, games: int) -> str:
 
 def main() -> int:
     """Play the duels that the options describe, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--task", default="duel_3m", help="a task of two sides")
     parser.add_argument("--games", type=int, default=20, help="number of games")
     parser.add_argument("--a", default="scripted/skilled", metavar="MODEL", help="as of khala run --blue")
     parser.add_argument("--b", default="scripted/focus-fire", metavar="MODEL", help="its opponent")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first two games")
     parser.add_argument("--out", type=Path, default=Path("runs/duels"), help="directory for recordings")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given, options = parser.parse_known_args()
     try:
         games = duels(given.task, given.a, given.b, games=given.games, seed=given.seed, out=given.out, options=options)
@@ -142,7 +141,3 @@ def main() -> int:
     else:
         print("\n".join(table(given.a, given.b, games)))
     return 0 if all(game.valid for game in games) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

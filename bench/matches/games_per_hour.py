@@ -1,9 +1,9 @@
 """How many games an hour this machine plays with scripted players, several at once.
 
-    python -m bench.games_per_hour                                   six tasks, as many games at once as there are cores
-    python -m bench.games_per_hour --tasks 2s3z_pair --games 40      one of them, so many games
-    python -m bench.games_per_hour --jobs 4                          four games at once
-    python -m bench.games_per_hour --json                            one JSON object on stdout
+    python -m bench games_per_hour                                   six tasks, as many games at once as there are cores
+    python -m bench games_per_hour --tasks 2s3z_pair --games 40      one of them, so many games
+    python -m bench games_per_hour --jobs 4                          four games at once
+    python -m bench games_per_hour --json                            one JSON object on stdout
 
 Games are played as `khala experiment run --jobs` plays them: recorded, each with a seed of its own, agents that ask the
 scripted model through its endpoint, which answers at once. Each process first plays a game that is not counted, since
@@ -14,7 +14,6 @@ after seven minutes of the game.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import sys
@@ -28,6 +27,7 @@ import psutil
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala.experiment.engine import Local, slots_of_this_machine
 from khala.experiment.plan import plan
@@ -172,11 +172,10 @@ def table(played: Sequence[Played]) -> Table:
 
 def main() -> None:
     """Play, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--tasks", nargs="+", default=list(TASKS), metavar="TASK")
     parser.add_argument("--games", type=int, help="games of each task; by default 1 to 10 for each at once")
     parser.add_argument("--jobs", type=int, default=slots_of_this_machine(), help="at once (default: %(default)s)")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     given = parser.parse_args()
     played = []
     with tempfile.TemporaryDirectory() as out:
@@ -188,7 +187,3 @@ def main() -> None:
     if given.json:
         rows = [asdict(one) | {"per_hour": one.per_hour, "cpu_s_a_game": one.cpu_s_a_game} for one in played]
         print(json.dumps({"rows": rows}))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,14 +1,13 @@
 """How often intervals hold the true value, and how often tests find what is not there.
 
-    python -m bench.intervals                     some minutes
-    python -m bench.intervals --times 100 --json
+    python -m bench intervals                     some minutes
+    python -m bench intervals --times 100 --json
 
 Wilson's interval is computed for every possible number of wins; all else is drawn by chance, with a fixed seed.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from functools import cache
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats  # type: ignore[import-untyped]
 
+from bench.command_line import make_parser
 from khala.experiment.statistics import (
     compare_paired_ratios,
     compare_paired_values,
@@ -124,9 +124,8 @@ def tables(times: int) -> Iterator[tuple[str, list[float]]]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--times", type=int, default=500, help="how often each is drawn")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args()
     if given.json:
         print(json.dumps({"games": GAMES, "shares": dict(tables(given.times))}))
@@ -135,7 +134,3 @@ def main() -> None:
     print(f"|---|{'---:|' * len(GAMES)}")
     for name, shares in tables(given.times):
         print(f"| {name} | {' | '.join(f'{100 * share:.1f} %' for share in shares)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,8 @@
 """Play full games of a scripted player against the computer's levels, and tabulate how many it wins.
 
-    python -m bench.ladder                                             three races, ECEB and SCEB, levels 1 to 4
-    python -m bench.ladder --levels very_easy hard --games 10 --jobs 2
-    python -m bench.ladder --tasks simple64_sceb_zerg --against terran --json
+    python -m bench ladder                                             three races, ECEB and SCEB, levels 1 to 4
+    python -m bench ladder --levels very_easy hard --games 10 --jobs 2
+    python -m bench ladder --tasks simple64_sceb_zerg --against terran --json
 
 A game has a seed of its own, the agents of its task in this process, and an observation and a reply for each of them at
 each step, as over the bus. The intervals are Wilson's, of 95 %. A game that reaches the task's `max_steps` is not won.
@@ -10,7 +10,6 @@ each step, as over the bus. The intervals are Wilson's, of 95 %. A game that rea
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import logging
@@ -22,6 +21,7 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import TYPE_CHECKING, get_args
 
+from bench.command_line import make_parser
 from khala.experiment.statistics import wilson
 from khala.playing import games
 from khala.playing.hosting import hosted
@@ -139,7 +139,7 @@ def _cell(played: Sequence[Game]) -> str:
 
 def main() -> int:
     """Play the games that the options describe, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--tasks", nargs="+", default=TASKS, metavar="TASK")
     parser.add_argument("--levels", nargs="+", default=LEVELS, choices=get_args(Difficulty), metavar="LEVEL")
     parser.add_argument("--against", nargs="+", default=[None], choices=get_args(Race), metavar="RACE")
@@ -147,7 +147,6 @@ def main() -> int:
     parser.add_argument("--games", type=int, default=1, help="number of games of each pairing")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first game of each pairing")
     parser.add_argument("--jobs", type=int, default=1, help="games at the same time, each in a process")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args()
     seeds = range(given.seed, given.seed + given.games)
     pairings = [Pairing(*each, given.player) for each in product(given.tasks, given.against, given.levels, seeds)]
@@ -158,7 +157,3 @@ def main() -> int:
             played.append(game)
     print(json.dumps([asdict(game) for game in played]) if given.json else "\n".join(table(played)))
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,11 +1,11 @@
 """How strong the computer players are: how they grow, and which level beats which.
 
-    python -m bench.opponents growth                            every level of every race at 1:30, 3, 5, 6 and 8 minutes
-    python -m bench.opponents growth --races terran --levels 1 7 --minutes 5
-    python -m bench.opponents ladder --race zerg --games 10     each pair of levels, one race against itself
-    python -m bench.opponents ladder --neighbours --games 10    each level against the one below it, nine match-ups
-    python -m bench.opponents ladder --pairs 7-8 --log won.jsonl     one pair; games in the file are not played again
-    python -m bench.opponents speed                             loops per second of a game with and without them
+    python -m bench opponents growth                            every level of every race at 1:30, 3, 5, 6 and 8 minutes
+    python -m bench opponents growth --races terran --levels 1 7 --minutes 5
+    python -m bench opponents ladder --race zerg --games 10     each pair of levels, one race against itself
+    python -m bench opponents ladder --neighbours --games 10    each level against the one below it, nine match-ups
+    python -m bench opponents ladder --pairs 7-8 --log won.jsonl     one pair; games in the file are not played again
+    python -m bench opponents speed                             loops per second of a game with and without them
 
 Straight on the engine, without the SC2 API. A pair plays each seed from both seats in turn. A game that is not over
 after `--minutes` goes to the side whose units and structures cost more, if it has a quarter more; else it is drawn.
@@ -28,6 +28,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from bench.command_line import make_parser
 from khala.experiment.statistics import wilson
 from khala_simulator.economy import supply
 from khala_simulator.maps.game_map import load_map
@@ -307,7 +308,7 @@ def speed(options: argparse.Namespace) -> Iterator[str]:
 
 def main() -> None:
     """Measure what the options ask for, and print it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("what", choices=("growth", "ladder", "speed"))
     parser.add_argument("--map", default="Melee/Simple64", help="as in the simulator's data")
     parser.add_argument("--race", default="terran", choices=RACES, help="of a ladder of one race")
@@ -321,7 +322,6 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0, help="of game time; 8 for growth, 20 for games")
     parser.add_argument("--seed", type=int, default=100, help="of the first game")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
     options = parser.parse_args()
     options.minutes = options.minutes or (20.0 if options.what == "ladder" else 8.0)
     if options.what == "speed":
@@ -338,7 +338,3 @@ def main() -> None:
         json.dump({"command": " ".join(sys.argv), "rows": [asdict(row) for row in rows]}, sys.stdout)
         return
     print("\n".join(lines))
-
-
-if __name__ == "__main__":
-    main()

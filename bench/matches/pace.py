@@ -8,12 +8,11 @@ again with four agents of 0.2 s. By agent, and for the steps of the host:
     late          answers that came past the deadline      past     how late steps began, in ms, median
 
 The exit code is not 0 if an answer of the agent that is quick in both matches, or a step, takes more than 1 ms longer
-at the median with slow agents beside it. Run `python -m bench.pace`; `--json` for one JSON object.
+at the median with slow agents beside it. Run `python -m bench pace`; `--json` for one JSON object.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import math
@@ -27,6 +26,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from khala.playing.local import play
 from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -162,9 +162,8 @@ def table(title: str, figures: Figures) -> Table:
 
 def main() -> None:
     """Measure both matches, print tables or a JSON object, and fail if the slow agents cost the quick one too much."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--game-s", type=float, default=GAME_S, help="length of a match, in seconds of the game")
-    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     found: dict[str, Figures] = {}
     for title, sleeps_s in {"mixed": SLEEPS_S, "all quick": SLEEPS_S[:1] * len(SLEEPS_S)}.items():
@@ -178,7 +177,3 @@ def main() -> None:
             Console(width=120).print(table(title, figures))
     if broken:
         raise SystemExit("\n".join(broken))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,8 @@
 """Play every scenario of the paper with scripted players, through `khala run`, and tabulate the results.
 
-    python -m bench.scenarios                              all 33 maps, skilled and focus-fire, one episode each
-    python -m bench.scenarios --tasks 'pvz_task1*' --episodes 5 --players skilled
-    python -m bench.scenarios --json                       one JSON object on stdout
+    python -m bench scenarios                              all 33 maps, skilled and focus-fire, one episode each
+    python -m bench scenarios --tasks 'pvz_task1*' --episodes 5 --players skilled
+    python -m bench scenarios --json                       one JSON object on stdout
 
 Host, agents and the scripted model are processes that talk over the bus, as in any other run. The table goes to
 `<out>/scenarios.md` as well, with a recording of every run next to it. The exit code is 1 if a run failed, or if a
@@ -11,7 +11,6 @@ player's reply had no valid action (class `malformed` or `unknown_action`): a sc
 
 from __future__ import annotations
 
-import argparse
 import fnmatch
 import json
 import subprocess
@@ -21,6 +20,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.command_line import make_parser
 from khala_orchestrator.config import all_tasks
 
 if TYPE_CHECKING:
@@ -103,13 +103,12 @@ def table(rows: Iterable[Row]) -> Iterator[str]:
 
 def main() -> int:
     """Play the tasks that the options name; print and write the table."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = make_parser(__doc__)
     options.add_argument("--tasks", default="*", metavar="PATTERN", help="only tasks whose names fit, such as 'pvz_*'")
     options.add_argument("--players", default=",".join(PLAYERS), help="scripted players, with commas between them")
     options.add_argument("--episodes", type=int, default=1, help="episodes of each task, with consecutive seeds")
     options.add_argument("--seed", type=int, default=1, help="seed of the first episode")
     options.add_argument("--out", type=Path, default=Path("runs/scenarios"), help="directory for table and recordings")
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = options.parse_args()
     names = scenarios(given.tasks)
     if not names:
@@ -127,7 +126,3 @@ def main() -> int:
     else:
         print(f"\n{given.out / 'scenarios.md'} has the table")
     return 1 if any(row.fault or set(SHAME) & row.rejections.keys() for row in rows) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ python -m bench serve [--orders 5] [--matches 4]
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import json
@@ -17,6 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bench.command_line import make_parser
 from khala.playing.matches import new
 from khala.playing.minds import Minds
 from khala.service import client
@@ -37,7 +37,7 @@ SETTLE_S = 20.0
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(prog="bench serve", description=__doc__)
+    options = make_parser(__doc__, json=False)
     options.add_argument("--orders", type=int, default=5)
     options.add_argument("--matches", type=int, default=4)
     options.add_argument("--task", default="2s3z_pair")
@@ -112,7 +112,3 @@ async def _over(bus: Bus, cards: list[MatchCard]) -> list[MatchCard]:
 
 def _spread(took: list[float]) -> str:
     return f"median {statistics.median(took):.2f} s, {min(took):.2f} to {max(took):.2f} s of {len(took)}"
-
-
-if __name__ == "__main__":
-    main()

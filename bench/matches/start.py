@@ -1,7 +1,7 @@
 """Measure what a match costs before its first observation: help, imports, a whole command, and memory.
 
-    python -m bench.start                        a table
-    python -m bench.start --times 9 --json       more repetitions; one JSON object
+    python -m bench start                        a table
+    python -m bench start --times 9 --json       more repetitions; one JSON object
 
 `cpu` is user and system time of the process and of all that it has waited for, `wall` the time on the clock; both are
 the least of some runs. On a busy machine only `cpu` and the numbers of modules can be compared. `first` is the time
@@ -11,7 +11,6 @@ once, at its highest while twelve agents play.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_protocol.keys import Topic, parse
 from khala_protocol.recording import Recording
@@ -137,9 +137,8 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--times", type=int, default=5, help="of each that is timed")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as directory:
         found = {
@@ -166,7 +165,3 @@ def show(found: Any) -> None:
         print(f"{row['process']:34} {row['pss_mb']:6} {row['rss_mb']:7}")
     total = sum(row["pss_mb"] for row in found["memory"])
     print(f"{f'all (goal {GOAL_MB} MB)':34} {total:6}")
-
-
-if __name__ == "__main__":
-    main()

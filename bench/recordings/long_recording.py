@@ -1,6 +1,6 @@
 """A recording as long as wanted, made of a short one that was played.
 
-    python -m bench.long_recording long.mcap --decisions 20000
+    python -m bench long_recording long.mcap --decisions 20000
 
 A match of `simple64_sceb` with pictures is played for `STEPS` steps against the scripted model; then its steps are
 written again and again, each time later in steps, game loops and wall time, until there are as many decisions as
@@ -10,13 +10,12 @@ show. Flushed after every step, as a host does it.
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.command_line import make_parser
 from bench.survival.processes import Processes
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recorded, Recorder, Recording
@@ -105,7 +104,7 @@ def _is(sample: Recorded, topic: Topic) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write one and print its size."""
-    parser = argparse.ArgumentParser(prog="bench.recordings.long_recording", description=__doc__.partition("\n")[0])
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("path", type=Path)
     parser.add_argument("--decisions", type=int, default=20_000)
     parser.add_argument("--of", type=Path, help="a recording that is there, instead of a match that is played first")
@@ -115,7 +114,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         done = lengthen(short, options.path, options.decisions)
     print(f"{done} decisions, {options.path.stat().st_size / 1e6:.0f} MB")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

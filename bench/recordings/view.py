@@ -1,6 +1,6 @@
 """The page of `khala view`: how soon it shows something, how quickly it follows, and what it costs.
 
-    python -m bench.view [open] [units] [live] [match] [--decisions 20000]
+    python -m bench view [open] [units] [live] [match] [--decisions 20000]
 
 open    a recording of many decisions (`bench.recordings.long_recording`), first without an index, then with one: seconds from the
         command to the address, and from there to the first map; then the milliseconds from a jump of the clock to the
@@ -14,14 +14,12 @@ match   what a page costs the match that it watches over the bus, if its process
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import json
 import os
 import random
 import statistics
-import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass
@@ -30,6 +28,7 @@ from typing import TYPE_CHECKING
 
 import psutil
 
+from bench.command_line import make_parser
 from bench.recordings.browser import Viewer, answer, browsing, steps_of, viewing
 from bench.recordings.long_recording import lengthen, played
 from bench.survival.processes import Processes, free_port
@@ -296,9 +295,7 @@ def _core(number: int) -> Iterator[None]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        prog="bench.recordings.view", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all of them, if none is named")
     parser.add_argument("--decisions", type=int, default=20_000)
     options = parser.parse_args(arguments)
@@ -322,7 +319,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _say(part: str, found: Opened | Frames | Lag | Cost) -> None:
     figures = {name: round(value, 2) if isinstance(value, float) else value for name, value in asdict(found).items()}
     print(part, json.dumps({name: value for name, value in figures.items() if value is not None}), flush=True)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

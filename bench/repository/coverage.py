@@ -1,4 +1,4 @@
-"""Coverage per package as a small table: `python -m bench.coverage .coverage.json --at-least 90 protocol agents`.
+"""Coverage per package as a small table: `python -m bench coverage .coverage.json --at-least 90 protocol agents`.
 
 It reads the JSON report of coverage.py; `make cover` makes and shows it. A package's figure is the share of its lines
 and of its branches together, as coverage.py counts them. It fails if a named package has less than it should.
@@ -6,10 +6,11 @@ and of its branches together, as coverage.py counts them. It fails if a named pa
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import Counter
 from pathlib import Path
+
+from bench.command_line import make_parser
 
 COUNTED = ("num_statements", "covered_lines", "num_branches", "covered_branches")
 
@@ -31,7 +32,7 @@ def share(counts: Counter[str]) -> float:
 
 def main() -> None:
     """Print the table; end with 1 if a package is below the threshold."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("report", type=Path)
     parser.add_argument("packages", nargs="*", help="packages that have to be covered")
     parser.add_argument("--at-least", type=float, default=0.0, metavar="PER_CENT")
@@ -45,7 +46,3 @@ def main() -> None:
     low = [name for name in options.packages if share(found[name]) < options.at_least]
     if low:
         raise SystemExit(f"less than {options.at_least:g} % is covered of {', '.join(low)}")
-
-
-if __name__ == "__main__":
-    main()

@@ -6,26 +6,26 @@
 * packed: assignments of several unlike values in one line
 * phrases: turns of phrase that have to be read twice, in docstrings, comments, texts and pages
 
-    python -m bench.house            the numbers, and their limits
-    python -m bench.house --where packed    each place of one kind
+    python -m bench house            the numbers, and their limits
+    python -m bench house --where packed    each place of one kind
 
 A number that shrank is written into `LIMITS`, so that it does not grow again.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
 import re
 import sys
 from collections import defaultdict
 from typing import TYPE_CHECKING, Final
 
+from bench.command_line import make_parser
 from bench.paths import ROOT
 
 if TYPE_CHECKING:
-    from pathlib import Path
     from collections.abc import Iterator
+    from pathlib import Path
 
 PACKAGES: Final = ("khala", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator")
 LIMITS: Final = {"classes": 78, "participles": 319, "one": 156, "packed": 134, "phrases": 0}
@@ -116,9 +116,7 @@ _FOUND: Final = {"participles": _is_participle, "one": _is_one, "packed": _is_pa
 
 def main() -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench.house", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--where", choices=LIMITS, help="list the places of one kind")
     given = parser.parse_args()
     if given.where:
@@ -131,9 +129,5 @@ def main() -> int:
         if number > limit:
             grown.append(kind)
     for kind in grown:
-        print(f"{kind} grew: `python -m bench.house --where {kind}` lists them", file=sys.stderr)
+        print(f"{kind} grew: `python -m bench house --where {kind}` lists them", file=sys.stderr)
     return 1 if grown else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

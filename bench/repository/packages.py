@@ -1,6 +1,6 @@
 """The size of an installation of each part: megabytes and packages, from wheels, in fresh environments.
 
-    python -m bench.packages
+    python -m bench packages
 
 The megabytes are those of `site-packages` before anything was compiled.
 """
@@ -43,7 +43,3 @@ def main() -> None:
         for part, distribution in PARTS.items():
             size_mb, names = measure(distribution, directory / "wheels", directory)
             print(f"{part:15} {size_mb:5.0f} MB  {len(names):3} packages: {', '.join(names)}")
-
-
-if __name__ == "__main__":
-    main()

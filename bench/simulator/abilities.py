@@ -1,7 +1,7 @@
 """Ask a game what its units can do, as every observation does, and measure how long that takes.
 
-    python -m bench.abilities            a table
-    python -m bench.abilities --json     one JSON object on stdout
+    python -m bench abilities            a table
+    python -m bench abilities --json     one JSON object on stdout
 
 The simulator runs in its own process, and PySC2 asks it over its websocket, as in a match: the base and the
 workers that a game of Simple64 begins with, plus 30 and 100 units of sixteen types. The time is that of
@@ -10,7 +10,6 @@ the question, its transport, its answer, and of reading it into a snapshot.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 import tempfile
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from s2clientprotocol import debug_pb2
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.game.game import GameConfig
@@ -87,8 +87,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the measurements."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
+    parser = make_parser(__doc__)
     arguments = parser.parse_args()
     rows = measure()
     if arguments.json:
@@ -97,7 +96,3 @@ def main() -> None:
     print(f"{'own units':>10}{'abilities':>11}{'median ms':>11}{'p95 ms':>9}")
     for row in rows:
         print(f"{row['units']:>10}{row['abilities']:>11}{row['median_ms']:>11}{row['p95_ms']:>9}")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,7 @@ vector, and whether the target is in reach. Each way runs in a process of its ow
 20 and for 200 fighters (medians of CPU time, in us), how long it takes until the first result (import, and for numba
 compiling or reading its cache), and the memory that this adds, in MB. All results must be equal to the last bit.
 
-    python -m bench.compilers
+    python -m bench compilers
 
 installs numba, mypy and Cython into an environment of its own first.
 """
@@ -152,7 +152,3 @@ def main() -> None:
     Console().print(table)
     if any(row["result"] != rows["numpy"]["result"] for row in rows.values()):
         sys.exit("the results differ")
-
-
-if __name__ == "__main__":
-    main()

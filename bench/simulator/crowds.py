@@ -1,8 +1,8 @@
 """How crowds move and fight in the simulator: who comes into reach, how soon, and that no side is favoured.
 
-    python -m bench.crowds                      every experiment
-    python -m bench.crowds --picture FILE       three moments of the first one instead, as a picture
-    python -m bench.crowds --mirrors 500        fights of equal armies instead: who wins, by side, owner and order
+    python -m bench crowds                      every experiment
+    python -m bench crowds --picture FILE       three moments of the first one instead, as a picture
+    python -m bench crowds --mirrors 500        fights of equal armies instead: who wins, by side, owner and order
 
 What must come out follows from perimeters. A melee unit of radius r and range R reaches a target of radius t when their
 centres are r + t + R apart, and stands s, its separation radius, away from others: round one target fit
@@ -17,7 +17,6 @@ that all of them cover shoulder to shoulder. Units that walk in single file at s
 
 from __future__ import annotations
 
-import argparse
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -28,6 +27,7 @@ import cv2
 import numpy as np
 from rich.console import Console
 
+from bench.command_line import make_parser
 from khala.experiment.statistics import wilson
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, lifecycle
@@ -460,7 +460,7 @@ def report(title: str, runs: list[dict[str, float]], console: Console) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--runs", type=int, default=10, help="seeds of each experiment")
     parser.add_argument("--mirrors", type=int, default=0, help="play so many fights of equal armies instead")
     parser.add_argument("--picture", type=Path, help="write three moments of the first experiment to this file instead")
@@ -496,7 +496,3 @@ def main() -> None:
     for name in () if options.only else ("Zergling", "Immortal", "Roach", "Archon", "Ultralisk", "SiegeTank", "Thor"):
         gaps = [cells for cells in (1, 2, 3) if walls(name, cells)]
         console.print(f"{name:20} passes gaps of {gaps} cells")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,16 +1,15 @@
 """The compiled engine against the interpreted one, in one run: how many times as many game loops it plays.
 
-    python -m bench.engines                     a table
-    python -m bench.engines --rounds 5          each engine plays five times, in turns
-    python -m bench.engines --json              one JSON object on stdout
+    python -m bench engines                     a table
+    python -m bench engines --rounds 5          each engine plays five times, in turns
+    python -m bench engines --json              one JSON object on stdout
 
-Each round is `python -m bench.simulator_engine` in a process of its own, once with KHALA_ENGINE=compiled and once with
+Each round is `python -m bench simulator_engine` in a process of its own, once with KHALA_ENGINE=compiled and once with
 KHALA_ENGINE=python, so that a noisy machine treats both the same. Without a compiled engine nothing is measured.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -18,6 +17,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any, Final
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_simulator.native.engine import VARIABLE
 
@@ -85,10 +85,9 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the ratios."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--rounds", type=int, default=3, help="how often each engine plays")
     parser.add_argument("--seconds", type=float, default=1.0, help="processor time of a battle")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args()
     found = measure(given.rounds, given.seconds)
     if given.json:
@@ -101,7 +100,3 @@ def main() -> None:
     for name, loops in found["loops_per_s"].items():
         middles = [statistics.median(loops[engine]) for engine in ENGINES]
         print(f"{name:<20}" + "".join(f"{value:>10.0f}" for value in middles) + f"{middles[0] / middles[1]:>10.2f}")
-
-
-if __name__ == "__main__":
-    main()

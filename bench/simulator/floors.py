@@ -1,8 +1,8 @@
 """The simulator against a server that answers at once: how many times as long a step of its clients takes.
 
-    python -m bench.floors                                       a table
-    python -m bench.floors layers:2s3z:8 --rounds 5 --steps 300  interface:map:loops, as in bench.simulator_env
-    python -m bench.floors --json                                one JSON object on stdout
+    python -m bench floors                                       a table
+    python -m bench floors layers:2s3z:8 --rounds 5 --steps 300  interface:map:loops, as in bench.simulator_env
+    python -m bench floors --json                                one JSON object on stdout
 
 In each round a battle is played on the simulator, and again with a server that repeats its answers. What that takes is
 the client's own; a ratio of 1 would be a simulator that costs nothing, at 1.5 a third of a step is the simulator's. The
@@ -11,7 +11,6 @@ ratio is of processor time of client and server together, which other programs d
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -22,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from absl import flags
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.simulator.at_once import floor
 from bench.simulator.simulator_env import Measured, measure_env, setting_of
@@ -68,11 +68,10 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the ratios."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("settings", nargs="*", default=list(LIMITS), help="interface:map:loops per step")
     parser.add_argument("--rounds", type=int, default=ROUNDS)
     parser.add_argument("--steps", type=int, default=STEPS, help="of a battle")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args()
     found = measure(given.settings, given.rounds, given.steps)
     if given.json:
@@ -82,7 +81,3 @@ def main() -> None:
     for setting, row in found.items():
         rate, ours, least = (statistics.median(row[name]) for name in ("steps_per_s", "cpu_ms", "floor_cpu_ms"))
         print(f"{setting:<24}{rate:>12.0f}{ours:>12.2f}{least:>12.2f}{ours / least:>12.2f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -2,12 +2,11 @@
 
 Every row is measured on a melee base of the map, at both starts. A trip takes the time at the field, the wait after it
 and two walks that begin and end at rest: ``2 * sqrt(way / acceleration)`` each, where the way is the distance of the
-centres less both radii and the worker's body. Run ``python -m bench.mining``, with ``--json`` for one JSON object.
+centres less both radii and the worker's body. Run ``python -m bench mining``, with ``--json`` for one JSON object.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import sys
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.economy import melee_start
@@ -126,8 +126,7 @@ def fields(name: str, minutes: int) -> Rows:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of tables")
+    parser = make_parser(__doc__)
     parser.add_argument("--map", default="Simple64", help="a melee map")
     parser.add_argument("--minutes", type=int, default=3, help="game minutes of each measurement")
     options = parser.parse_args()
@@ -141,7 +140,3 @@ def main() -> None:
         for name, row in part.items():
             table.add_row(name, *(f"{value:.1f}" for value in row.values()))
         Console().print(table)
-
-
-if __name__ == "__main__":
-    main()

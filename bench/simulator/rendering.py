@@ -1,7 +1,7 @@
 """The cost of rendered images: milliseconds of CPU per frame of the screen and of the minimap, while two armies fight.
 
-    python -m bench.rendering                a table
-    python -m bench.rendering --json         one JSON object on stdout
+    python -m bench rendering                a table
+    python -m bench rendering --json         one JSON object on stdout
 
 Two armies of several types meet in the middle of an open map, all of them in the camera's view; each loop is painted.
 The first frame, in which the ground and every look are painted for the first time, is reported separately.
@@ -9,7 +9,6 @@ The first frame, in which the ground and every look are painted for the first ti
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import statistics
@@ -22,6 +21,7 @@ from rich.table import Table
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
+from bench.command_line import make_parser
 from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.layers import Frame
 from khala_simulator.maps.game_map import load_map
@@ -90,9 +90,8 @@ def measure(screen: int, units: int) -> dict[str, float]:
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description="Measure rendered images.")
+    parser = make_parser(__doc__)
     parser.add_argument("--units", type=int, default=80, help="units at the start; some die")
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     results = [measure(size, arguments.units) for size in SIZES]
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -106,7 +105,3 @@ def main() -> None:
         table.add_row(size, units, *times)
     Console().print(table)
     print(f"largest memory of the process: {memory_mb:.0f} MB")
-
-
-if __name__ == "__main__":
-    main()

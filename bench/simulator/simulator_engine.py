@@ -3,12 +3,11 @@
 Some shipped maps are played with both sides on attack-move, restarted with the next seed when they end; then armies of
 10 to 400 units meet on an open map, which shows how the cost grows: `us per unit` is the mean time of a loop per
 unit alive in it. `MB` is the memory of the process at the end of a row. Run
-``python -m bench.simulator_engine``, with ``--json`` for one JSON object.
+``python -m bench simulator_engine``, with ``--json`` for one JSON object.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
@@ -107,8 +107,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
+    parser = make_parser(__doc__)
     parser.add_argument("--seconds", type=float, default=2.0, help="CPU seconds per row")
     parser.add_argument("--maps", nargs="*", default=list(MAPS), help="maps to play; none: only the armies")
     parser.add_argument("--sizes", nargs="*", type=int, default=list(ARMY_SIZES), help="units in the open battles")
@@ -134,7 +133,3 @@ def main() -> None:
         cells = (row[name] for name in names)
         table.add_row(name.rpartition("/")[2], *(f"{cell:g}" for cell in cells))
     Console().print(table)
-
-
-if __name__ == "__main__":
-    main()

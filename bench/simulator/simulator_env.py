@@ -1,9 +1,9 @@
 """Play battles on the simulator through PySC2, and measure the cost of a step and of its parts.
 
-    python -m bench.simulator_env                     a table
-    python -m bench.simulator_env --json              one JSON object on stdout
-    python -m bench.simulator_env layers:2s3z:8       one row: interface, map and game loops per step
-    python -m bench.simulator_env --floor             also what the client makes of a server that answers at once
+    python -m bench simulator_env                     a table
+    python -m bench simulator_env --json              one JSON object on stdout
+    python -m bench simulator_env layers:2s3z:8       one row: interface, map and game loops per step
+    python -m bench simulator_env --floor             also what the client makes of a server that answers at once
 
 With `layers` it is `SC2Env` with feature layers of 128 and 64 pixels, raw units and feature units, as LLM-PySC2 plays.
 With `raw` it is PySC2's controller with the raw interface alone, as SMAC plays; `smac_speed.py` measures SMAC itself.
@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 from absl import flags
 from s2clientprotocol import sc2api_pb2 as sc
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.simulator.at_once import floor
 from bench.simulator.env_games import (
@@ -182,8 +183,7 @@ def measures(found: Mapping[str, Mapping[str, Any]]) -> Iterator[Figure]:
 
 def main() -> None:
     """Print one line per setting."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
+    parser = make_parser(__doc__)
     parser.add_argument(
         "--floor", action="store_true", help="also the steps a second with a server that answers at once"
     )
@@ -205,7 +205,3 @@ def main() -> None:
     for name, row in rows.items():
         cells = ("" if value is None else f"{value:.2f}" for value in row.values())
         print(f"{name:<28}" + "".join(f"{cell:>9}" for cell in cells))
-
-
-if __name__ == "__main__":
-    main()

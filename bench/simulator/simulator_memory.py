@@ -1,7 +1,7 @@
 """How much memory a game process holds, from its start over many games, and how soon it returns its first observation.
 
-    python -m bench.simulator_memory                a table
-    python -m bench.simulator_memory --games 20     fewer games
+    python -m bench simulator_memory                a table
+    python -m bench simulator_memory --games 20     fewer games
 
 PySC2 restarts each game (`SC2Env.reset`) and plays it for some steps with all feature layers; then the resident
 memory of the game process is read. `growth` is the difference between the end and the tenth game: caches have
@@ -11,7 +11,6 @@ wait for a connection.
 
 from __future__ import annotations
 
-import argparse
 import os
 import tempfile
 import time
@@ -20,6 +19,7 @@ from typing import Any
 
 from absl import flags
 
+from bench.command_line import make_parser
 from bench.simulator.env_games import make_env
 from khala_bridge.compat import actions
 from khala_simulator.process.install import install
@@ -56,7 +56,7 @@ def measure(name: str, games: int) -> tuple[float, list[float]]:
 
 def main() -> None:
     """Print one line per map."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--games", type=int, default=100, help="how many games each process plays")
     parser.add_argument("--maps", nargs="+", default=["2s3z", "2c_vs_64zg"], help="maps of llm_smac")
     options = parser.parse_args()
@@ -69,7 +69,3 @@ def main() -> None:
             start_s, held = measure(name, options.games)
             growth = held[-1] - held[min(SETTLED, len(held) - 1)]
             print(f"{name:<12} {start_s:8.2f} {held[0]:9.1f} {held[-1]:8.1f} {growth:10.1f}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

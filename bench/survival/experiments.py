@@ -1,7 +1,7 @@
 """Experiments under attack: a runner that is killed, and an endpoint that charges and refuses.
 
-    python -m bench.experiments kills --kills 5     SIGKILL the runner in the middle, and resume until all is played
-    python -m bench.experiments money --usd 0.25    a third of the requests get 429, the others are charged
+    python -m bench experiments kills --kills 5     SIGKILL the runner in the middle, and resume until all is played
+    python -m bench experiments money --usd 0.25    a third of the requests get 429, the others are charged
 
 `kills` compares every number of every match, but for wall times, with the same experiment that nobody disturbed.
 `money` compares what the endpoint charged with the cap, and the pilot's estimate with what a whole experiment cost.
@@ -10,7 +10,6 @@ The exit code is 1 if a table differs, the cap was exceeded, or the estimate is 
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import json
@@ -25,6 +24,7 @@ from typing import Any
 
 from aiohttp import web
 
+from bench.command_line import make_parser
 from khala.experiment.commands import words_of
 from khala.experiment.engine import Local
 from khala.experiment.plan import plan
@@ -197,7 +197,7 @@ async def _account(file: Path, out: Path, cap_usd: float | None, pilot: int, slo
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("what", choices=["kills", "money"])
     parser.add_argument("--kills", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1, help="of the moments of the kills")
@@ -211,7 +211,3 @@ def main() -> int:
             found = asyncio.run(money(given.usd))
     print(found)
     return 0 if found.is_good else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

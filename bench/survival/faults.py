@@ -1,8 +1,8 @@
 """Break a running match in every way that is known, and look in its recording whether the turn held.
 
-    python -m bench.faults                         1 000 faults of every kind
-    python -m bench.faults --routers 100           restarts of the router alone, with agents that answer at once
-    python -m bench.faults --faults 300 --seed 7   fewer, others
+    python -m bench faults                         1 000 faults of every kind
+    python -m bench faults --routers 100           restarts of the router alone, with agents that answer at once
+    python -m bench faults --faults 300 --seed 7   fewer, others
 
 Host, game, router and the two agents are processes of their own; each link goes through a relay that can cut it. The
 agents ask a scripted model that fails for a part of the requests, and a saboteur on the bus answers in their names:
@@ -16,7 +16,6 @@ be held only while a fault takes someone away (`AWAY`).
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import json
@@ -37,6 +36,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.survival.processes import Processes, free_port, until_listening
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
@@ -635,12 +635,11 @@ def measure(
 
 def main() -> None:
     """Measure, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--faults", type=int, default=1000)
     parser.add_argument("--routers", type=int, metavar="N", help="restart the router N times, and nothing else")
     parser.add_argument("--only", nargs="+", metavar="KIND", help="of the faults that take time, only these")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
     verdict = measure(arguments.faults, arguments.routers, arguments.seed, arguments.only)
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(verdict))
@@ -648,7 +647,3 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(verdict.__dict__, default=list))
     raise SystemExit(0 if verdict.is_good() else 1)
-
-
-if __name__ == "__main__":
-    main()

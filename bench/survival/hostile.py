@@ -1,8 +1,8 @@
 """Give the host what no well-meaning agent sends, and look whether it fails, slows down or passes it on.
 
-    python -m bench.hostile                                            100 000 replies and 20 000 frames
-    python -m bench.hostile --replies 1000000 --frames 100000 --processes 2
-    python -m bench.hostile --json                                     one JSON object on stdout
+    python -m bench hostile                                            100 000 replies and 20 000 frames
+    python -m bench hostile --replies 1000000 --frames 100000 --processes 2
+    python -m bench hostile --json                                     one JSON object on stdout
 
 Replies are mutated ones of the corpora in `tests`, and mixtures of the tokens of the language. Each is read and acted
 on as by a match, at a real observation of a task; then the length of the next observations is measured, its own and
@@ -13,7 +13,6 @@ long, writes a line that looks like a heading, or leaves memory behind.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import multiprocessing
@@ -29,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from bench.command_line import make_parser
 from bench.paths import GOLDEN, TESTS
 from khala_bridge.act import Actor
 from khala_bridge.game.game import GameConfig
@@ -352,12 +352,11 @@ def run(trial: Callable[[int, int], Verdict], count: int, seed: int, processes: 
 
 def main() -> None:
     """Print the figures."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = make_parser(__doc__)
     options.add_argument("--replies", type=int, default=100_000)
     options.add_argument("--frames", type=int, default=20_000)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--processes", type=int, default=2)
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
     chosen = options.parse_args()
     trials: dict[
         str, tuple[Callable[[int, int], Verdict], int]
@@ -385,7 +384,3 @@ def _print(name: str, verdict: Verdict) -> None:
     print(f"    memory {verdict.left_mb:+.1f} MB; exceptions {verdict.exceptions.total()}")
     for what, number in verdict.exceptions.most_common(20):
         print(f"        {number} {what}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,8 @@
 """Read files that are made to do harm: mutated task, model and agents files, scenarios of maps, and recordings.
 
-    python -m bench.hostile_files                                              3000 of each
-    python -m bench.hostile_files --files 10000 --recordings 10000 --seed 7
-    python -m bench.hostile_files --json                                       one JSON object on stdout
+    python -m bench hostile_files                                              3000 of each
+    python -m bench hostile_files --files 10000 --recordings 10000 --seed 7
+    python -m bench hostile_files --json                                       one JSON object on stdout
 
 Every file is read, or refused by an error of one sentence, a `KhalaError` or a `ScenarioError`. Anything else is
 counted, and printed with the seed of its case: another exception, a case of more than 250 ms of CPU, more than 300 MB
@@ -11,7 +11,6 @@ of memory. The exit code is then 1.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import random
@@ -29,6 +28,7 @@ from typing import TYPE_CHECKING
 import yaml
 from rich.console import Console
 
+from bench.command_line import make_parser
 from bench.paths import GOLDEN
 from khala_agents.config import AgentsFile, ModelConfig
 from khala_bridge.task.config import TaskConfig
@@ -361,11 +361,10 @@ def resident_mb() -> float:
 
 def main() -> None:
     """Print what happened; end with 1 if anything did that must not."""
-    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    options = make_parser(__doc__)
     options.add_argument("--files", type=int, default=3000)
     options.add_argument("--recordings", type=int, default=3000)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--json", action="store_true")
     given = options.parse_args()
     before_mb = resident_mb()
     tallies = measure(given.files, given.recordings, given.seed)
@@ -390,7 +389,3 @@ def main() -> None:
         for text, times in Counter(violations).most_common(40):
             print(f"  {times} x {text}" if times > 1 else f"  {text}")
     sys.exit(bool(violations))
-
-
-if __name__ == "__main__":
-    main()

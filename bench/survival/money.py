@@ -1,9 +1,9 @@
 """Ask an endpoint that counts what it bills until a budget is used up, and hold what it billed against the cap.
 
-    python -m bench.money                              all kinds of trouble, caps of 0.05, 0.30 and 1.00, 1 and 8 jobs
-    python -m bench.money --kind late --cap 0.3        some of them
-    python -m bench.money --experiment                 whole experiments in place of single agents, N matches at once
-    python -m bench.money --json                       one JSON object on stdout
+    python -m bench money                              all kinds of trouble, caps of 0.05, 0.30 and 1.00, 1 and 8 jobs
+    python -m bench money --kind late --cap 0.3        some of them
+    python -m bench money --experiment                 whole experiments in place of single agents, N matches at once
+    python -m bench money --json                       one JSON object on stdout
 
 Each job is an agent with a ledger of its own on the same file, as processes of a match have; the clients, limits and
 retries are the real ones. The endpoint bills every answer that it began to write, whether or not it arrived, by a
@@ -16,7 +16,6 @@ rest was held for requests of which nobody knows what they cost. Seen: docs/meas
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import itertools
 import json
@@ -29,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from aiohttp import web
 
+from bench.command_line import make_parser
 from bench.paths import GOLDEN
 from bench.tables import print_table
 from khala_agents.build import Workshop
@@ -324,14 +324,11 @@ def _scene() -> tuple[Briefing, Observation]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench.money", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__)
     parser.add_argument("--kind", action="append", choices=KINDS, help="only these kinds of trouble")
     parser.add_argument("--cap", action="append", type=float, help="only these caps, in US dollars")
     parser.add_argument("--jobs", action="append", type=int, help="only these numbers of agents at once")
     parser.add_argument("--experiment", action="store_true", help="play experiments, with so many matches at once")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     given = parser.parse_args(arguments)
     logging.disable(logging.ERROR)
     rows = []
@@ -352,7 +349,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ],
         )  # fmt: skip
     return 0 if all(row.kept for row in rows) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,13 +1,12 @@
 """How long the processes of a match live after their host is killed, at random moments after it started the first one.
 
-    python -m bench.orphans --kills 20
+    python -m bench orphans --kills 20
 
 Every process is found by its environment, in `/proc`: Linux only. The exit code is 1 if one was left after `GONE_S`.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -20,6 +19,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from bench.command_line import make_parser
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,10 +86,9 @@ def is_good(found: Sequence[Killed], gone_s: float = GONE_S) -> bool:
 
 def main() -> None:
     """Measure, and print each kill and the summary, or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     arguments = parser.parse_args()
     found = measure(arguments.kills, arguments.seed)
     gone_s = [killed.gone_s for killed in found]
@@ -100,7 +100,3 @@ def main() -> None:
         print(f"killed after {killed.after_s:5.2f} s: {killed.children} children, gone after {killed.gone_s:.2f} s")
     print(f"{len(found)} kills: median {statistics.median(gone_s):.2f} s, longest {max(gone_s):.2f} s")
     raise SystemExit(code)
-
-
-if __name__ == "__main__":
-    main()

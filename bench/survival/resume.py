@@ -1,6 +1,6 @@
 """Kill the host of a match at random moments, and look whether the match ends as if nothing had happened.
 
-    python -m bench.resume --kills 20
+    python -m bench resume --kills 20
 
 Host, agents, scripted model and router are processes of their own; agents and router stay. Each match is killed
 `KILLS_A_MATCH` times, and resumed with `khala host --resume`. In half of the matches the host is its own router, so
@@ -12,7 +12,6 @@ memory that were started again meanwhile. The exit code is 1 if a match was not 
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import hashlib
@@ -29,6 +28,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.survival.processes import Processes, free_port, until_listening
 from khala.playing.local import shares
 from khala.testing import replay_host
@@ -336,11 +336,10 @@ def table(found: Sequence[Kill]) -> Table:
 
 def main() -> None:
     """Measure, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--only", nargs="+", metavar="CASE", choices=sorted({case.name for case in cases(20)}))
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
     resumed = asyncio.run(measure(arguments.kills, arguments.seed, arguments.only))
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(resumed.kills))
@@ -354,7 +353,3 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(asdict(resumed)))
     raise SystemExit(0 if resumed.is_good else 1)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """Many decisions in a row over the real bus: what grows, and what slows down.
 
-    python -m bench.soak --decisions 20000 --agents 8
+    python -m bench soak --decisions 20000 --agents 8
 
 Host, game and two processes of agents, which decide by a function that orders nothing: all that is left is what Khala
 itself does. The match has ten episodes of the same length; after each of them the memory of every process and the size
@@ -11,7 +11,6 @@ overhead grew by more than `MOST_GROWTH`, or a process by more than `MOST_GROWN_
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import statistics
@@ -25,6 +24,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.survival.orphans import processes_of
 from bench.survival.processes import Processes, free_port
 from khala.playing.local import shares
@@ -183,10 +183,9 @@ def table(soaked: Soaked) -> Table:
 
 def main() -> None:
     """Measure, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--decisions", type=int, default=20_000)
     parser.add_argument("--agents", type=int, default=8)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
     soaked = asyncio.run(measure(arguments.decisions, arguments.agents))
     Console(file=sys.stderr if arguments.json else sys.stdout, width=120).print(table(soaked))
@@ -197,7 +196,3 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(asdict(soaked)))
     raise SystemExit(0 if soaked.is_good() else 1)
-
-
-if __name__ == "__main__":
-    main()

@@ -6,7 +6,7 @@ agent Mallory, which has a seat in the match and plays in another process, too. 
 what reached the host or an agent under a name that is not Mallory's; "late" are steps of honest agents without a reply
 in time.
 
-Run `python -m bench.strangers`; `--router` puts a router process's rules between, `--json` for one JSON object.
+Run `python -m bench strangers`; `--router` puts a router process's rules between, `--json` for one JSON object.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from rich.table import Table
 from zenoh.handlers import Callback
 
 from bench import paths
+from bench.command_line import make_parser
 from bench.turns.bus import open_raw
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
@@ -522,13 +523,12 @@ def table(rows: Sequence[Row]) -> Table:
 
 def main() -> None:
     """Attack, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--only", nargs="+", choices=list(ATTACKS), default=list(ATTACKS), metavar="ATTACK")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long a flood lasts")
     parser.add_argument("--listen", default="tls/127.0.0.1:0", help="where the match listens")
     parser.add_argument("--through", nargs="+", default=[], help="command before that of the attacker")
     parser.add_argument("--router", action="store_true", help="the host is a client of a separate router")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     for hidden in ("--attack", "--endpoint", "--keys"):
         parser.add_argument(hidden, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -543,7 +543,3 @@ def main() -> None:
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:
         print(json.dumps({"rows": [asdict(one) for one in rows]}))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """Make commands of replies of about 2 kB, and measure the time from the text to the checked commands.
 
-    python -m bench.act            a table
-    python -m bench.act --json     one JSON object on stdout
+    python -m bench act            a table
+    python -m bench act --json     one JSON object on stdout
 
 One agent has five teams of four units and may use every text action of the catalogue, including other races'.
 The game has reported what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:
@@ -12,7 +12,6 @@ processor: nothing waits here, and other programs disturb them less.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 import time
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.catalogue import catalogue
@@ -146,8 +146,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the figures."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    options = make_parser(__doc__)
     given = options.parse_args()
     results = {"right": measure(CALLS), "wrong": measure(WRONG)}
     if given.json:
@@ -157,7 +156,3 @@ def main() -> None:
     print("  ".join(f"{column:>12}" for column in ("reply", *columns)))
     for name, result in results.items():
         print("  ".join(f"{value:>12}" for value in (name, *(result[column] for column in columns))))
-
-
-if __name__ == "__main__":
-    main()

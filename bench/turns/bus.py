@@ -1,8 +1,8 @@
 """One joint round over the bus: the host sends every agent an observation, and every agent replies.
 
-    python -m bench.bus                      a table
-    python -m bench.bus --tls                the same over TLS, next to it
-    python -m bench.bus --json               one JSON object on stdout
+    python -m bench bus                      a table
+    python -m bench bus --tls                the same over TLS, next to it
+    python -m bench bus --json               one JSON object on stdout
 
 It compares, in turns of a few rounds so that a noisy machine treats them the same:
     bus    `khala_protocol.bus`: observations as STATE, replies as SPEECH
@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import zenoh
 from zenoh.handlers import Callback
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig, settings
@@ -383,14 +384,13 @@ def row(result: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--agents", type=int, nargs="+", default=[1, 8, 32, 128])
     parser.add_argument("--workers", type=int, default=2, help="processes that the agents are spread over")
     parser.add_argument("--observation-bytes", type=int, default=20_000)
     parser.add_argument("--reply-bytes", type=int, default=2_000)
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the number of rounds")
     parser.add_argument("--tls", action="store_true", help="measure over TLS as well, with keys made for it")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     parser.add_argument("--process", nargs="+", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.process:
@@ -404,7 +404,3 @@ def main() -> None:
         result = asyncio.run(run(arguments))
     if arguments.json:
         print(json.dumps(result))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """The cost of a request to a model on this machine: many at once on one loop, each over its own client.
 
-    python bench/turns/http_client.py                 a table
-    python bench/turns/http_client.py --json          one JSON object on stdout
+    python -m bench http_client                 a table
+    python -m bench http_client --json          one JSON object on stdout
 
 The endpoint is `khala llm` in its own process, on the same cores. It compares a plain `httpx.AsyncClient`, one
 over the transport that agents use, and an agent's whole client (prompt to bytes, bytes to completion). Medians of the
@@ -10,7 +10,6 @@ rounds after the first; CPU time is that of this process alone.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import statistics
@@ -23,6 +22,7 @@ from typing import TYPE_CHECKING
 
 import httpx
 
+from bench.command_line import make_parser
 from khala_agents.llm.client import Request
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
@@ -90,10 +90,9 @@ async def compare(base_url: str, count: int, rounds: int) -> list[Row]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = make_parser(__doc__)
     parser.add_argument("--calls", type=int, nargs="+", default=[1, 8, 32, 128], help="requests at once")
     parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     options = parser.parse_args()
     command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
@@ -110,7 +109,3 @@ def main() -> None:
     print(f"{'client':26}{'at once':>8}{'over latency, ms':>18}{'CPU a call, ms':>16}")
     for row in rows:
         print(f"{row.client:26}{row.calls_at_once:8}{row.over_latency_ms:18.1f}{row.cpu_ms_per_call:16.2f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """Draw pictures of battles on the simulator, and measure the cost of one, from a snapshot to bytes.
 
-    python -m bench.image            a table
-    python -m bench.image --json     one JSON object on stdout
+    python -m bench image            a table
+    python -m bench image --json     one JSON object on stdout
 
 A game is played for 40 decisions, all units attacking; then each picture is made of each of its snapshots, 512 pixels
 large, with marks. `ms` is the median and `p95 ms` the 95th percentile of the time for one picture, with everything
@@ -12,7 +12,6 @@ screen. The aim is 5 ms.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import statistics
@@ -22,6 +21,7 @@ from typing import Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.command_line import make_parser
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.names import unit_name
@@ -101,8 +101,7 @@ def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    options = make_parser(__doc__)
     results = {}
     for battle, map_name in BATTLES.items():
         snapshots = play(map_name)
@@ -115,7 +114,3 @@ def main() -> None:
     for battle, by_name in results.items():
         for name, row in by_name.items():
             print(f"{battle:>12}  {name:>22}  " + "  ".join(f"{row[column]:>9}" for column in columns))
-
-
-if __name__ == "__main__":
-    main()

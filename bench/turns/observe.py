@@ -1,7 +1,7 @@
 """Make observations and joint actions of armies, and measure the cost of a turn between PySC2 and the bus.
 
-    python -m bench.observe            a table
-    python -m bench.observe --json     one JSON object on stdout
+    python -m bench observe            a table
+    python -m bench observe --json     one JSON object on stdout
 
 `observe` is everything from a snapshot to views and text of one agent with its teams, all units in sight of all
 teams, half of them hurt since the turn before. `unseen` is what a snapshot costs at which no agent looks. `act` is
@@ -14,7 +14,6 @@ every team sees all of them, and at four places, as in a fight of many fronts. T
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import statistics
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.functions import general
@@ -214,8 +214,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    options = make_parser(__doc__)
     given = options.parse_args()
     results = {name: measure(name) for name in BATTLES}
     results |= {"12 in one place": measure_full_game(1), "12 at four": measure_full_game(4)}
@@ -226,7 +225,3 @@ def main() -> None:
     print("  ".join(f"{column:>16}" for column in ("battle", *columns)))
     for name, result in results.items():
         print("  ".join(f"{value:>16}" for value in (name, *(result[column] for column in columns))))
-
-
-if __name__ == "__main__":
-    main()

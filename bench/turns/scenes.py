@@ -1,9 +1,9 @@
 """The cost of the map for those who watch: time of a step without scenes, with what the sides see, with the whole map.
 
-    python -m bench.scenes                            2s3z, and a whole game
-    python -m bench.scenes simple64_sceb --steps 600
-    python -m bench.scenes --think 0.05               agents that take 50 ms, during which a scene is made
-    python -m bench.scenes --json                     one JSON object on stdout
+    python -m bench scenes                            2s3z, and a whole game
+    python -m bench scenes simple64_sceb --steps 600
+    python -m bench scenes --think 0.05               agents that take 50 ms, during which a scene is made
+    python -m bench scenes --json                     one JSON object on stdout
 
 The steps of one match take turns, so that all three are measured on the same armies and with the same load of the
 machine. Host, texts and game are those of a match, scenes are encoded and recorded; there is no bus. The agents answer
@@ -12,7 +12,6 @@ in this process; how long `skilled` decides is not counted, only what they are s
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import logging
@@ -27,6 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.command_line import make_parser
 from khala.playing.hosting import game_of
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -145,12 +145,11 @@ def measure(name: str, steps: int, think_s: float, seed: int) -> dict[str, Any]:
 
 def main() -> None:
     """Measure, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("tasks", nargs="*", default=["2s3z", "simple64_sceb"])
     parser.add_argument("--steps", type=int, default=300)
     parser.add_argument("--think", type=float, default=0.0, help="seconds that agents think in each step")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     logging.disable(logging.WARNING)  # PySC2 warns of abilities that it has no names for
     rows = [measure(task, options.steps, options.think, options.seed) for task in options.tasks]
@@ -162,7 +161,3 @@ def main() -> None:
             f"{name} {value:.1f}" if isinstance(value, float) else f"{name} {value}" for name, value in row.items()
         )
         sys.stdout.write("  ".join(cells) + "\n")
-
-
-if __name__ == "__main__":
-    main()

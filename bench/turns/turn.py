@@ -8,12 +8,11 @@ first implementation: threads that poll (`bench.turns.original`). The parts are 
     bus       the way to it and back, with coding               merge    speech, recognition and translation of all
     agent     prompt, parsing and sending, without HTTP         build    views and texts of all agents, within `before`
 
-Run `python -m bench.turn`; `--json` for one JSON object.
+Run `python -m bench turn`; `--json` for one JSON object.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import json
@@ -30,6 +29,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.turns.original import step_s
 from khala.playing import games
@@ -312,13 +312,12 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Measure, and print a table or a JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = make_parser(__doc__)
     parser.add_argument("--agents", type=int, nargs="+", default=list(GOALS_MS))
     parser.add_argument("--steps", type=int, default=10, help="100 or more for a 99th percentile that means something")
     parser.add_argument("--original-steps", type=int, default=8)
     parser.add_argument("--tcp", action="store_true", help="over loopback TCP instead of a unix socket")
     parser.add_argument("--tls", action="store_true", help="measure over TLS as well, with keys made for it")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout; the table goes to stderr")
     arguments = parser.parse_args()
     measured = asyncio.run(
         measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp, tls=arguments.tls)
@@ -327,7 +326,3 @@ def main() -> None:
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:
         print(json.dumps({"latency_s": LATENCY_S, "rows": rows}))
-
-
-if __name__ == "__main__":
-    main()

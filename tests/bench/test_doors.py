@@ -1,4 +1,4 @@
-"""`python -m bench.doors`: every command has rows, a row that gets through is seen, and no row does."""
+"""`python -m bench doors`: every command has rows, a row that gets through is seen, and no row does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are made to do harm are read or refused: some of what `python -m bench.hostile_files` tries."""
+"""Files that are made to do harm are read or refused: some of what `python -m bench hostile_files` tries."""
 
 from __future__ import annotations
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections import Counter
 from typing import TYPE_CHECKING, get_args
 
-import bench.doors
+from bench.command_line import make_parser
 from bench.doors.commands import missing
-from bench.doors.ending import end_on_sigterm
 from bench.doors.registry import DOORS, load_rows
 from bench.doors.rows import Kind
 from bench.tables import print_table
@@ -27,11 +25,7 @@ SLOWEST = 5
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench.doors",
-        description=bench.doors.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--door", default="", help="play only rows whose door begins so")
     parser.add_argument("--kind", choices=get_args(Kind), help="play only rows of this kind")
     parser.add_argument("--jobs", type=int, default=1, help="number of processes that play rows; 1 if not given")
@@ -102,8 +96,3 @@ def summary(played: Sequence[tuple[Row, Outcome]]) -> str:
     skipped = sum(bool(outcome.skipped) for _, outcome in played)
     counts = ", ".join(f"{kinds[kind]} {kind}{'' if kinds[kind] == 1 else 's'}" for kind in get_args(Kind))
     return f"{len(played)} rows: {counts}; {through} got through" + (f", {skipped} skipped" if skipped else "")
-
-
-if __name__ == "__main__":
-    end_on_sigterm()
-    sys.exit(main())
