@@ -63,7 +63,8 @@ def changes(a: Results, b: Results, only: Sequence[str] = ()) -> Iterator[Change
     """Yield how the figures differ that both have, in the order of `b`."""
     before = {series.key: series.per_run for series in a.figures}
     for series in b.figures:
-        old, new = before.get(series.key, []), series.per_run
+        old = before.get(series.key, [])
+        new = series.per_run
         if (only and series.bench not in only) or not old or not new:
             continue
         yield Change(
@@ -81,13 +82,13 @@ def remarks(a: Results, b: Results, found: Sequence[Change]) -> Iterator[str]:
     """Yield what a reader must know before believing the factors."""
     if a.machine != b.machine:
         yield f"the machines differ, so factors are not those of the code: A {a.machine}; B {b.machine}"
-    for name, one in (("A", a), ("B", b)):
-        if one.load > QUIET:
-            yield f"{name} began on a machine with a load of {one.load:g}: measure it again when nothing else runs"
-    missing = {one.key for one in a.figures} ^ {one.key for one in b.figures}
+    for name, results in (("A", a), ("B", b)):
+        if results.load > QUIET:
+            yield f"{name} began on a machine with a load of {results.load:g}: measure it again when nothing else runs"
+    missing = {series.key for series in a.figures} ^ {series.key for series in b.figures}
     if missing:
         yield f"{len(missing)} figures are in one of the two alone, and are left out"
-    if sure := [one for one in found if math.isfinite(one.factor.high)]:
+    if sure := [change for change in found if math.isfinite(change.factor.high)]:
         yield f"of {len(sure)} figures that are the same, {len(sure) / 20:.1f} would stand out by chance"
     if len(sure) < len(found):
         yield "figures without an interval were measured in one run of A or B; `python -m bench --times 3` makes three"
@@ -95,10 +96,10 @@ def remarks(a: Results, b: Results, found: Sequence[Change]) -> Iterator[str]:
 
 def rows(found: Sequence[Change]) -> Iterator[tuple[str, ...]]:
     """Yield the cells of a table of `COLUMNS`."""
-    for one in found:
-        factor = "" if one.factor.value is None else f"{one.factor.value:.3f}"
-        sure = f"{one.factor.low:.3f} to {one.factor.high:.3f}" if math.isfinite(one.factor.high) else ""
-        yield one.bench, one.name, f"{one.a:.4g}", f"{one.b:.4g}", one.unit, factor, sure, one.verdict
+    for change in found:
+        factor = "" if change.factor.value is None else f"{change.factor.value:.3f}"
+        sure = f"{change.factor.low:.3f} to {change.factor.high:.3f}" if math.isfinite(change.factor.high) else ""
+        yield change.bench, change.name, f"{change.a:.4g}", f"{change.b:.4g}", change.unit, factor, sure, change.verdict
 
 
 def _finite(factor: Interval) -> dict[str, float | None]:
@@ -116,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     a, b = read(find(given.a)), read(find(given.b))
     found = list(changes(a, b, given.only))
     if given.json:
-        each = [asdict(one) | {"factor": _finite(one.factor), "verdict": one.verdict} for one in found]
+        each = [asdict(change) | {"factor": _finite(change.factor), "verdict": change.verdict} for change in found]
         print(json.dumps({"a": a.title, "b": b.title, "remarks": list(remarks(a, b, found)), "changes": each}))
         return
     print(f"A: {a.title}; {a.machine}\nB: {b.title}; {b.machine}\n")

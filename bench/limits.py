@@ -64,11 +64,11 @@ def judge(bench: str, figures: Sequence[Figure]) -> Iterator[Judged]:
 
 def rows(judged: Sequence[Judged]) -> Iterator[tuple[str, ...]]:
     """Yield the cells of a table of `COLUMNS`."""
-    for one in judged:
-        at = "at most" if one.figure.better == "less" else "at least"
-        value = "" if one.ratio.value is None else f"{one.ratio.value:.2f}"
-        sure = f"{one.ratio.low:.2f} to {one.ratio.high:.2f}" if math.isfinite(one.ratio.high) else ""
-        yield one.bench, one.figure.name, value, sure, f"{at} {one.figure.limit:g}", one.verdict
+    for judgement in judged:
+        at = "at most" if judgement.figure.better == "less" else "at least"
+        value = "" if judgement.ratio.value is None else f"{judgement.ratio.value:.2f}"
+        sure = f"{judgement.ratio.low:.2f} to {judgement.ratio.high:.2f}" if math.isfinite(judgement.ratio.high) else ""
+        yield judgement.bench, judgement.figure.name, value, sure, f"{at} {judgement.figure.limit:g}", judgement.verdict
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,21 +78,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if unknown := [name for name in given.names if name not in LIMITED]:
         parser.error(f"{unknown[0]!r} has no limits; {', '.join(LIMITED)} have")
-    judged = [one for name in given.names or LIMITED for one in judge(name, figures_of(name, LIMITED[name]))]
-    broken = [one for one in judged if one.verdict == "broken"]
+    judged = [
+        judgement for name in given.names or LIMITED for judgement in judge(name, figures_of(name, LIMITED[name]))
+    ]
+    broken = [judgement for judgement in judged if judgement.verdict == "broken"]
     if given.json:
-        print(json.dumps([_row(one) for one in judged]))
+        print(json.dumps([_row(judgement) for judgement in judged]))
     else:
         print_table(COLUMNS, rows(judged))
-        for why in dict.fromkeys(one.figure.skipped for one in judged if one.figure.skipped):
+        for why in dict.fromkeys(judgement.figure.skipped for judgement in judged if judgement.figure.skipped):
             print(f"* skipped: {why}")
-    for one in broken:
-        print(f"{one.bench}: {one.figure.name} is beyond its limit of {one.figure.limit:g}", file=sys.stderr)
+    for judgement in broken:
+        print(
+            f"{judgement.bench}: {judgement.figure.name} is beyond its limit of {judgement.figure.limit:g}",
+            file=sys.stderr,
+        )
     return 1 if broken else 0
 
 
-def _row(one: Judged) -> dict[str, object]:
+def _row(judgement: Judged) -> dict[str, object]:
     return {
-        "measurement": one.bench, "ratio": one.figure.name, "measured": one.ratio.value, "limit": one.figure.limit,
-        "values": one.figure.values, "verdict": one.verdict, "skipped": one.figure.skipped,
+        "measurement": judgement.bench, "ratio": judgement.figure.name, "measured": judgement.ratio.value, "limit": judgement.figure.limit,
+        "values": judgement.figure.values, "verdict": judgement.verdict, "skipped": judgement.figure.skipped,
     }  # fmt: skip

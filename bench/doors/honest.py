@@ -74,7 +74,8 @@ async def measure(name: str, seconds: float, directory: Path) -> tuple[str, ...]
 async def _ask(target: Target, seconds: float) -> tuple[list[float], int]:
     """Ask for so long; return the times in seconds, and how many requests were not answered with 200."""
     times: list[float] = []
-    failed, end = 0, time.perf_counter() + seconds
+    failed = 0
+    end = time.perf_counter() + seconds
     while (began := time.perf_counter()) < end:
         failed += await send(target) != 200
         times.append(time.perf_counter() - began)

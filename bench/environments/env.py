@@ -13,7 +13,6 @@ count.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -31,6 +30,7 @@ from bench.paths import ROOT
 from khala.playing import games
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Iterator, Sequence
 
 
@@ -91,7 +91,7 @@ def kinds_of(options: argparse.Namespace) -> Iterator[Kind]:
         yield Kind("smaclite", python=str(options.smaclite_python), path=str(options.smaclite.absolute()))
 
 
-def measured(map_name: str, kinds: Sequence[Kind], count: int, seconds: float, rounds: int) -> list[Row]:
+def measure(map_name: str, kinds: Sequence[Kind], count: int, seconds: float, rounds: int) -> list[Row]:
     """Return a row for each kind: so many environments at once, the kinds in turn."""
     with ExitStack() as stack:
         started = {
@@ -124,8 +124,8 @@ def _round(workers: Sequence[subprocess.Popen[str]], seconds: float) -> tuple[fl
         worker.stdin.write(f"{seconds}\n")
         worker.stdin.flush()
     played = [json.loads(_line(worker)) for worker in workers]
-    steps = sum(one["steps"] for one in played)
-    return sum(one["steps"] / one["wall_s"] for one in played), sum(one["cpu_s"] for one in played) / steps * 1000
+    steps = sum(play["steps"] for play in played)
+    return sum(play["steps"] / play["wall_s"] for play in played), sum(play["cpu_s"] for play in played) / steps * 1000
 
 
 def _line(worker: subprocess.Popen[str]) -> str:
@@ -150,7 +150,7 @@ def main() -> None:
     rows = []
     for map_name in options.maps:
         for count in options.at_once:
-            for row in measured(map_name, kinds, count, options.seconds, options.rounds):
+            for row in measure(map_name, kinds, count, options.seconds, options.rounds):
                 rows.append(asdict(row))
                 text = f"| {row.map} | {row.kind} | {row.envs} | {row.steps_per_s:.0f} | {row.cpu_ms:.2f} |"
                 if not options.json:

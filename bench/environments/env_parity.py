@@ -49,8 +49,12 @@ def compare(theirs: Any, map_name: str, episodes: int, seed: int) -> Compared:
         episodes: how many.
         seed: of the game and of the actions.
     """
-    smac, ours = theirs(map_name=map_name, seed=seed), StarCraft2Env(map_name, seed=seed)
-    rng, ends, steps, differences = np.random.default_rng(seed), list[tuple[int, str]](), 0, 0
+    smac = theirs(map_name=map_name, seed=seed)
+    ours = StarCraft2Env(map_name, seed=seed)
+    rng = np.random.default_rng(seed)
+    ends = list[tuple[int, str]]()
+    steps = 0
+    differences = 0
     for _ in range(episodes):
         smac.reset()
         ours.reset()
@@ -102,7 +106,8 @@ def main() -> None:
     os.environ["SC2PATH"] = str(games.find("simulator")[0])
     from smac.env import StarCraft2Env as Smac  # noqa: PLC0415  # a package that only this measurement needs
 
-    each, wrong = -(-options.episodes // len(options.maps)), False
+    each = -(-options.episodes // len(options.maps))
+    wrong = False
     print("| map | episodes | steps | differences | same worlds |\n|---|---:|---:|---:|---:|")
     for map_name in options.maps:
         found = compare(Smac, map_name, each, options.seed)

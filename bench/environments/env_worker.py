@@ -90,18 +90,23 @@ KINDS: dict[str, type[Khala]] = {"khala": Khala, "smac": Smac, "smaclite": SmacL
 
 def main() -> None:
     """Make an environment, and play it for as many seconds as each line of the input says; its end is the end."""
-    kind, map_name, seed = sys.argv[1], sys.argv[2], int(sys.argv[3])
+    kind = sys.argv[1]
+    map_name = sys.argv[2]
+    seed = int(sys.argv[3])
     said, sys.stdout = sys.stdout, open(os.devnull, "w")  # noqa: SIM115, PTH123  # SMAClite prints
-    env, rng = KINDS[kind](map_name, seed), np.random.default_rng(seed)
+    env = KINDS[kind](map_name, seed)
+    rng = np.random.default_rng(seed)
     env.reset()
     print("ready", file=said, flush=True)
     for line in sys.stdin:
-        print(json.dumps(_played(env, rng, float(line))), file=said, flush=True)
+        print(json.dumps(_play(env, rng, float(line))), file=said, flush=True)
     env.close()
 
 
-def _played(env: Khala, rng: np.random.Generator, seconds: float) -> dict[str, float]:
-    begun_s, cpu_s, steps = time.perf_counter(), env.cpu_s(), 0
+def _play(env: Khala, rng: np.random.Generator, seconds: float) -> dict[str, float]:
+    begun_s = time.perf_counter()
+    cpu_s = env.cpu_s()
+    steps = 0
     while time.perf_counter() - begun_s < seconds:
         over = env.step([int(rng.choice(np.flatnonzero(can))) for can in env.read()])
         steps += 1

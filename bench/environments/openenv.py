@@ -72,14 +72,12 @@ def of_clients(count: int, steps: int, seconds: float) -> dict[str, Any]:
         assert server.stderr is not None
         address = server.stderr.readline().strip()
         try:
-            return {"clients": count} | asyncio.run(
-                measured(address, count, steps, seconds, psutil.Process(server.pid))
-            )
+            return {"clients": count} | asyncio.run(measure(address, count, steps, seconds, psutil.Process(server.pid)))
         finally:
             server.terminate()
 
 
-async def measured(address: str, count: int, steps: int, seconds: float, server: psutil.Process) -> dict[str, Any]:
+async def measure(address: str, count: int, steps: int, seconds: float, server: psutil.Process) -> dict[str, Any]:
     counts = Counts()
     watching = asyncio.create_task(highest(server))
     began_s = time.monotonic()
@@ -143,7 +141,7 @@ async def highest(server: psutil.Process) -> tuple[float, float]:
     try:
         while True:
             server_mb = max(server_mb, pss_mb(server))
-            games = [pss_mb(one) for one in server.children(recursive=True)]
+            games = [pss_mb(child) for child in server.children(recursive=True)]
             game_mb = max(game_mb, sum(games) / max(len(games), 1))
             await asyncio.sleep(LOOK_S)
     except asyncio.CancelledError:

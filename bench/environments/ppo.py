@@ -69,8 +69,8 @@ class Net:
             for (rows, columns), scale in zip(shapes, scales, strict=True)
             for part in (rng.normal(0, scale / np.sqrt(rows), (rows, columns)), np.zeros(columns))
         ]
-        self._first = [np.zeros_like(one) for one in self.weights]
-        self._second = [np.zeros_like(one) for one in self.weights]
+        self._first = [np.zeros_like(weight) for weight in self.weights]
+        self._second = [np.zeros_like(weight) for weight in self.weights]
         self._count = 0
 
     def __call__(self, x: Array) -> Array:
@@ -79,22 +79,22 @@ class Net:
 
     def _layers(self, x: Array) -> list[Array]:
         w1, b1, w2, b2, w3, b3 = self.weights
-        one = np.tanh(x @ w1 + b1)
-        two = np.tanh(one @ w2 + b2)
-        return [x, one, two, two @ w3 + b3]
+        lower = np.tanh(x @ w1 + b1)
+        upper = np.tanh(lower @ w2 + b2)
+        return [x, lower, upper, upper @ w3 + b3]
 
     def learn(self, x: Array, slope_of: Any, settings: Settings) -> None:
         """Go a step down: `slope_of` takes the outputs and returns the slope of the loss in each."""
-        x, one, two, out = self._layers(x)
+        x, lower, upper, out = self._layers(x)
         slope = slope_of(out)
-        back_two = (slope @ self.weights[4].T) * (1 - two**2)
-        back_one = (back_two @ self.weights[2].T) * (1 - one**2)
+        back_upper = (slope @ self.weights[4].T) * (1 - upper**2)
+        back_lower = (back_upper @ self.weights[2].T) * (1 - lower**2)
         slopes = [
             part
-            for below, above in ((x, back_one), (one, back_two), (two, slope))
+            for below, above in ((x, back_lower), (lower, back_upper), (upper, slope))
             for part in (below.T @ above, above.sum(0))
         ]
-        length = np.sqrt(sum(float((one**2).sum()) for one in slopes))
+        length = np.sqrt(sum(float((part**2).sum()) for part in slopes))
         shrink = min(1.0, settings.most_gradient / (length + 1e-9))
         self._count += 1
         for weight, first, second, part in zip(self.weights, self._first, self._second, slopes, strict=True):
@@ -132,7 +132,7 @@ class Learner:
 
     def learn(self, rollout: Rollout, last_state: Array) -> None:
         """Learn from what was played; `last_state` is [envs, size] after it."""
-        advantages, returns = self._judged(rollout, last_state)
+        advantages, returns = self._judge(rollout, last_state)
         advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
         rows = len(returns)
         seen = rollout.seen.reshape(rows, self.agents, -1)
@@ -158,7 +158,7 @@ class Learner:
         numbers = np.broadcast_to(self._numbers, (*seen.shape[:-1], self.agents))
         return np.concatenate((seen, numbers), axis=-1).reshape(-1, self.size + self.agents)
 
-    def _judged(self, rollout: Rollout, last_state: Array) -> tuple[Array, Array]:
+    def _judge(self, rollout: Rollout, last_state: Array) -> tuple[Array, Array]:
         """Return the advantage and the return of each step, in one row."""
         steps, envs = rollout.rewards.shape
         values = self.critic(np.concatenate((rollout.states.reshape(steps * envs, -1), last_state)))

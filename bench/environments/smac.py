@@ -72,9 +72,11 @@ def play(map_name: str, agent: str, episodes: int, seed: int) -> Played:
     """Play one map in this process; `smac` must be importable."""
     from smac.env import StarCraft2Env  # noqa: PLC0415  # a package that only this measurement needs
 
-    begun_s, rng = time.monotonic(), np.random.default_rng(seed)
+    begun_s = time.monotonic()
+    rng = np.random.default_rng(seed)
     env = StarCraft2Env(map_name=map_name, seed=seed, heuristic_ai=agent == "heuristic")
-    facts, trouble = env.get_env_info(), []
+    facts = env.get_env_info()
+    trouble = []
     results = []
     for _ in range(episodes):
         env.reset()
@@ -85,11 +87,11 @@ def play(map_name: str, agent: str, episodes: int, seed: int) -> Played:
     if env.force_restarts:
         trouble.append(f"{env.force_restarts} games started again")
     env.close()
-    rewards = [one.reward for one in results]
-    trouble += [f"an episode worth {one.reward:.2f}" for one in results if one.reward > one.most + 1e-6]
+    rewards = [result.reward for result in results]
+    trouble += [f"an episode worth {result.reward:.2f}" for result in results if result.reward > result.most + 1e-6]
     return Played(
-        map_name, agent, episodes, won=sum(one.won for one in results), reward=float(np.mean(rewards)),
-        most=max(rewards), steps=float(np.mean([one.steps for one in results])), obs=facts["obs_shape"],
+        map_name, agent, episodes, won=sum(result.won for result in results), reward=float(np.mean(rewards)),
+        most=max(rewards), steps=float(np.mean([result.steps for result in results])), obs=facts["obs_shape"],
         state=facts["state_shape"], actions=facts["n_actions"], wall_s=time.monotonic() - begun_s,
         trouble="; ".join(dict.fromkeys(trouble)),
     )  # fmt: skip
@@ -107,18 +109,22 @@ class Episode(NamedTuple):
 
 def _episode(env: Any, agent: str, rng: np.random.Generator) -> Episode:
     """Play one episode to its end."""
-    total, regained, over, info, steps = 0.0, 0.0, False, {}, 0
+    total = 0.0
+    regained = 0.0
+    over = False
+    info = {}
+    steps = 0
     while not over:
         actions = [0] * env.n_agents
         if agent == "random":
             actions = [int(rng.choice(np.flatnonzero(env.get_avail_agent_actions(i)))) for i in range(env.n_agents)]
         reward, over, info = env.step(actions)
-        total, regained, steps = total + reward, regained + _regained(env), steps + 1
+        total, regained, steps = total + reward, regained + _gains(env), steps + 1
     most = MOST_REWARD * (1 + 2 * regained / env.max_reward)
     return Episode(total, most, bool(info.get("battle_won")), steps)
 
 
-def _regained(env: Any) -> float:
+def _gains(env: Any) -> float:
     """Return the life and shields that living enemies gained in the last step."""
     both = ((enemy, env.previous_enemy_units.get(number)) for number, enemy in env.enemies.items() if enemy.health > 0)
     return float(sum(max(0.0, now.health + now.shield - old.health - old.shield) for now, old in both if old))

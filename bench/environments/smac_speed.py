@@ -47,9 +47,11 @@ def measure(map_name: str, steps: int, seed: int) -> Speed:
     """Play so many steps of a map; `smac` must be importable and SC2PATH set."""
     from smac.env import StarCraft2Env  # noqa: PLC0415  # a package that only such measurements need
 
-    env, rng = StarCraft2Env(map_name=map_name, seed=seed), np.random.default_rng(seed)
+    env = StarCraft2Env(map_name=map_name, seed=seed)
+    rng = np.random.default_rng(seed)
     env.reset()
-    stepping_s, over = 0.0, False
+    stepping_s = 0.0
+    over = False
     with CpuTime(env._sc2_proc.pid) as cpu:  # noqa: SLF001  # SMAC tells the process nowhere else
         begun_s = time.perf_counter()
         for _ in range(steps):

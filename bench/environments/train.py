@@ -67,11 +67,12 @@ class Team:
 
     def states(self) -> np.ndarray[Any, Any]:
         """Return [envs, size] the states now."""
-        return np.stack([one["state"] for one in self.seen])
+        return np.stack([step["state"] for step in self.seen])
 
     def _step(self, learner: Learner) -> tuple[Any, ...]:
-        seen, states = np.stack([one["observation"] for one in self.seen]), self.states()
-        masks = np.stack([one["action_mask"] for one in self.seen]).astype(np.bool_)
+        seen = np.stack([step["observation"] for step in self.seen])
+        states = self.states()
+        masks = np.stack([step["action_mask"] for step in self.seen]).astype(np.bool_)
         actions, chance = learner.act(seen, masks)
         rewards, ended = [], []
         for number, env in enumerate(self.envs):
@@ -91,7 +92,10 @@ def train(map_name: str, seed: int, envs: int, minutes: float, tell: Callable[[R
     first = team.seen[0]
     (agents, size), (state_size,) = first["observation"].shape, first["state"].shape
     learner = Learner(agents, size, state_size, team.envs[0].battles.n_actions, seed)
-    run, begun_s, told, steps = Run(map_name, seed), time.process_time(), 0.0, 0
+    run = Run(map_name, seed)
+    begun_s = time.process_time()
+    told = 0.0
+    steps = 0
     with suppress(KeyboardInterrupt):
         while (spent := (time.process_time() - begun_s) / 60) < minutes:
             learner.learn(team.play(learner, STEPS), team.states())
@@ -103,13 +107,14 @@ def train(map_name: str, seed: int, envs: int, minutes: float, tell: Callable[[R
                 run.won.append(sum(team.won) / len(team.won))
                 run.episodes = team.episodes
                 tell(run)
-        run.greedy = tested(map_name, learner)
+        run.greedy = win_rate(map_name, learner)
     return run, learner
 
 
-def tested(map_name: str, learner: Learner) -> float:
+def win_rate(map_name: str, learner: Learner) -> float:
     """Return the part of new battles that are won with the most likely actions."""
-    env, won = CentralEnv(map_name), 0
+    env = CentralEnv(map_name)
+    won = 0
     for number in range(TESTED):
         seen, _ = env.reset(seed=TEST_SEED + number)
         over = cut = False

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from bench.command_line import make_parser
-from bench.matches.ladder import TASKS, Pairing, witnessed
+from bench.matches.ladder import TASKS, Pairing, watch
 from khala_agents.scripted.reading import points, read
 from khala_agents.scripted.skilled.kinds import fights
 from khala_protocol.speech import parse
@@ -105,11 +105,12 @@ def judge(transcript: Transcript) -> Verdict:
     verdict = Verdict()
     last: dict[tuple[str, str], tuple[str, float]] = {}
     for said in _messages(transcript):
-        pair, now = (said.sender, said.recipient), said.turn.seen.time_s
+        pair = (said.sender, said.recipient)
+        now = said.turn.seen.time_s
         text, when = last.get(pair, ("", -math.inf))
         verdict.again += text == said.text and now - when < STAYS_S
         last[pair] = said.text, now
-        kind, why = judged(said)
+        kind, why = fault_of(said)
         verdict.said[kind] += 1
         if why == UNREAD:
             verdict.unread += 1
@@ -124,11 +125,11 @@ def _messages(transcript: Transcript) -> Iterator[Said]:
         for turn in turns:
             for message in turn.reply.messages:
                 theirs = transcript.turns.get(message.recipient, [])
-                then = [one for one in theirs if one.step > turn.step][:CHANCES]
+                then = [later for later in theirs if later.step > turn.step][:CHANCES]
                 yield Said(sender, turn, message.recipient, message.text, then)
 
 
-def judged(said: Said) -> tuple[str, str]:
+def fault_of(said: Said) -> tuple[str, str]:
     """Return the kind of a message and what is wrong with it, "" for nothing.
 
     Raises:
@@ -232,7 +233,7 @@ RULES: Final[dict[str, tuple[re.Pattern[str], Callable[[Said, re.Match[str]], st
 def measure(task: str, *, steps: int, seed: int) -> Verdict:
     """Play a part of a game against level 4, and judge what was said."""
     transcript = Transcript()
-    witnessed(Pairing(task, None, "medium_hard", seed, "skilled"), transcript.hear, steps=steps)
+    watch(Pairing(task, None, "medium_hard", seed, "skilled"), transcript.hear, steps=steps)
     return judge(transcript)
 
 
@@ -262,12 +263,12 @@ def main() -> int:
     if given.json:
         rows = {
             name: {
-                "messages": sum(one.said.values()),
-                "true_percent": round(one.share, 1),
-                "again": one.again,
-                "unread": one.unread,
+                "messages": sum(score.said.values()),
+                "true_percent": round(score.share, 1),
+                "again": score.again,
+                "unread": score.unread,
             }
-            for name, one in found.items()
+            for name, score in found.items()
         }
         print(json.dumps(rows))
-    return int(any(one.share < GOAL for one in found.values()))
+    return int(any(score.share < GOAL for score in found.values()))

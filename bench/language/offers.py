@@ -84,7 +84,9 @@ class Table:
         config = GameConfig(sc2path=sc2path, map=task.map_spec, opponent=task.opponent, seed=seed)
         self.task = task
         self._game = PySC2Game(config)
-        self._observer, self._actor, self._executor = Observer(task), Actor(task), executor_of(task)
+        self._observer = Observer(task)
+        self._actor = Actor(task)
+        self._executor = executor_of(task)
         self._feedback: Mapping[str, Feedback] = {}
 
     def play(self, steps: int, seed: int, tally: Tally, *, after: int = 0, judged: bool = False) -> None:
@@ -103,12 +105,14 @@ class Table:
             joint = self._actor.joint(seen, words)
             (result,) = self._game.act([self._executor.plan(joint.commands, snapshot, self.task.clock.step_loops)])
             refused = [(refusal.agent, refusal.rejection) for refusal in result.played.refusals]
-            refused += [(name, one) for name, found in joint.rejections.items() for one in found]
+            refused += [(name, rejection) for name, found in joint.rejections.items() for rejection in found]
             if counted and not judged:
                 self._count(words, refused, tally)
-                tally.overtaken += sum(self._is_overtaken(seen, name, one) for name, one in refused)
+                tally.overtaken += sum(self._is_overtaken(seen, name, rejection) for name, rejection in refused)
             self._feedback = {
-                name: Feedback(joint.accepted.get(name, ()), tuple(one for who, one in refused if who == name))
+                name: Feedback(
+                    joint.accepted.get(name, ()), tuple(rejection for who, rejection in refused if who == name)
+                )
                 for name in texts
             }
             snapshot = result.snapshot
@@ -119,7 +123,7 @@ class Table:
             for call in random_calls(read(text), random.Random(f"{seed} {name} {text}")):
                 words = {name: parse(call)}
                 found = self._actor.joint(seen, words).rejections.get(name, ())
-                self._count(words, [(name, one) for one in found], tally)
+                self._count(words, [(name, rejection) for rejection in found], tally)
 
     def _is_overtaken(self, seen: SideObservation, name: str, refused: Rejection) -> bool:
         if refused.reason != "not_available":
@@ -179,13 +183,13 @@ def main() -> int:
     if given.json:
         rows = {
             name: {
-                "calls": one.calls,
-                "refused": sum(one.refused.values()),
-                "percent": round(one.share, 2),
-                "overtaken": one.overtaken,
-                "dishonest_percent": round(one.dishonest, 2),
+                "calls": tally.calls,
+                "refused": sum(tally.refused.values()),
+                "percent": round(tally.share, 2),
+                "overtaken": tally.overtaken,
+                "dishonest_percent": round(tally.dishonest, 2),
             }
-            for name, one in found.items()
+            for name, tally in found.items()
         }
         print(json.dumps(rows))
-    return 1 if any(one.dishonest > 2 for one in found.values()) else 0
+    return 1 if any(tally.dishonest > 2 for tally in found.values()) else 0

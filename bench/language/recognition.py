@@ -180,7 +180,8 @@ def _task(types: tuple[str, ...]) -> TaskConfig:
 
 
 def _snapshot() -> Snapshot:
-    response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
+    response = sc_pb.ResponseObservation()
+    info = sc_pb.ResponseGameInfo()
     raw = response.observation.raw_data
     for units, alliance, x in ((OWN, raw_pb2.Self, 32.0), (FOES, raw_pb2.Enemy, 36.0)):
         for place, (tag, name) in enumerate(units.items()):
@@ -193,7 +194,8 @@ def _snapshot() -> Snapshot:
                 health_max=160,
                 build_progress=1,
             )
-            unit.pos.x, unit.pos.y = x, 32.0 + place
+            unit.pos.x = x
+            unit.pos.y = 32.0 + place
     raw.player.upgrade_ids.append(BLINK)
     for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         size.x = size.y = 64

@@ -58,7 +58,8 @@ def play(options: argparse.Namespace) -> None:
     random.seed(options.seed)  # the bots draw where they build, and what they attack
     ai = _bot(options.path / "examples" / file)
     players: Any = [Bot(Race[own], ai), Computer(Race[other], Difficulty[LEVELS[options.levels[0] - 1]])]
-    limit_s, arena = round(60 * options.minutes), maps.get(options.map)
+    limit_s = round(60 * options.minutes)
+    arena = maps.get(options.map)
     result: Any = run_game(arena, players, realtime=False, game_time_limit=limit_s, random_seed=options.seed)
     found = {"result": result.name, "minutes": round(ai.time / 60, 1)}
     sys.stdout.write("\n" + json.dumps(found) + "\n")

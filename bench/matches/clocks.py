@@ -73,9 +73,9 @@ class Row:
     def violations(self) -> list[str]:
         """Return the promises that were broken."""
         where = f"{self.rule}, seed {self.seed}"
-        found = [f"{where}: {one.differences} observations of the replay differ" for one in self.played
-                 if one.differences]  # fmt: skip
-        if self.rule != "realtime" and len({one.hash for one in self.played}) > 1:
+        found = [f"{where}: {play.differences} observations of the replay differ" for play in self.played
+                 if play.differences]  # fmt: skip
+        if self.rule != "realtime" and len({play.hash for play in self.played}) > 1:
             found.append(f"{where}: the game depends on how long the endpoint took")
         return found
 
@@ -93,14 +93,15 @@ class Row:
             "decisions": len(last.ages_loops),
             "fates": {fate: fates[fate] for fate in FATES},
             "age_loops": statistics.median(last.ages_loops) if last.ages_loops else 0,
-            "hashes": [one.hash for one in self.played],
-            "differences": sum(one.differences for one in self.played),
+            "hashes": [play.hash for play in self.played],
+            "differences": sum(play.differences for play in self.played),
         }
 
 
 async def play(config: MatchConfig, path: Path, latency_s: float) -> Played:
     """Play a match with the scripted model, and its recording once more."""
-    broker, run = MemoryBroker(), config.run
+    broker = MemoryBroker()
+    run = config.run
     sc2path, name = games.find("simulator")
     config = config.model_copy(update={"record": path, "game": name})
     async with Endpoint(Behaviour(latency_s=latency_s)) as endpoint, game_of(config, sc2path) as game:

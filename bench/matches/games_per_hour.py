@@ -96,7 +96,7 @@ class Played:
         return self.cpu_s / self.games
 
 
-def planned(name: str, games: int) -> list[PlannedMatch]:
+def plan_games(name: str, games: int) -> list[PlannedMatch]:
     """Return so many games of a task, each with a seed of its own."""
     max_steps = TASKS.get(name, Plays(1)).max_steps(load_task(name))
     experiment: dict[str, Any] = {
@@ -114,10 +114,11 @@ async def measure(name: str, games: int, at_once: int, out: Path) -> Played:
     Raises:
         SystemExit: a game was not played to its end.
     """
-    matches = planned(name, games + at_once)
+    matches = plan_games(name, games + at_once)
     async with Local(at_once, game="simulator", logs=out / "logs") as engine:
         await _play(matches[:at_once], engine, out / "first")
-        began_s, spent_s = time.perf_counter(), _processor_s()
+        began_s = time.perf_counter()
+        spent_s = _processor_s()
         await _play(matches[at_once:], engine, out / "counted")
         wall_s, cpu_s = time.perf_counter() - began_s, _processor_s() - spent_s
     goal = TASKS[name].goal if name in TASKS else None
@@ -146,7 +147,9 @@ def _processor_s() -> float:
     """Return the processor time of this process and of all that it has started, those that ended included."""
     here = psutil.Process()
     times = [process.cpu_times() for process in (here, *here.children(recursive=True))]
-    return float(sum(one.user + one.system + one.children_user + one.children_system for one in times))
+    return float(
+        sum(process.user + process.system + process.children_user + process.children_system for process in times)
+    )
 
 
 def measures(found: Any) -> Iterator[Figure]:
@@ -162,11 +165,11 @@ def table(played: Sequence[Played]) -> Table:
     shown = Table(box=None)
     for column in ("task", "at once", "games", "games an hour", "goal", "s", "cpu s"):
         shown.add_column(column, justify="left" if column == "task" else "right")
-    for one in played:
-        each_s = one.wall_s * one.at_once / one.games
-        goal = "" if one.goal is None else str(one.goal)
-        cells = (str(one.at_once), str(one.games), f"{one.per_hour:.0f}", goal, f"{each_s:.2f}")
-        shown.add_row(one.task, *cells, f"{one.cpu_s_a_game:.2f}")
+    for batch in played:
+        each_s = batch.wall_s * batch.at_once / batch.games
+        goal = "" if batch.goal is None else str(batch.goal)
+        cells = (str(batch.at_once), str(batch.games), f"{batch.per_hour:.0f}", goal, f"{each_s:.2f}")
+        shown.add_row(batch.task, *cells, f"{batch.cpu_s_a_game:.2f}")
     return shown
 
 
@@ -185,5 +188,5 @@ def main() -> None:
             print(f"{name}: {played[-1].per_hour:.0f} games an hour", file=sys.stderr)
     Console(file=sys.stderr if given.json else sys.stdout).print(table(played))
     if given.json:
-        rows = [asdict(one) | {"per_hour": one.per_hour, "cpu_s_a_game": one.cpu_s_a_game} for one in played]
+        rows = [asdict(batch) | {"per_hour": batch.per_hour, "cpu_s_a_game": batch.cpu_s_a_game} for batch in played]
         print(json.dumps({"rows": rows}))

@@ -46,7 +46,7 @@ BOOTSTRAPS = {
 def coverages(games: int) -> NDArray[np.float64]:
     """Return how often Wilson's interval holds the true share, for each of `SHARES`."""
     intervals = [wilson(won, games) for won in range(games + 1)]
-    low, high = (np.array([getattr(one, end) for one in intervals])[:, None] for end in ("low", "high"))
+    low, high = (np.array([getattr(interval, end) for interval in intervals])[:, None] for end in ("low", "high"))
     chances = stats.binom.pmf(np.arange(games + 1)[:, None], games, SHARES)
     return np.asarray((chances * ((low <= SHARES) & (high >= SHARES))).sum(axis=0))
 
@@ -58,7 +58,8 @@ def average_coverage(games: int) -> float:
 
 def difference_coverage(games: int, *, paired: bool, times: int) -> float:
     """Return how often Newcombe's interval holds the true difference, of shares drawn by chance."""
-    rng, held = np.random.default_rng(1), 0
+    rng = np.random.default_rng(1)
+    held = 0
     for _ in range(times):
         # four outcomes of a pair; without pairs, the same with the columns drawn for themselves
         chances = rng.dirichlet([1, 1, 1, 1])
@@ -75,15 +76,19 @@ def difference_coverage(games: int, *, paired: bool, times: int) -> float:
 
 def bootstrap_coverage(of: str, games: int, times: int) -> float:
     """Return how often a bootstrap interval holds the true value."""
-    rng, held = np.random.default_rng(1), 0
+    rng = np.random.default_rng(1)
+    held = 0
     for _ in range(times):
         if of == "K/D":
             skill = rng.gamma(4, 1, games)
-            found, true = ratio_of_sums(list(rng.gamma(2, 100, games) * skill), list(rng.gamma(2, 200, games))), 2.0
+            found = ratio_of_sums(list(rng.gamma(2, 100, games) * skill), list(rng.gamma(2, 200, games)))
+            true = 2.0
         elif of == "skewed":
-            found, true = mean(list(rng.lognormal(0, 1, games))), float(np.exp(0.5))
+            found = mean(list(rng.lognormal(0, 1, games)))
+            true = float(np.exp(0.5))
         else:
-            found, true = mean(list(rng.normal(size=games))), 0.0
+            found = mean(list(rng.normal(size=games)))
+            true = 0.0
         held += found.low <= true <= found.high
     return held / times
 
@@ -119,7 +124,7 @@ def tables(times: int) -> Iterator[tuple[str, list[float]]]:
         yield f"{words} (bootstrap)", [bootstrap_coverage(name, n, times) for n in GAMES]
     errors = [type_one_errors(n, times) for n in GAMES]
     for name in errors[0]:
-        yield f"found though not there: {name}", [one[name] for one in errors]
+        yield f"found though not there: {name}", [error[name] for error in errors]
 
 
 def main() -> None:

@@ -77,12 +77,12 @@ class Game:
 
 def play(pairing: Pairing) -> Game:
     """Play one game in this process."""
-    result = witnessed(pairing)
+    result = watch(pairing)
     rejected = sum(result.rejections.values())
     return Game(pairing, result.outcome, result.steps, result.game_s, result.wall_s, result.accepted, rejected)
 
 
-def witnessed(pairing: Pairing, hear: Hear = lambda *_: None, *, steps: int | None = None) -> Result:
+def watch(pairing: Pairing, hear: Hear = lambda *_: None, *, steps: int | None = None) -> Result:
     """Play one game in this process, of so many decisions at most; `hear` gets every observation with its reply."""
     logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns of abilities that it does not know
     return asyncio.run(_play(pairing, hear, steps))

@@ -16,7 +16,6 @@ prints the file.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import json
 import math
@@ -38,6 +37,7 @@ from khala_simulator.tick import advance, new_game
 from khala_simulator.world.players import GameResult, PlayerSetup
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Iterable, Iterator, Sequence
 
     from khala_simulator.world.world import World
@@ -121,7 +121,8 @@ def growth(game_map: str, seat: Seat, moments_s: Iterable[int], seed: int) -> li
 
 
 def _grown(world: World, seat: Seat, at_s: int, had: list[float]) -> Growth:
-    owner, slots = world.players[1], world.units_of(1).tolist()
+    owner = world.players[1]
+    slots = world.units_of(1).tolist()
     units = [world.unit_type(slot) for at in slots for slot in (at, *world.passengers(at))]
     collected = owner.score.collected
     return Growth(
@@ -143,7 +144,8 @@ def _grown(world: World, seat: Seat, at_s: int, had: list[float]) -> Growth:
 
 def play(game_map: str, first: Seat, second: Seat, seed: int, minutes: float) -> Game:
     """Play one game to its end, or for so many minutes."""
-    world, began = world_of(game_map, (first, second), seed), time.process_time()
+    world = world_of(game_map, (first, second), seed)
+    began = time.process_time()
     while not world.ended and world.loop < minutes * 60.0 * FASTER_LOOPS:
         advance(world, STRIDE)
     won = [p.id for p in world.players[1:] if p.result is GameResult.VICTORY]
@@ -237,9 +239,9 @@ def ladder_table(games: Iterable[Game]) -> Iterator[str]:
 # the command ----------------------------------------------------------------------------------------------------------
 
 
-def played(options: argparse.Namespace, pairs: Sequence[tuple[Seat, Seat]]) -> list[Game]:
+def play_missing(options: argparse.Namespace, pairs: Sequence[tuple[Seat, Seat]]) -> list[Game]:
     """Play the games of the pairs that the log does not have yet; return all games, those of the log first."""
-    done = list(logged(options.log))
+    done = list(read_log(options.log))
     known = {(game.first, game.second, game.seed) for game in done}
     todo = [row for row in fixtures(pairs, options.games, options.seed) if row not in known]
     for number, game in enumerate(_games(options, todo), start=1):
@@ -251,7 +253,7 @@ def played(options: argparse.Namespace, pairs: Sequence[tuple[Seat, Seat]]) -> l
     return done
 
 
-def logged(log: Path | None) -> Iterator[Game]:
+def read_log(log: Path | None) -> Iterator[Game]:
     """Yield the games of a log, none if there is no such file."""
     for line in log.read_text(encoding="utf-8").splitlines() if log and log.exists() else ():
         row = json.loads(line)
@@ -292,12 +294,12 @@ def speed(options: argparse.Namespace) -> Iterator[str]:
     for level in options.levels:
         spent = Counter[str]()
 
-        def timed(world: World, spent: Counter[str] = spent) -> None:
+        def time_opponents(world: World, spent: Counter[str] = spent) -> None:
             began = time.process_time_ns()
             opponents.run(world)
             spent["ns"] += time.process_time_ns() - began
 
-        tick.SYSTEMS = (timed, *tick.SYSTEMS[1:])  # type: ignore[misc]  # measured in place
+        tick.SYSTEMS = (time_opponents, *tick.SYSTEMS[1:])  # type: ignore[misc]  # measured in place
         world = world_of(options.map, [Seat(race, level, options.build) for race in ("terran", "zerg")], options.seed)
         began = time.process_time()
         advance(world, math.ceil(options.minutes * 60 * FASTER_LOOPS))
@@ -332,7 +334,7 @@ def main() -> None:
         rows = grown(options)
         lines = list(growth_table(rows))
     else:
-        rows = played(options, pairs_of(options))
+        rows = play_missing(options, pairs_of(options))
         lines = list(ladder_table(rows))
     if options.json:
         json.dump({"command": " ".join(sys.argv), "rows": [asdict(row) for row in rows]}, sys.stdout)

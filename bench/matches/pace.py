@@ -112,12 +112,12 @@ def _figures(name: str, sleep_s: float, reports: Sequence[Report]) -> AgentFigur
         over_ms=1000 * statistics.median((agent.latency_s or 0.0) - sleep_s for _, agent in taken),
         age_p50_loops=statistics.median(ages),
         age_p95_loops=ages[int(0.95 * len(ages))],
-        steps_later=statistics.median(step - _asked(step, agent) for step, agent in taken),
+        steps_later=statistics.median(step - _step_of(step, agent) for step, agent in taken),
         late=len(found) - len(taken),
     )
 
 
-def _asked(step: int, agent: AgentReport) -> int:
+def _step_of(step: int, agent: AgentReport) -> int:
     return step if agent.asked_step is None else agent.asked_step
 
 
@@ -129,7 +129,7 @@ def _past_s(recording: Recording, speed: float) -> Iterator[float]:
         if isinstance(sample.message, Report)
     ]
     past_s = [at_s - loop / (LOOPS_PER_S * speed) for at_s, loop in began[:-1]]  # the last step may be a short one
-    yield from (one - min(past_s) for one in past_s)
+    yield from (late_s - min(past_s) for late_s in past_s)
 
 
 def _took_s(report: Report) -> float:
@@ -152,10 +152,10 @@ def table(title: str, figures: Figures) -> Table:
     shown = Table(title=title, caption=caption, box=None)
     for column in ("agent", "sleeps", "decisions", "over ms", "age p50", "age p95", "steps later", "late"):
         shown.add_column(column, justify="right", no_wrap=True)
-    for one in figures.agents:
+    for agent in figures.agents:
         shown.add_row(
-            one.agent, f"{one.sleep_s:g} s", str(one.decisions), f"{one.over_ms:.2f}", f"{one.age_p50_loops:g}",
-            f"{one.age_p95_loops:g}", f"{one.steps_later:g}", str(one.late),
+            agent.agent, f"{agent.sleep_s:g} s", str(agent.decisions), f"{agent.over_ms:.2f}", f"{agent.age_p50_loops:g}",
+            f"{agent.age_p95_loops:g}", f"{agent.steps_later:g}", str(agent.late),
         )  # fmt: skip
     return shown
 

@@ -30,7 +30,9 @@ from khala_protocol.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-GOAL_HELP_S, GOAL_MATCH_S, GOAL_MB = 0.25, 2.5, 350
+GOAL_HELP_S = 0.25
+GOAL_MATCH_S = 2.5
+GOAL_MB = 350
 IMPORTS = {
     "khala.cli": "every command",
     "khala_agents.commands": "agents",
@@ -43,11 +45,14 @@ TWELVE = ("run", "simple64_sceb", "--max-steps", "8", "--latency", "0.2")
 LOOK_S = 0.1
 
 
-def timed(command: Sequence[str], times: int) -> dict[str, Any]:
+def time_command(command: Sequence[str], times: int) -> dict[str, Any]:
     """Return processor and wall time of a command, each the least of some runs, and what the last one printed."""
-    cpu_s, wall_s, said = [], [], ""
+    cpu_s = []
+    wall_s = []
+    said = ""
     for _ in range(times):
-        began_s, before = time.perf_counter(), os.times()
+        began_s = time.perf_counter()
+        before = os.times()
         said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         after = os.times()
         wall_s.append(time.perf_counter() - began_s)
@@ -57,7 +62,7 @@ def timed(command: Sequence[str], times: int) -> dict[str, Any]:
 
 def of_help(times: int) -> dict[str, Any]:
     """Return what `khala --help` takes."""
-    took = timed([sys.executable, "-m", "khala", "--help"], times)
+    took = time_command([sys.executable, "-m", "khala", "--help"], times)
     return {"cpu_s": took["cpu_s"], "wall_s": took["wall_s"]}
 
 
@@ -65,7 +70,7 @@ def of_imports(times: int) -> list[dict[str, Any]]:
     """Return what importing each of the modules takes, a new process for each."""
     rows = []
     for module, what in IMPORTS.items():
-        took = timed([sys.executable, "-c", f"import {module}{COUNT}"], times)
+        took = time_command([sys.executable, "-c", f"import {module}{COUNT}"], times)
         rows.append({"module": module, "for": what, "modules": int(took.pop("said"))} | took)
     return rows
 
@@ -76,11 +81,11 @@ def of_match(times: int, directory: Path) -> dict[str, Any]:
     for number in range(times):
         began_s = time.time()
         run = ["--run", f"m{number}", "--out", str(directory)]
-        took.append(timed([sys.executable, "-m", "khala", *MATCH, *run], 1))
+        took.append(time_command([sys.executable, "-m", "khala", *MATCH, *run], 1))
         recording = Recording.open(directory / f"m{number}" / "recording.mcap")
-        seen = next(one for one in recording if parse(one.key).topic is Topic.OBSERVATION)
+        seen = next(sample for sample in recording if parse(sample.key).topic is Topic.OBSERVATION)
         first_s.append(seen.log_time_ns / 1e9 - began_s)
-    least = {name: min(one[name] for one in took) for name in ("cpu_s", "wall_s")}
+    least = {name: min(run[name] for run in took) for name in ("cpu_s", "wall_s")}
     return {"command": f"khala {' '.join(MATCH)}", "first_s": round(min(first_s), 3)} | least
 
 

@@ -29,7 +29,7 @@ PATIENCE_S = 600.0
 _TIMED = frozenset({Topic.OBSERVATION, Topic.REPLY, Topic.MESSAGE, Topic.EXCHANGE, Topic.REPORT, Topic.SCENE})
 
 
-def played(directory: Path, *, task: str = TASK, steps: int = STEPS) -> Path:
+def play_short(directory: Path, *, task: str = TASK, steps: int = STEPS) -> Path:
     """Play a match with pictures and requests to a model; return its recording."""
     directory.mkdir(parents=True, exist_ok=True)
     options = ("--run", "short", "--latency", "0", "--max-steps", str(steps), "--images", "paper")
@@ -41,7 +41,7 @@ def played(directory: Path, *, task: str = TASK, steps: int = STEPS) -> Path:
 
 def lengthen(short: Path, long: Path, decisions: int) -> int:
     """Write a recording of at least so many decisions; return how many it has."""
-    before, steps, after = _parted(Recording.open(short))
+    before, steps, after = _part(Recording.open(short))
     span_loops, span_ns = _span(steps)
     done = lap = 0
     with Recorder(long) as recorder:
@@ -60,7 +60,7 @@ def lengthen(short: Path, long: Path, decisions: int) -> int:
     return done
 
 
-def _parted(recording: Recording) -> tuple[list[Recorded], list[list[Recorded]], list[Recorded]]:
+def _part(recording: Recording) -> tuple[list[Recorded], list[list[Recorded]], list[Recorded]]:
     """Return the samples before the first step, those of each step, and those after the last one."""
     before: list[Recorded] = []
     after: list[Recorded] = []
@@ -80,7 +80,7 @@ def _parted(recording: Recording) -> tuple[list[Recorded], list[list[Recorded]],
 
 def _span(steps: Sequence[Sequence[Recorded]]) -> tuple[int, int]:
     """Return how long the steps are, in game loops and in nanoseconds."""
-    loops = [json.loads(sample.payload)["game_loop"] for one in steps for sample in one if _is(sample, Topic.REPORT)]
+    loops = [json.loads(sample.payload)["game_loop"] for step in steps for sample in step if _is(sample, Topic.REPORT)]
     return loops[-1] - loops[0] + (loops[-1] - loops[-2]), steps[-1][-1].log_time_ns - steps[0][0].log_time_ns
 
 
@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--of", type=Path, help="a recording that is there, instead of a match that is played first")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as directory:
-        short = options.of or played(Path(directory))
+        short = options.of or play_short(Path(directory))
         done = lengthen(short, options.path, options.decisions)
     print(f"{done} decisions, {options.path.stat().st_size / 1e6:.0f} MB")
     return 0

@@ -30,7 +30,7 @@ import psutil
 
 from bench.command_line import make_parser
 from bench.recordings.browser import Viewer, answer, browsing, steps_of, viewing
-from bench.recordings.long_recording import lengthen, played
+from bench.recordings.long_recording import lengthen, play_short
 from bench.survival.processes import Processes, free_port
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import load_task
@@ -138,7 +138,7 @@ class Cost:
 # --- open -------------------------------------------------------------------------------------------
 
 
-def opened(browser: Browser, path: Path, decisions: int) -> Iterator[Opened]:
+def open_page(browser: Browser, path: Path, decisions: int) -> Iterator[Opened]:
     """Open a recording for the first time, and again."""
     for again in (False, True):
         begun = time.perf_counter()
@@ -151,7 +151,7 @@ def opened(browser: Browser, path: Path, decisions: int) -> Iterator[Opened]:
             _wait_for_index(page)
             indexed_s = time.perf_counter() - begun
             found = Opened(decisions, path.stat().st_size / 1e6, again, address_s, first_map_s)
-            yield (_scrubbed(page, viewer, found) if again else Opened(**{**asdict(found), "indexed_s": indexed_s}))
+            yield (_scrub(page, viewer, found) if again else Opened(**{**asdict(found), "indexed_s": indexed_s}))
             page.close()
 
 
@@ -160,7 +160,7 @@ def _wait_for_index(page: Page) -> None:
         page.wait_for_timeout(200)
 
 
-def _scrubbed(page: Page, viewer: Viewer, found: Opened) -> Opened:
+def _scrub(page: Page, viewer: Viewer, found: Opened) -> Opened:
     steps = steps_of(page)
     chance = random.Random(1)
     jumps = [page.evaluate(JUMP, chance.choice(steps)) for _ in range(JUMPS)]
@@ -180,7 +180,7 @@ def _scrubbed(page: Page, viewer: Viewer, found: Opened) -> Opened:
 
 def frames(browser: Browser, directory: Path) -> Frames:
     """Play a battle of many units on the page."""
-    path = crowded(played(directory / "battle", task=TASK, steps=60), directory / "crowd.mcap")
+    path = write_crowd(play_short(directory / "battle", task=TASK, steps=60), directory / "crowd.mcap")
     with viewing(path) as viewer:
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(viewer.address)
@@ -191,7 +191,7 @@ def frames(browser: Browser, directory: Path) -> Frames:
     return Frames(UNITS, len(took_ms) / sum(took_ms) * 1000, max(took_ms))
 
 
-def crowded(path: Path, crowd: Path) -> Path:
+def write_crowd(path: Path, crowd: Path) -> Path:
     """Write a recording whose scenes have many units: those that are there, beside themselves."""
     with Recorder(crowd) as recorder:
         for sample in Recording.open(path):
@@ -304,8 +304,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         directory = Path(name)
         if "open" in parts:
             long = directory / "long.mcap"
-            decisions = lengthen(played(directory / "short"), long, options.decisions)
-            for found in opened(browser, long, decisions):
+            decisions = lengthen(play_short(directory / "short"), long, options.decisions)
+            for found in open_page(browser, long, decisions):
                 _say("open", found)
         if "units" in parts:
             _say("units", frames(browser, directory))

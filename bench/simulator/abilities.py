@@ -53,7 +53,8 @@ def measure(sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
 
 def _row(game: PySC2Game, size: int) -> dict[str, Any]:
     now = _with_army(game, size)
-    times, answer = [], now.abilities or {}
+    times = []
+    answer = now.abilities or {}
     for _ in range(ROUNDS):
         start = time.perf_counter()
         game._with_abilities([now])  # noqa: SLF001  # the very thing that is to be measured

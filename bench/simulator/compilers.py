@@ -107,7 +107,7 @@ print(json.dumps(said))
 """
 
 
-def measured(folder: Path, python: str) -> dict[str, dict[str, Any]]:
+def measure(folder: Path, python: str) -> dict[str, dict[str, Any]]:
     """Build all ways in a folder, and return what each measured; numba twice, without and with its cache."""
     ways = {"with_numpy.py": NUMPY, "with_numba.py": NUMBA, "with_mypyc.py": MYPYC, "with_cython.pyx": CYTHON}
     for name, text in {**ways, "build.py": BUILD, "measure.py": MEASURE}.items():
@@ -143,7 +143,7 @@ def main() -> None:
             "numpy",
             cwd=folder,
         )
-        rows = measured(folder, python)
+        rows = measure(folder, python)
     table = Table("compiler", *(f"us for {size}" for size in SIZES), "ms to start", "MB", "same result")
     for name, row in rows.items():
         times = (f"{us:.1f}" for us in row["us"])

@@ -117,15 +117,16 @@ def alive(world: World, slots: Sequence[int]) -> list[int]:
 
 def fits_around(world: World, attacker: str, target: str) -> float:
     """Return how many of one type fit round one target of another, as the perimeter has it."""
-    one, other = world.catalog.unit(attacker), world.catalog.unit(target)
-    reach = max(one.radius + other.radius + one.weapons[0].range, one.separation + other.separation)
-    return math.pi / math.asin(min(one.separation / reach, 1.0))
+    fighter, other = world.catalog.unit(attacker), world.catalog.unit(target)
+    reach = max(fighter.radius + other.radius + fighter.weapons[0].range, fighter.separation + other.separation)
+    return math.pi / math.asin(min(fighter.separation / reach, 1.0))
 
 
 def fits_around_group(world: World, attacker: str, targets: Sequence[int]) -> float:
     """Return how many of one type fit round several targets: groups that touch have one hull, others one each."""
     kind = world.catalog.unit(attacker)
-    left, places = set(targets), 0.0
+    left = set(targets)
+    places = 0.0
     while left:
         group = _touching(world, left, 2 * kind.separation)
         left -= group
@@ -138,7 +139,8 @@ def fits_around_group(world: World, attacker: str, targets: Sequence[int]) -> fl
 
 def _touching(world: World, slots: set[int], room: float) -> set[int]:
     """Return one of the groups in which no attacker fits between neighbours."""
-    group, edge = set(), {min(slots)}
+    group = set()
+    edge = {min(slots)}
     while edge:
         group |= edge
         edge = {
@@ -153,8 +155,10 @@ def _touching(world: World, slots: set[int], room: float) -> set[int]:
 
 def arc_of(world: World, attacker: str, target: str, count: int) -> float:
     """Return the angle in degrees that a row of units covers at the distance at which they reach a target."""
-    one, other = world.catalog.unit(attacker), world.catalog.unit(target)
-    return math.degrees(2.0 * count * math.asin(one.separation / (one.radius + other.radius + one.weapons[0].range)))
+    fighter, other = world.catalog.unit(attacker), world.catalog.unit(target)
+    return math.degrees(
+        2.0 * count * math.asin(fighter.separation / (fighter.radius + other.radius + fighter.weapons[0].range))
+    )
 
 
 def file_of(world: World, slots: list[int]) -> float:
@@ -387,10 +391,11 @@ def binomial(wins: int, games: int) -> float:
 
 def mirrors(games: int, console: Console) -> None:
     """Play so many fights, the same number of each kind; print the shares won by each factor."""
-    each, total = games // len(BATTLES), []
+    each = games // len(BATTLES)
+    total = []
     for number, (kind, army) in enumerate(BATTLES.items()):
         played = [mirror(seed, army) for seed in range(number * each, (number + 1) * each)]
-        decided = [one for one in played if one is not None]
+        decided = [fight for fight in played if fight is not None]
         total += decided
         console.print(f"{kind:32} {each - len(decided):3} draws", _odds(decided), soft_wrap=True)
     console.print(f"{'all':32} {each * len(BATTLES) - len(total):3} draws", _odds(total), soft_wrap=True)
@@ -400,8 +405,9 @@ def _odds(decided: list[dict[str, bool]]) -> str:
     """Return the share won by each factor with the interval in which it lies with 95 %, and the odds of a fair coin."""
     texts = []
     for factor in decided[0] if decided else ():
-        wins = sum(one[factor] for one in decided)
-        share, odds = wilson(wins, len(decided)), binomial(wins, len(decided))
+        wins = sum(fight[factor] for fight in decided)
+        share = wilson(wins, len(decided))
+        odds = binomial(wins, len(decided))
         texts.append(
             f"{factor} {wins} of {len(decided)} = {share.value:.0%} ({share.low:.0%} to {share.high:.0%}, p {odds:.2f})"
         )
@@ -440,7 +446,8 @@ def picture(world: World, half: Place = (4.5, 5.0)) -> NDArray[np.uint8]:
         return int(x + half[0] * SCALE), int(half[1] * SCALE - y)
 
     for slot in world.live.tolist():
-        colour, radius = COLOURS[int(world.owner[slot])], float(world.radius[slot])
+        colour = COLOURS[int(world.owner[slot])]
+        radius = float(world.radius[slot])
         at, front = pixel(world.pos[slot]), pixel(world.pos[slot] + world.heading[slot] * radius)
         if world.in_reach[slot]:
             cv2.circle(image, at, int(radius * SCALE), colour, -1, cv2.LINE_AA)

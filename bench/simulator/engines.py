@@ -77,7 +77,7 @@ def _environ(engine: str) -> dict[str, str]:
 def measures(found: Any) -> Iterator[Figure]:
     """Yield the ratio of each battle, of every round."""
     for name, loops in found["loops_per_s"].items():
-        ratios = tuple(one / other for one, other in zip(*(loops[engine] for engine in ENGINES), strict=True))
+        ratios = tuple(compiled / pure for compiled, pure in zip(*(loops[engine] for engine in ENGINES), strict=True))
         yield Figure(
             f"compiled / pure, {name}", "times", ratios, "more", limit=BATTLES[name], skipped=found["skipped"]
         )  # fmt: skip

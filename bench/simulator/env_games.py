@@ -123,7 +123,8 @@ class RawGame:
     """A game as SMAC plays it: PySC2's controller, the raw interface and nothing else."""
 
     def __init__(self, name: str, step_mul: int) -> None:
-        self._map, self._step_mul = f"{directory_of(name)}/{name}.SC2Map", step_mul
+        self._map = f"{directory_of(name)}/{name}.SC2Map"
+        self._step_mul = step_mul
         self._process = run_configs.get().start(want_rgb=False)
         self._controller = self._process.controller
         self._begin()

@@ -46,7 +46,8 @@ def measure(settings: Sequence[str], rounds: int, steps: int) -> dict[str, Any]:
         os.environ["SC2PATH"] = str(install(Path(directory)))
         for setting in [*settings] * rounds:
             play = partial(measure_env, setting_of(setting), steps)
-            ours, least = play(), floor(play)
+            ours = play()
+            least = floor(play)
             found[setting]["cpu_ms"].append(_cpu_ms(ours))
             found[setting]["floor_cpu_ms"].append(_cpu_ms(least))
             found[setting]["steps_per_s"].append(1e3 / statistics.fmean(ours.durations_ms))

@@ -61,12 +61,12 @@ def base(name: str, workers: Iterable[int] = (), kind: str = "SCV") -> World:
 def income(world: World, minutes: int) -> float:
     """Return the minerals a minute of the mean player, once its workers have found their rhythm."""
     advance(world, WARM_UP)
-    before = mined(world)
+    before = minerals_of(world)
     advance(world, minutes * MINUTE)
-    return (mined(world) - before) / minutes
+    return (minerals_of(world) - before) / minutes
 
 
-def mined(world: World) -> float:
+def minerals_of(world: World) -> float:
     """Return the minerals that the mean player has delivered."""
     players = world.players[1:]
     return sum(player.score.collected[0] for player in players) / len(players)
@@ -77,7 +77,7 @@ def fields_of(world: World) -> Ints:
     return melee_start.mineral_fields(world, world.players[1].start or (0.0, 0.0))
 
 
-def expected(world: World, field: int) -> float:
+def expected_income(world: World, field: int) -> float:
     """Return the minerals a minute of one worker at a field, derived from its distance."""
     worker, hall = world.catalog.unit("SCV"), world.catalog.unit("CommandCenter")
     way = math.dist(world.pos[field].tolist(), world.players[1].start or (0.0, 0.0))
@@ -101,16 +101,18 @@ def opening(name: str) -> Rows:
     first = 0
     while world.loop < 2 * MINUTE:
         advance(world)
-        first = first or (world.loop if mined(world) else 0)
+        first = first or (world.loop if minerals_of(world) else 0)
         if world.loop in (160, 320, 480, 640, MINUTE, 2 * MINUTE):
-            marks[f"at {world.loop}"] = mined(world)
+            marks[f"at {world.loop}"] = minerals_of(world)
     return {"opening": {"first return": first} | marks}
 
 
 def fields(name: str, minutes: int) -> Rows:
     """Measure one, two and three workers at each field, and what one MULE takes from it in its life."""
     world = base(name)
-    rows = {f"field {rank + 1}": {"expected": expected(world, slot)} for rank, slot in enumerate(fields_of(world))}
+    rows = {
+        f"field {rank + 1}": {"expected": expected_income(world, slot)} for rank, slot in enumerate(fields_of(world))
+    }
     for count in (1, 2, 3):
         world = base(name, list(range(len(rows))) * count)
         advance(world, WARM_UP)

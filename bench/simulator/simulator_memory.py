@@ -24,7 +24,8 @@ from bench.simulator.env_games import make_env
 from khala_bridge.compat import actions
 from khala_simulator.process.install import install
 
-GOAL_MB, GOAL_START_S = 200, 1.5
+GOAL_MB = 200
+GOAL_START_S = 1.5
 SETTLED = 10
 STEPS = 20
 

@@ -182,7 +182,9 @@ async def money(cap_usd: float, *, seeds: int = 6, steps: int = 8, pilot: int = 
 async def _account(file: Path, out: Path, cap_usd: float | None, pilot: int, slots: int) -> tuple[float, float]:
     """Return what an experiment has cost by its own account, and what its pilot estimated."""
     experiment = load(file, Experiment)
-    store, matches, estimated = Store(out), plan(experiment), 0.0
+    store = Store(out)
+    matches = plan(experiment)
+    estimated = 0.0
     store.begin(file)
     async with Local(slots, game="simulator", logs=store.logs) as engine:
         runner = Runner(experiment, store, engine, Budget(usd=cap_usd))

@@ -343,7 +343,7 @@ class Arena:
         except TimeoutError:
             self.lost.append(f"some steps after: {after}")
 
-    async def killed(self, name: str, pause_s: float = 0.0) -> int:
+    async def kill(self, name: str, pause_s: float = 0.0) -> int:
         """Kill a process, and start it again."""
         self.running[name].kill()
         self.running[name].wait()
@@ -351,7 +351,7 @@ class Arena:
         await self.start(name)
         return time.time_ns()
 
-    async def stopped(self, name: str, seconds: float) -> int:
+    async def stop(self, name: str, seconds: float) -> int:
         """Stop a process, and have it go on."""
         self.running[name].send_signal(signal.SIGSTOP)
         await asyncio.sleep(seconds)
@@ -372,7 +372,7 @@ class Arena:
                 os.kill(pid, how)
         return time.time_ns()
 
-    async def doubled(self) -> int:
+    async def double(self) -> int:
         """Start an agent a second time for a while; return when it has left."""
         name = self.dice.choice(AGENTS)
         second = self.processes.start(name, "agent", name, "--run", RUN, "--connect", self.relays[name].endpoint,
@@ -486,17 +486,17 @@ def ways(match: Arena, endpoint: Endpoint | None) -> dict[str, Callable[[], Awai
         return time.time_ns()
 
     return {
-        "agent killed": lambda: match.killed(dice.choice(AGENTS)),
-        "agent stopped": lambda: match.stopped(dice.choice(AGENTS), dice.choice([0.3, 1.5])),
-        BEYOND: lambda: match.stopped(dice.choice(AGENTS), LEASE_S + 1.5),
+        "agent killed": lambda: match.kill(dice.choice(AGENTS)),
+        "agent stopped": lambda: match.stop(dice.choice(AGENTS), dice.choice([0.3, 1.5])),
+        BEYOND: lambda: match.stop(dice.choice(AGENTS), LEASE_S + 1.5),
         "agent's link cut": lambda: match.cut(dice.choice(AGENTS), dice.uniform(0.05, 3)),
         "host's link cut": lambda: match.cut("host", dice.uniform(0.05, 3)),
-        "router restarted": lambda: match.killed("router", dice.uniform(0, 1)),
+        "router restarted": lambda: match.kill("router", dice.uniform(0, 1)),
         "endpoint away": away,
-        "two processes of one agent": match.doubled,
+        "two processes of one agent": match.double,
         "game killed": lambda: match.game(signal.SIGKILL),
         "game hangs": lambda: match.game(signal.SIGSTOP),
-        "host killed": lambda: match.killed("host"),
+        "host killed": lambda: match.kill("host"),
     }
 
 
@@ -523,7 +523,7 @@ async def everything(
                 while not match.lost and _sum(failing.counted, saboteur.counted, match.faults) < faults:
                     await match.steady()
             counted = failing.counted + saboteur.counted
-        return _judged(match, counted)
+        return _judge(match, counted)
 
 
 async def routers(processes: Processes, restarts: int, seed: int) -> Verdict:
@@ -532,8 +532,8 @@ async def routers(processes: Processes, restarts: int, seed: int) -> Verdict:
     async with arena(processes, dice, "bench.survival.faults:decide", 15.0, RECOVERY_S) as match:
         for _ in range(restarts):
             await asyncio.sleep(dice.uniform(0, 0.3))
-            await match.inject("router restarted", lambda: match.killed("router", dice.uniform(0, 0.5)))
-    verdict = _judged(match, Counter())
+            await match.inject("router restarted", lambda: match.kill("router", dice.uniform(0, 0.5)))
+    verdict = _judge(match, Counter())
     slow = [f"answer after {took_s:.1f} s" for took_s in verdict.recovery_s["router restarted"] if took_s > ANSWER_S]
     lost = [f"{times} {status}" for status, times in verdict.statuses.items() if status != "ok"]
     verdict.lost = [*verdict.lost, *slow, *lost]
@@ -553,18 +553,24 @@ async def _sabotage(match: Arena) -> AsyncIterator[Saboteur]:
 
 
 def _sum(*counted: Any) -> int:
-    return sum(one.total() if isinstance(one, Counter) else len(one) for one in counted)
+    return sum(each.total() if isinstance(each, Counter) else len(each) for each in counted)
 
 
-def _judged(match: Arena, counted: Counter[str]) -> Verdict:
+def _judge(match: Arena, counted: Counter[str]) -> Verdict:
     recording = match.recording()
-    good_ns = [one.log_time_ns for one in recording if isinstance(one.message, Report) and is_answered(one.message)]
+    good_ns = [
+        sample.log_time_ns for sample in recording if isinstance(sample.message, Report) and is_answered(sample.message)
+    ]
     for fault in match.faults:
         if fault.undone_ns:
             fault.recovered_ns = next((at for at in good_ns if at > fault.undone_ns), fault.recovered_ns)
     kinds = dict.fromkeys(fault.kind for fault in match.faults)
     times_s = {
-        kind: [(one.recovered_ns - one.undone_ns) / 1e9 for one in match.faults if one.kind == kind and one.undone_ns]
+        kind: [
+            (fault.recovered_ns - fault.undone_ns) / 1e9
+            for fault in match.faults
+            if fault.kind == kind and fault.undone_ns
+        ]
         for kind in kinds
     }
     counted = counted + Counter(fault.kind for fault in match.faults)

@@ -221,7 +221,7 @@ def corpus() -> list[str]:
     return [*written, *sorted(recorded)]
 
 
-def mutated(chance: random.Random, texts: Sequence[str], words: Sequence[str]) -> str:
+def mutate(chance: random.Random, texts: Sequence[str], words: Sequence[str]) -> str:
     """Return a text with some changes; one of a hundred is as long as a reply may be, or longer."""
     mixture = "".join(chance.choices(TOKENS, k=chance.randrange(1, 40)))
     text = chance.choice(texts) if chance.random() < 0.7 else mixture
@@ -245,10 +245,13 @@ def mutated(chance: random.Random, texts: Sequence[str], words: Sequence[str]) -
 
 def replies(stage: list[Scene], count: int, seed: int) -> Verdict:
     """Return the outcome of this number of replies."""
-    chance, texts, verdict = random.Random(seed), corpus(), Verdict()
-    for _ in _counted(verdict, count):
+    chance = random.Random(seed)
+    texts = corpus()
+    verdict = Verdict()
+    for _ in _trials(verdict, count):
         scene = chance.choice(stage)
-        agent, text = chance.choice(scene.agents).name, mutated(chance, texts, scene.words)
+        agent = chance.choice(scene.agents).name
+        text = mutate(chance, texts, scene.words)
         try:
             took_s, lines = scene.play(agent, text)
         except Exception:  # noqa: BLE001  # every one is a find
@@ -259,21 +262,24 @@ def replies(stage: list[Scene], count: int, seed: int) -> Verdict:
         growth = scene.growth(lines)
         verdict.forged += any(map(is_forged, lines.values()))
         if took_s > verdict.slowest_s:
-            verdict.slowest_s, verdict.slowest = took_s, f"{len(text)} characters, ends {text[-60:]!r}"
+            verdict.slowest_s = took_s
+            verdict.slowest = f"{len(text)} characters, ends {text[-60:]!r}"
         if growth > verdict.most_growth:
-            verdict.most_growth, verdict.longest = growth, f"{scene.task.name}, {agent}, {len(text)} characters"
+            verdict.most_growth = growth
+            verdict.longest = f"{scene.task.name}, {agent}, {len(text)} characters"
     return verdict
 
 
 def frames(count: int, seed: int) -> Verdict:
     """Return the outcome of this number of frames, which may be refused and must not raise anything else."""
-    chance, verdict = random.Random(seed), Verdict()
+    chance = random.Random(seed)
+    verdict = Verdict()
     known: dict[type, list[bytes]] = {kind: [] for kind in MESSAGE_TYPES}
     for recorded in read(GOLDEN):
         if recorded.message is not None:
             known[type(recorded.message)].append(encode(recorded.message))
     known = {kind: sorted(payloads, key=len)[:40] for kind, payloads in known.items() if payloads}
-    for _ in _counted(verdict, count):
+    for _ in _trials(verdict, count):
         kind = chance.choice(list(known))
         payload = _broken(chance, chance.choice(known[kind]))
         try:
@@ -284,7 +290,8 @@ def frames(count: int, seed: int) -> Verdict:
             verdict.exceptions[_where(repr(payload[:200]))] += 1
             continue
         if took_s > verdict.slowest_s:
-            verdict.slowest_s, verdict.slowest = took_s, f"{kind.__name__} of {len(payload)} bytes"
+            verdict.slowest_s = took_s
+            verdict.slowest = f"{kind.__name__} of {len(payload)} bytes"
     return verdict
 
 
@@ -318,9 +325,10 @@ def _broken(chance: random.Random, payload: bytes) -> bytes:
     return payload
 
 
-def _counted(verdict: Verdict, count: int) -> Iterator[None]:
+def _trials(verdict: Verdict, count: int) -> Iterator[None]:
     """Yield once for each trial, and measure all of them; memory is measured after the first tenth."""
-    began, before_mb = time.perf_counter(), 0.0
+    began = time.perf_counter()
+    before_mb = 0.0
     for number in range(count):
         if number == count // 10:
             before_mb = _resident_mb()
@@ -345,8 +353,8 @@ def run(trial: Callable[[int, int], Verdict], count: int, seed: int, processes: 
     with multiprocessing.get_context("fork").Pool(processes) as pool:
         found = pool.starmap(trial, shares)
     whole = Verdict()
-    for one in found:
-        whole.add(one)
+    for verdict in found:
+        whole.add(verdict)
     return whole
 
 

@@ -127,7 +127,7 @@ def _spent_ms(case: Callable[[], object]) -> float:
     return 1000 * (time.process_time() - began)
 
 
-def mutated(text: str, other: str, dice: random.Random) -> str:
+def mutate(text: str, other: str, dice: random.Random) -> str:
     """Return a text with some changes, most often one; `other` gives pieces to splice in."""
     for _ in range(dice.choice((1, 1, 2, 4))):
         text = dice.choice(_CHANGES)(text, other, dice)
@@ -151,8 +151,8 @@ def _splice(text: str, other: str, dice: random.Random) -> str:
 
 def _swap(text: str, _: str, dice: random.Random) -> str:
     words = text.split(" ")
-    one, two = dice.randrange(len(words)), dice.randrange(len(words))
-    words[one], words[two] = words[two], words[one]
+    first, second = dice.randrange(len(words)), dice.randrange(len(words))
+    words[first], words[second] = words[second], words[first]
     return " ".join(words)
 
 
@@ -190,7 +190,7 @@ def files(count: int, seed: int, directory: Path) -> Tally:
     for number in range(count):
         dice = random.Random(f"{seed} {number}")
         (path, model), (other, _) = dice.choice(shipped), dice.choice(shipped)
-        text = mutated(path.read_text(encoding="utf-8"), other.read_text(encoding="utf-8"), dice)
+        text = mutate(path.read_text(encoding="utf-8"), other.read_text(encoding="utf-8"), dice)
         hostile = directory / "hostile.yaml"
         hostile.write_bytes(_bytes(text, dice))
         tally.judge(f"file {seed} {number}, of {path.name}", lambda: load(hostile, model))  # noqa: B023  # called at once
@@ -223,7 +223,7 @@ def scenarios(count: int, seed: int, directory: Path) -> Tally:
         dice = random.Random(f"{seed} {number}")
         name, other = dice.choice(names), dice.choice(names)
         hostile = directory / "scenario.yaml"
-        hostile.write_bytes(_bytes(mutated(shipped[name], shipped[other], dice), dice))
+        hostile.write_bytes(_bytes(mutate(shipped[name], shipped[other], dice), dice))
         tally.judge(f"scenario {seed} {number}, of {name}", lambda: read_scenario(hostile))  # noqa: B023  # called at once
     return tally
 
@@ -241,9 +241,9 @@ def recordings(count: int, seed: int, directory: Path) -> Tally:
         dice = random.Random(f"{seed} {number}")
         path = directory / f"{number}.mcap"
         if dice.random() < 0.5:
-            path.write_bytes(_damaged(whole, dice))
+            path.write_bytes(_damage(whole, dice))
         else:
-            _written(path, _changed(samples, dice))
+            _written(path, _change(samples, dice))
         tally.judge(f"recording {seed} {number}", lambda: _show(path))  # noqa: B023  # called at once
         path.unlink()
     return tally
@@ -258,7 +258,7 @@ def _written(path: Path, samples: list[tuple[str, bytes]]) -> Path:
     return path
 
 
-def _damaged(whole: bytes, dice: random.Random) -> bytes:
+def _damage(whole: bytes, dice: random.Random) -> bytes:
     data = bytearray(whole)
     for _ in range(dice.randint(1, 8)):
         at = dice.randrange(len(data))
@@ -278,7 +278,7 @@ def _damaged(whole: bytes, dice: random.Random) -> bytes:
     return bytes(data)
 
 
-def _changed(samples: list[tuple[str, bytes]], dice: random.Random) -> list[tuple[str, bytes]]:
+def _change(samples: list[tuple[str, bytes]], dice: random.Random) -> list[tuple[str, bytes]]:
     changed = list(samples)
     for _ in range(dice.randint(1, 6)):
         at = dice.randrange(len(changed))
@@ -286,7 +286,7 @@ def _changed(samples: list[tuple[str, bytes]], dice: random.Random) -> list[tupl
         other = dice.choice(changed)
         match dice.randrange(4):
             case 0:
-                key = mutated(key, other[0], dice)[:1000].encode("utf-8", "replace").decode()
+                key = mutate(key, other[0], dice)[:1000].encode("utf-8", "replace").decode()
             case 1:
                 key = other[0]
             case 2:
@@ -301,7 +301,7 @@ def _changed(samples: list[tuple[str, bytes]], dice: random.Random) -> list[tupl
 def _json(text: str, other: str, dice: random.Random) -> str:
     """Return changed JSON: often one that still is JSON, with another value somewhere."""
     if dice.random() < 0.4:
-        return mutated(text, other, dice)
+        return mutate(text, other, dice)
     values = (
         "1" + "0" * 400,
         "-1",

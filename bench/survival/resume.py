@@ -102,7 +102,7 @@ class Whole:
     def of(cls, path: Path) -> Whole:
         """Read a recording."""
         recording = Recording.open(path)
-        seen = sorted((one.step, one.agent, one.model_dump_json()) for one in recording.of(Observation))
+        seen = sorted((seen.step, seen.agent, seen.model_dump_json()) for seen in recording.of(Observation))
         calls = {(call.step, call.agent): repr(call.prompt) for call in recording.of(ModelCall)}
         steps = tuple(report.step for report in recording.of(Report))
         return cls(hashlib.sha256("".join(text for *_, text in seen).encode()).hexdigest(), steps, calls)
@@ -128,7 +128,7 @@ class Resumed:
     @property
     def unequal(self) -> int:
         """Kills of matches that did not end as if nothing had happened."""
-        return sum(not one.equal for one in self.kills)
+        return sum(not kill.equal for kill in self.kills)
 
     @property
     def is_good(self) -> bool:
@@ -204,7 +204,7 @@ class Watch:
         reports = await self._bus.subscribe(run_key(RUN, Topic.REPORT), Delivery.LOG)
         async with asyncio.TaskGroup() as group:
             group.create_task(self._cards(cards))
-            group.create_task(self._asked(asked))
+            group.create_task(self._note_questions(asked))
             group.create_task(self._reports(reports))
 
     async def until_step(self, step: int, host: subprocess.Popen[bytes], processes: Processes) -> None:
@@ -231,7 +231,7 @@ class Watch:
         async for _ in cards:
             self.card_s = time.monotonic()
 
-    async def _asked(self, observations: Subscription[Sample]) -> None:
+    async def _note_questions(self, observations: Subscription[Sample]) -> None:
         async for _ in observations:
             self.asked_s = self.asked_s or time.monotonic()
 
@@ -254,7 +254,8 @@ async def play(processes: Processes, model: str, case: Case, moments: Sequence[f
         for moment in moments:
             await watch.until_step(int(moment), host, processes)
             await asyncio.sleep((moment % 1) * 0.1)  # a step takes about 0.1 s
-            step, killed_s = watch.step, time.monotonic()
+            step = watch.step
+            killed_s = time.monotonic()
             host.kill()
             host.wait()
             watch.asked_s = watch.over_s = 0.0
@@ -311,16 +312,16 @@ async def measure(kills: int, seed: int, only: Collection[str] | None = None) ->
             except (RuntimeError, TimeoutError) as error:
                 failed.append(f"{case.name}, killed at {moments}: {str(error) or 'nothing happened for too long'}")
                 continue
-            found += await _judged(seen, Whole.of(path), whole[case.clock, case.memory], case, path)
+            found += await _judge(seen, Whole.of(path), whole[case.clock, case.memory], case, path)
             print(f"{case.name}: {found[-1]}", file=sys.stderr)
     return Resumed(found, failed, processes.orphans)
 
 
-async def _judged(seen: Sequence[Kill], played: Whole, whole: Whole, case: Case, path: Path) -> list[Kill]:
+async def _judge(seen: Sequence[Kill], played: Whole, whole: Whole, case: Case, path: Path) -> list[Kill]:
     equal = played.digest == whole.digest if case.clock != "realtime" else not await replay_host(path)
     complete = played.steps == tuple(range(STEPS))
     prompts = 0 if case.clock == "realtime" else played.other_prompts(whole)
-    return [Kill(one.case, one.step, one.replay_s, one.away_s, equal and complete, prompts) for one in seen]
+    return [Kill(kill.case, kill.step, kill.replay_s, kill.away_s, equal and complete, prompts) for kill in seen]
 
 
 def table(found: Sequence[Kill]) -> Table:
@@ -328,9 +329,9 @@ def table(found: Sequence[Kill]) -> Table:
     shown = Table(title=f"hosts killed in a match of {STEPS} steps ({TASK})", box=None)
     for column in ("case", "killed after step", "replay s", "steps/s", "away s", "equal", "other prompts"):
         shown.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
-    for one in found:
-        figures = f"{one.replay_s:.2f}", f"{one.steps_per_s:.0f}", f"{one.away_s:.1f}"
-        shown.add_row(one.case, str(one.step), *figures, "yes" if one.equal else "NO", str(one.prompts))
+    for kill in found:
+        figures = f"{kill.replay_s:.2f}", f"{kill.steps_per_s:.0f}", f"{kill.away_s:.1f}"
+        shown.add_row(kill.case, str(kill.step), *figures, "yes" if kill.equal else "NO", str(kill.prompts))
     return shown
 
 

@@ -124,7 +124,8 @@ class Soak:
         for number, share in enumerate(shares(self.names, AGENT_PROCESSES)):
             self._start(f"agents {number}", "agent", *share, "--run", RUN, "--connect", self._endpoint,
                         "--policy", "bench.survival.soak:decide")  # fmt: skip
-        began, marks = time.monotonic(), list[Mark]()
+        began = time.monotonic()
+        marks = list[Mark]()
         while len(marks) < TENTHS:
             await self._next(results)
             size = sum(path.stat().st_size for path in (out / RUN).glob("*.mcap"))
@@ -156,12 +157,12 @@ async def measure(decisions: int, agents: int) -> Soaked:
     with tempfile.TemporaryDirectory() as directory, Processes(Path(directory)) as processes:
         marks = list(await Soak(processes, agents, steps).play())
         reports = list(Recording.open(Path(directory) / "runs" / RUN / "recording.mcap").of(Report))
-    tenths = [[one.timings for one in reports if one.episode == tenth] for tenth in range(TENTHS)]
+    tenths = [[report.timings for report in reports if report.episode == tenth] for tenth in range(TENTHS)]
     outcomes = [agent.status for report in reports for agent in report.agents]
     return Soaked(
-        [Mark(steps * agents * one.decisions, one.wall_s, one.rss_mb, one.recording_mb) for one in marks],
-        [statistics.median(1000 * (t.observe_s + t.publish_s + t.wait_s + t.act_s) for t in one) for one in tenths],
-        [statistics.median(1000 * t.game_s for t in one) for one in tenths],
+        [Mark(steps * agents * mark.decisions, mark.wall_s, mark.rss_mb, mark.recording_mb) for mark in marks],
+        [statistics.median(1000 * (t.observe_s + t.publish_s + t.wait_s + t.act_s) for t in tenth) for tenth in tenths],
+        [statistics.median(1000 * t.game_s for t in tenth) for tenth in tenths],
         sum(status != "ok" for status in outcomes),
         len(outcomes),
         processes.orphans,

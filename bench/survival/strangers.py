@@ -60,7 +60,8 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Briefing
 
 RUN, BLUE, RED = "siege", "blue", "red"
-HONEST, MALLORY = ("Stalkers", "Zealots"), "Mallory"
+HONEST = ("Stalkers", "Zealots")
+MALLORY = "Mallory"
 ROOT, VICTIM = f"khala/{RUN}", f"khala/{RUN}/{BLUE}/{HONEST[0]}"
 OWN = f"khala/{RUN}/{BLUE}/{MALLORY}"
 FORGED = b"FORGED"
@@ -231,7 +232,8 @@ def floods(key: str) -> Callable[[Stranger], Tried]:
 
     def attack(me: Stranger) -> Tried:
         """Flood."""
-        until, count = time.monotonic() + me.seconds, 0
+        until = time.monotonic() + me.seconds
+        count = 0
         with me.session() as session:
             while time.monotonic() < until:
                 session.put(key, FRAME, congestion_control=zenoh.CongestionControl.BLOCK)
@@ -403,13 +405,13 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         certify_agent(keys, RED, "Roaches")
         names = [(BLUE, HONEST[0]), (BLUE, HONEST[1]), (BLUE, MALLORY), (RED, "Roaches")]
         rules = router_settings(names, RUN)
-        router = await _opened(
+        router = await _open(
             stack, BusConfig(mode="router", listen=(listen,), tls=files_of(keys, "router"), zenoh=rules)
         )
         endpoint = router.endpoints[0]
         host = router
         if separate:
-            host = await _opened(stack, BusConfig(connect=(endpoint,), tls=files_of(keys, "host")))
+            host = await _open(stack, BusConfig(connect=(endpoint,), tls=files_of(keys, "host")))
         seats = [Seat(BLUE, name) for name in (*HONEST, MALLORY)]
         recorder = stack.enter_context(Recorder(keys / "recording.mcap"))
         bus = RecordingBus(host, recorder, seats)
@@ -419,7 +421,7 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         turn = await stack.enter_async_context(Turn(bus, RUN, roster))
         players = (*HONEST, MALLORY)
         agents = [
-            await _opened(stack, BusConfig(connect=(endpoint,), tls=files_of(keys, agent_name(BLUE, name))))
+            await _open(stack, BusConfig(connect=(endpoint,), tls=files_of(keys, agent_name(BLUE, name))))
             for name in players
         ]
         running = stack.enter_context(_tasks())
@@ -442,7 +444,7 @@ async def siege(listen: str = "tls/127.0.0.1:0", *, separate: bool = False) -> A
         yield match
 
 
-async def _opened(stack: contextlib.AsyncExitStack, config: BusConfig) -> Any:
+async def _open(stack: contextlib.AsyncExitStack, config: BusConfig) -> Any:
     session = await open_bus(config)
     stack.push_async_callback(session.close)
     return session
@@ -516,8 +518,8 @@ def table(rows: Sequence[Row]) -> Table:
     shown = Table(title=f"attacks on a match with {len(HONEST)} honest agents, {ANSWER_S:g} s to answer", box=None)
     for column in ("attack", "tried", "succeeded", "steps", "late", "slowest ms"):
         shown.add_column(column, justify="left" if column == "attack" else "right", no_wrap=True)
-    for one in rows:
-        shown.add_row(*(str(value) for value in asdict(one).values()))
+    for row in rows:
+        shown.add_row(*(str(value) for value in asdict(row).values()))
     return shown
 
 
@@ -542,4 +544,4 @@ def main() -> None:
     )
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:
-        print(json.dumps({"rows": [asdict(one) for one in rows]}))
+        print(json.dumps({"rows": [asdict(row) for row in rows]}))

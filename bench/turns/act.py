@@ -68,7 +68,8 @@ def scene() -> tuple[Actor, Any]:
 
 def snapshot() -> Snapshot:
     """Return a snapshot of five teams of four, and forty enemies around them."""
-    response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
+    response = sc_pb.ResponseObservation()
+    info = sc_pb.ResponseGameInfo()
     units = response.observation.raw_data.units
     own = [name for name in TEAMS for _ in range(UNITS_PER_TEAM)]
     armies = ((own, raw_pb2.Self, FIRST_OWN), (["Roach"] * FOES, raw_pb2.Enemy, FIRST_FOE))

@@ -234,7 +234,8 @@ class BareHost(RawHost):
 
     async def play(self, number: int) -> None:
         self.done.clear()
-        self.head, self.missing = number.to_bytes(HEAD_BYTES), len(self.publishers)
+        self.head = number.to_bytes(HEAD_BYTES)
+        self.missing = len(self.publishers)
         for publisher in self.publishers:
             publisher.put(self.head + self.body)
         if not self.done.wait(1.0):  # the measured behaviour: blocking

@@ -54,7 +54,8 @@ class Row:
 async def measure(name: str, calls: list[Callable[[], Awaitable[object]]], rounds: int) -> Row:
     wall, cpu = [], []
     for _ in range(rounds + 1):
-        began, used = time.perf_counter(), time.process_time()
+        began = time.perf_counter()
+        used = time.process_time()
         await asyncio.gather(*(call() for call in calls))
         wall.append(time.perf_counter() - began - LATENCY_S)
         cpu.append((time.process_time() - used) / len(calls))

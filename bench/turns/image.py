@@ -76,11 +76,15 @@ def task_of(shown: Snapshot, spec: ImageSpec) -> TaskConfig:
 def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
     task = task_of(snapshots[0], spec)
     observer = Observer(task.model_copy(update={"agents": (task.agents[0].model_copy(update={"images": ()}),)}))
-    took_ms, worked_ms, sizes, units = [], [], [], 0
+    took_ms = []
+    worked_ms = []
+    sizes = []
+    units = 0
     for shown in snapshots:
         seen = next(iter(observer.observe(shown).agents.values()))
         seen = dataclasses.replace(seen, agent=task.agents[0])
-        began, worked = time.perf_counter(), time.thread_time()
+        began = time.perf_counter()
+        worked = time.thread_time()
         pictures = Album(shown, shown.info.frame(Frames())).pictures(seen)
         took_ms.append(1000 * (time.perf_counter() - began))
         worked_ms.append(1000 * (time.thread_time() - worked))

@@ -97,7 +97,8 @@ def snapshot(own: dict[str, int], foes: dict[str, int], loop: int) -> Snapshot:
 def messages(
     own: dict[str, int], foes: dict[str, int], loop: int, size: int = 32
 ) -> tuple[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo]:
-    response, info = sc_pb.ResponseObservation(), sc_pb.ResponseGameInfo()
+    response = sc_pb.ResponseObservation()
+    info = sc_pb.ResponseGameInfo()
     observation = response.observation
     observation.game_loop = loop
     hurt = float(loop % 2 * 7)
@@ -142,7 +143,8 @@ def crowd(places: int, loop: int) -> Snapshot:
 
 def unseen_ms(task: TaskConfig, snapshots: list[Snapshot]) -> float:
     """Return the cost of an observation at which no agent looks."""
-    observer, took_ms = Observer(task), []
+    observer = Observer(task)
+    took_ms = []
     for round_ in range(ROUNDS):
         began = time.perf_counter()
         observer.observe(snapshots[round_ % 2])
@@ -152,7 +154,8 @@ def unseen_ms(task: TaskConfig, snapshots: list[Snapshot]) -> float:
 
 def measure_full_game(places: int) -> dict[str, Any]:
     """Return the cost of one observation of all twelve agents."""
-    observer, snapshots = Observer(full_game()), [crowd(places, loop) for loop in (0, 1)]
+    observer = Observer(full_game())
+    snapshots = [crowd(places, loop) for loop in (0, 1)]
     observe_ms = []
     observation = observer.observe(snapshots[1])
     tidy_memory()  # as a host does when a match begins
@@ -174,7 +177,8 @@ def measure_full_game(places: int) -> dict[str, Any]:
 
 def measure(name: str) -> dict[str, Any]:
     task = load_task(name)
-    observer, actor = Observer(task), Actor(task)
+    observer = Observer(task)
+    actor = Actor(task)
     snapshots = [snapshot(*BATTLES[name], loop) for loop in (0, 1)]
     observe_ms, act_ms = [], []
     observation = observer.observe(snapshots[1])

@@ -71,7 +71,8 @@ class Onlookers(SilentObserver):
         """Return the answers of one step."""
         found: dict[Seat, Answer] = {}
         for question in questions:
-            seen, began = question.observation, time.perf_counter()
+            seen = question.observation
+            began = time.perf_counter()
             text = PLAYERS["skilled"](seen.text, random.Random(f"{seen.agent} {seen.step}"))
             self.began += time.perf_counter() - began
             place = {"run": seen.run, "agent": seen.agent, "side": seen.side, "episode": 0, "step": seen.step}

@@ -105,7 +105,8 @@ class Bench:
         self.bus, self.run, self.snapshot = bus, run, snapshot
         self.task = crowd(task, agents)
         self.seats = [Seat(task.side, agent.name) for agent in self.task.agents]
-        self.observer, self.actor = Observer(self.task, Everybodys), Actor(self.task)
+        self.observer = Observer(self.task, Everybodys)
+        self.actor = Actor(self.task)
         self.exchanges: dict[str, bytes] = {}
         self.arrived = asyncio.Event()
 
@@ -322,7 +323,7 @@ def main() -> None:
     measured = asyncio.run(
         measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp, tls=arguments.tls)
     )
-    rows = [one.row(LATENCY_S) for one in measured]
+    rows = [turn.row(LATENCY_S) for turn in measured]
     Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
     if arguments.json:
         print(json.dumps({"latency_s": LATENCY_S, "rows": rows}))
