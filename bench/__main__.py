@@ -9,9 +9,9 @@
     python -m bench history                      the page and the pictures of all results that are kept
     python -m bench limits                       fail if a ratio of one run is beyond its limit
 
-Options of this command stand before the names. Several benchmarks run one after the other, each in a process of its own.
-All together take hours, those of which figures are kept ten minutes a time. They are most reliable on an otherwise idle
-machine.
+Options of this command stand before the names. Several benchmarks run one after the other, each in a process of its
+own. All together take hours, those of which figures are kept ten minutes a time. They are most reliable on an otherwise
+idle machine.
 """
 
 from __future__ import annotations

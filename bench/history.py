@@ -1,4 +1,4 @@
-"""Write the page of all results that are kept, with a picture of each figure over time: `python -m bench history`.
+"""Write the page of all kept results, with a picture of each figure over time.
 
 It reads `bench/results` and writes `docs/measurements-over-time.md` and `docs/images/measurements`. Results of code
 that differed from its commit are left out. Machines have colours of their own: values of two say nothing of the code.
@@ -6,7 +6,6 @@ that differed from its commit are left out. Machines have colours of their own: 
 
 from __future__ import annotations
 
-import argparse
 import io
 import itertools
 import re
@@ -14,6 +13,7 @@ import statistics
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from bench.command_line import make_parser
 from bench.paths import RESULTS, ROOT
 from bench.results import SHORT, every
 from docs.pages import markdown
@@ -184,9 +184,7 @@ def kept_results(among: Path = RESULTS) -> list[Results]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the page."""
-    argparse.ArgumentParser(
-        prog="python -m bench history", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args(arguments)
+    make_parser(__doc__, json=False).parse_args(arguments)
     kept = kept_results()
     first, *rest = write(kept)
     print(f"{first.relative_to(ROOT)}: {len(kept)} results, {len(rest)} pictures")

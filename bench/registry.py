@@ -1,7 +1,7 @@
 """Every benchmark: its module, the claim that it backs, and when it runs.
 
-`python -m bench`, its `--help` and `--list`, and `python -m bench limits` read this table and import no benchmark before
-it runs. The first line of a module's docstring says what it measures.
+`python -m bench`, its `--help` and `--list`, and `python -m bench limits` read this table. None of them imports a
+benchmark before it runs. The first line of a module's docstring says what it measures.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ Part: TypeAlias = Literal["figures", "table", "alone"]
 
 figures: its figures are kept. Its module has `--json`, and `measures`, which makes figures of what `--json` prints.
 table: it prints its table.
-alone: it is left out, and runs when it is named. It takes hours, needs a checkout of another project, or looks after the
-    repository. All words after its name are its own.
+alone: it is left out, and runs when it is named. It takes hours, needs a checkout of another project, or looks after
+    the repository. All words after its name are its own.
 """
 
 
@@ -58,7 +58,7 @@ class Benchmark:
 BENCHMARKS: Final[Mapping[str, Benchmark]] = {
     benchmark.name: benchmark
     for benchmark in (
-        Benchmark("yardstick", "docs/measurements-over-time.md", "figures"),
+        Benchmark("yardstick", "Measurements", "figures"),
         Benchmark("turns.turn", "A step costs what the model costs", "figures"),
         Benchmark("turns.bus", "The bus", "figures", limited=("--agents", "8", "32", "--scale", "1")),
         Benchmark("simulator.simulator_engine", "The simulator", "figures"),
@@ -107,7 +107,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("survival.experiments", "tests/khala/experiment/test_engine.py"),
         Benchmark("survival.hostile", "docs/design/turn.md"),
         Benchmark("survival.hostile_files", "SECURITY.md"),
-        Benchmark("limits", "docs/measurements-over-time.md"),
+        Benchmark("limits", "Measurements"),
         Benchmark("compare", "docs/measurements-over-time.md"),
         Benchmark("history", "docs/measurements-over-time.md"),
         Benchmark("repository.house", "Makefile"),

@@ -116,7 +116,7 @@ def _short(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-def begun() -> Results:
+def begin() -> Results:
     """Return results without figures: the commit, the machine and the moment."""
     commit = _git("rev-parse", "HEAD")
     return Results(

@@ -1,7 +1,4 @@
-"""A fixed piece of work that no change of the project touches: how fast this machine is at the moment.
-
-    python -m bench yardstick            the milliseconds of processor time that it takes
-    python -m bench yardstick --json     one JSON object on stdout
+"""Measure how fast this machine is at the moment, by a piece of work that no change of the project touches.
 
 It is what hosts, agents and games mostly do: objects of Python, small arrays of numpy, JSON. `python -m bench compare`
 shows its factor beside the others, which says how much of them is the machine.

@@ -1,4 +1,16 @@
-"""Play the rows, print a table, and end with 1 if one of them got through a door."""
+"""Play every attack and every quirk of the outside world against every door of Khala.
+
+    python -m bench doors                       all rows, as a table; the exit code is 1 if one of them gets through
+    python -m bench doors --door "khala view"   those of one door
+    python -m bench doors --kind fault          those of one kind: attack, quirk or fault
+    python -m bench doors --jobs 2              in two processes
+    python -m bench doors --list                what would be played
+    python -m bench doors --check               the commands without rows; `make check` runs it
+
+A door is where something comes in that its owner did not write: a command that reads a file, a server, an endpoint that
+answers. `rows` says what a row is, `commands` lists the doors of the command line, `registry` says which module has the
+rows of which door, `playing` plays them, and each other module has rows.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +21,7 @@ from typing import TYPE_CHECKING, get_args
 
 from bench.command_line import make_parser
 from bench.doors.commands import missing
+from bench.doors.ending import end_on_sigterm
 from bench.doors.registry import DOORS, load_rows
 from bench.doors.rows import Kind
 from bench.tables import print_table
@@ -47,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             {"door": "left", "kind": "left", "what": "left"}, [(row.door, row.kind, row.what) for row in chosen]
         )
         return 0
+    end_on_sigterm()
     return run(rows, numbers, given.jobs)
 
 

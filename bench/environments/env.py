@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterator, Sequence
 
+WORKER = Path(__file__).with_name("env_worker.py")
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -58,7 +60,7 @@ class Kind:
         """Start one; it says `ready`."""
         environment = {**os.environ, "PYTHONPATH": self.path, "OMP_NUM_THREADS": "1"}
         environment["SC2PATH"] = str(games.find("simulator")[0])
-        command = [self.python, "-P", str(Path(__file__).parent / "env_worker.py"), self.name, map_name, str(seed)]
+        command = [self.python, "-P", str(WORKER), self.name, map_name, str(seed)]
         return subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -101,9 +103,7 @@ def measure(map_name: str, kinds: Sequence[Kind], count: int, seconds: float, ro
         for name, workers in started.items():
             for worker in workers:
                 if _line(worker) != "ready\n":
-                    raise SystemExit(
-                        f"an environment of {name} did not start: run bench/environments/env_worker.py {name} {map_name} 1"
-                    )
+                    raise SystemExit(f"an environment of {name} did not start: run {WORKER} {name} {map_name} 1")
         taken: dict[str, list[tuple[float, float]]] = {name: [] for name in started}
         for _ in range(rounds):
             for name, workers in started.items():

@@ -1,6 +1,6 @@
-"""One environment that is measured by `bench.environments.env`: it is made, waits for a line, plays, and says what that took.
+"""One environment that `python -m bench env` measures: it waits for a line, plays, and says how long that took.
 
-It needs nothing of Khala for SMAClite, so that another Python can run it: `python bench/environments/env_worker.py smaclite 3m 1`.
+It needs nothing of Khala for SMAClite, so that another Python can run it as a script: `env_worker.py smaclite 3m 1`.
 Between two steps it reads what a learner reads: observations, the state, and which actions are available, of which it
 takes one at random for each agent.
 """
@@ -88,7 +88,7 @@ class SmacLite(Khala):
 KINDS: dict[str, type[Khala]] = {"khala": Khala, "smac": Smac, "smaclite": SmacLite}
 
 
-def main() -> None:
+def work() -> None:
     """Make an environment, and play it for as many seconds as each line of the input says; its end is the end."""
     kind = sys.argv[1]
     map_name = sys.argv[2]
@@ -116,4 +116,4 @@ def _play(env: Khala, rng: np.random.Generator, seconds: float) -> dict[str, flo
 
 
 if __name__ == "__main__":
-    main()
+    work()

@@ -2,7 +2,6 @@
 
     python -m bench openenv                              a table
     python -m bench openenv --clients 1 8 --steps 5      fewer clients, shorter episodes
-    python -m bench openenv --json                       one JSON object
 
 The server is `khala openenv` in a process of its own, and each client has a session. `sessions` are whole
 ones a second: a client connects, begins an episode of 2s3z with a seed, plays some steps without orders,

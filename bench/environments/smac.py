@@ -132,17 +132,7 @@ def _gains(env: Any) -> float:
 
 def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: argparse.Namespace) -> Played:
     """Play one map in a process of its own, and end it when it takes too long."""
-    command = [
-        sys.executable,
-        "-m",
-        "bench.environments.smac",
-        str(root),
-        "--one",
-        "--maps",
-        map_name,
-        "--agents",
-        agent,
-    ]
+    command = [sys.executable, "-m", "bench", "smac", str(root), "--one", "--maps", map_name, "--agents", agent]
     command += ["--episodes", str(options.episodes), "--seed", str(options.seed)]
     environment = {**os.environ, "SC2PATH": str(sc2path), "PYTHONPATH": str(root)}
     limit_s = START_S + options.patience_s * options.episodes

@@ -1,4 +1,4 @@
-"""Measure how many steps a second SMAC's own package makes on the simulator, and which part of them is whose.
+"""Measure how many steps a second SMAC's own package makes on the simulator, and which process takes the time.
 
     python -m bench smac_speed ~/smac                         2s3z, 3s5z and 2c_vs_64zg, with their goals
     python -m bench smac_speed ~/smac --maps MMM2 --steps 1000

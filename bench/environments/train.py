@@ -4,10 +4,10 @@
     python -m bench train 3m --minutes 10 --seeds 1 2 3
     python -m bench train 2s3z --minutes 30 --envs 16 --out curve.svg
 
-The learner is PPO with shared weights (`bench.environments.ppo`), in this process, with all environments in turn. Printed are the
-win rate of the last 200 episodes as they were sampled, and, at the end, that of 100 new battles in which each agent
-takes its most likely action. Minutes are those of the processor, so that a busy machine changes nothing. Ctrl-C ends
-the training, and what there is is drawn.
+The learner is PPO with shared weights (`ppo.py`), in this process, with all environments in turn. It prints the win
+rate of the last 200 episodes as they were sampled and, at the end, that of 100 new battles in which each agent takes
+its most likely action. Minutes are those of the processor, so that a busy machine changes nothing. Ctrl-C ends the
+training, and draws the curve so far.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How true the messages of the scripted player are: each is judged by what its sender saw and its reader then did.
+"""Measure how true the messages of the scripted player are, by what their senders saw and their readers did.
 
     python -m bench messages                                       SCEB and ECEB, three races, 200 decisions each
     python -m bench messages --tasks simple64_sceb --steps 300 --show 20
@@ -138,7 +138,9 @@ def fault_of(said: Said) -> tuple[str, str]:
     for kind, (pattern, rule) in RULES.items():
         if found := pattern.fullmatch(said.text):
             return kind, rule(said, found)
-    raise UnknownMessage(f"{said.sender} writes {said.text!r}, and no rule of bench.messages judges that; add one")
+    raise UnknownMessage(
+        f"{said.sender} writes {said.text!r}, and no rule of bench/language/messages.py judges that; add one"
+    )
 
 
 # rules ----------------------------------------------------------------------------------------------------------------

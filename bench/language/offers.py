@@ -1,10 +1,9 @@
-"""How honest the offers are: random choices among what a text calls valid, and the share that is refused.
+"""Measure how many calls are refused that are drawn at random among those a text calls valid.
 
     python -m bench offers                                   the full games, 150 decisions of each, three races
     python -m bench offers --task simple64_ecsb --seeds 1 2  one task, two games
     python -m bench offers --after 220                       the same, after `skilled` has built for 220 decisions
     python -m bench offers --judged                          every offer, along a game of the player `skilled`
-    python -m bench offers --json                            one JSON object on stdout
 
 First `random-legal` plays, from the text alone as a model does: what the host or the game refuses of its calls is
 counted by action and reason. A random player has little after the first minute, so with `--after` it takes over a

@@ -1,8 +1,7 @@
-"""Read the corpus of replies, and measure how much of their meaning is understood.
+"""Measure how much of the meaning of a corpus of replies is understood.
 
     python -m bench recognition            a table
     python -m bench recognition --misses   and every reply that is not read as a person would read it
-    python -m bench recognition --json     one JSON object on stdout
 
 The corpus (`tests/bridge/corpus/*.yaml`) holds replies as models write them, and what a reasonable person would
 understand: calls with team, name and arguments, messages, channels, and the rejections. It was written by

@@ -82,17 +82,7 @@ def _bot(file: Path) -> Any:
 def play_apart(options: argparse.Namespace, sc2path: Path, game: tuple[str, int, int]) -> dict[str, Any]:
     """Play one game in a process of its own; return its result, or what was wrong."""
     bot, level, seed = game
-    command = [
-        sys.executable,
-        "-m",
-        "bench.matches.bots",
-        str(options.path),
-        "--one",
-        "--bots",
-        bot,
-        "--levels",
-        str(level),
-    ]
+    command = [sys.executable, "-m", "bench", "bots", str(options.path), "--one", "--bots", bot, "--levels", str(level)]
     command += ["--seed", str(seed), "--minutes", str(options.minutes), "--map", options.map]
     try:
         done = subprocess.run(

@@ -1,11 +1,9 @@
-"""One task under the four rules of the clock: what comes of it, and that it comes out the same twice.
+"""Play one task under the four rules of the clock, and check that it comes out the same twice.
 
 The scripted model plays through its HTTP endpoint, in one process with the host, the game beside it. Under `frozen`,
 `budget` and `token` each match is played twice, with an endpoint that answers at once and with one that takes its time:
 the hashes over all observations must be equal. Each recorded match, `realtime` included, is then played again from its
-recording: no observation may differ.
-
-Run `python -m bench clocks`; `--json` for one JSON object. The exit code is not 0 if a promise is broken.
+recording: no observation may differ. The exit code is not 0 if a promise is broken.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""How many games an hour this machine plays with scripted players, several at once.
+"""Measure how many games an hour this machine plays with scripted players, several at once.
 
     python -m bench games_per_hour                                   six tasks, as many games at once as there are cores
     python -m bench games_per_hour --tasks 2s3z_pair --games 40      one of them, so many games
     python -m bench games_per_hour --jobs 4                          four games at once
-    python -m bench games_per_hour --json                            one JSON object on stdout
 
 Games are played as `khala experiment run --jobs` plays them: recorded, each with a seed of its own, agents that ask the
 scripted model through its endpoint, which answers at once. Each process first plays a game that is not counted, since

@@ -1,4 +1,4 @@
-"""How often intervals hold the true value, and how often tests find what is not there.
+"""Measure how often intervals hold the true value, and how often tests find what is not there.
 
     python -m bench intervals                     some minutes
     python -m bench intervals --times 100 --json

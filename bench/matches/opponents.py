@@ -1,4 +1,4 @@
-"""How strong the computer players are: how they grow, and which level beats which.
+"""Measure how strong the computer players are: how they grow, and which level beats which.
 
     python -m bench opponents growth                            every level of every race at 1:30, 3, 5, 6 and 8 minutes
     python -m bench opponents growth --races terran --levels 1 7 --minutes 5
@@ -9,7 +9,7 @@
 
 Straight on the engine, without the SC2 API. A pair plays each seed from both seats in turn. A game that is not over
 after `--minutes` goes to the side whose units and structures cost more, if it has a quarter more; else it is drawn.
-The levels were tuned on seeds below 100; the ladder begins with seed 100. `--json` for one JSON object. With `--log`
+The levels were tuned on seeds below 100; the ladder begins with seed 100. With `--log`
 each game is written down when it is over, and a long ladder can be interrupted and continued; `--games 0`
 prints the file.
 """

@@ -1,4 +1,4 @@
-"""Agents of 0.2, 1, 5 and 20 s in one match in real time: what each gets done, and what the slow ones cost the others.
+"""Measure what quick and slow agents get done in one match in real time, and what the slow cost the quick.
 
 Four agents of a full game, each in a process of its own on the bus, sleep before they answer. The same match is played
 again with four agents of 0.2 s. By agent, and for the steps of the host:
@@ -8,7 +8,7 @@ again with four agents of 0.2 s. By agent, and for the steps of the host:
     late          answers that came past the deadline      past     how late steps began, in ms, median
 
 The exit code is not 0 if an answer of the agent that is quick in both matches, or a step, takes more than 1 ms longer
-at the median with slow agents beside it. Run `python -m bench pace`; `--json` for one JSON object.
+at the median with slow agents beside it.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ def table(title: str, figures: Figures) -> Table:
         shown.add_column(column, justify="right", no_wrap=True)
     for agent in figures.agents:
         shown.add_row(
-            agent.agent, f"{agent.sleep_s:g} s", str(agent.decisions), f"{agent.over_ms:.2f}", f"{agent.age_p50_loops:g}",
-            f"{agent.age_p95_loops:g}", f"{agent.steps_later:g}", str(agent.late),
+            agent.agent, f"{agent.sleep_s:g} s", str(agent.decisions), f"{agent.over_ms:.2f}",
+            f"{agent.age_p50_loops:g}", f"{agent.age_p95_loops:g}", f"{agent.steps_later:g}", str(agent.late),
         )  # fmt: skip
     return shown
 

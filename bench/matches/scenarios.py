@@ -2,7 +2,6 @@
 
     python -m bench scenarios                              all 33 maps, skilled and focus-fire, one episode each
     python -m bench scenarios --tasks 'pvz_task1*' --episodes 5 --players skilled
-    python -m bench scenarios --json                       one JSON object on stdout
 
 Host, agents and the scripted model are processes that talk over the bus, as in any other run. The table goes to
 `<out>/scenarios.md` as well, with a recording of every run next to it. The exit code is 1 if a run failed, or if a

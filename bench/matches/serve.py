@@ -1,4 +1,4 @@
-"""How long a match takes from its order to its first observation, cold and warm, and how fast several are at once.
+"""Measure the time from an order to its first observation, cold and warm, and how fast several matches are at once.
 
 python -m bench serve [--orders 5] [--matches 4]
 """

@@ -1,7 +1,5 @@
 """A recording as long as wanted, made of a short one that was played.
 
-    python -m bench long_recording long.mcap --decisions 20000
-
 A match of `simple64_sceb` with pictures is played for `STEPS` steps against the scripted model; then its steps are
 written again and again, each time later in steps, game loops and wall time, until there are as many decisions as
 asked for. So every message is one that Khala wrote, of the usual length; what a game would be like by then it does not
@@ -11,17 +9,15 @@ show. Flushed after every step, as a host does it.
 from __future__ import annotations
 
 import json
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.command_line import make_parser
 from bench.survival.processes import Processes
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recorded, Recorder, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 TASK = "simple64_sceb"
 STEPS = 150
@@ -100,17 +96,3 @@ def _later(sample: Recorded, steps: int, loops: int) -> bytes:
 
 def _is(sample: Recorded, topic: Topic) -> bool:
     return sample.address is not None and sample.address.topic is topic
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write one and print its size."""
-    parser = make_parser(__doc__, json=False)
-    parser.add_argument("path", type=Path)
-    parser.add_argument("--decisions", type=int, default=20_000)
-    parser.add_argument("--of", type=Path, help="a recording that is there, instead of a match that is played first")
-    options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as directory:
-        short = options.of or play_short(Path(directory))
-        done = lengthen(short, options.path, options.decisions)
-    print(f"{done} decisions, {options.path.stat().st_size / 1e6:.0f} MB")
-    return 0

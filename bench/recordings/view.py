@@ -1,8 +1,8 @@
-"""The page of `khala view`: how soon it shows something, how quickly it follows, and what it costs.
+"""Measure how soon the page of `khala view` shows a match, how quickly it follows, and what it costs.
 
     python -m bench view [open] [units] [live] [match] [--decisions 20000]
 
-open    a recording of many decisions (`bench.recordings.long_recording`), first without an index, then with one: seconds from the
+open    a recording of many decisions (`long_recording.py`), first without an index, then with one: seconds from the
         command to the address, and from there to the first map; then the milliseconds from a jump of the clock to the
         map and the decisions of that moment, over jumps all through the match; memory of the server and of the tab
 units   frames a second while a battle of `UNITS` units plays, and the longest frame

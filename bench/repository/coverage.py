@@ -1,7 +1,9 @@
-"""Coverage per package as a small table: `python -m bench coverage .coverage.json --at-least 90 protocol agents`.
+"""Print the coverage of each package; `make cover` fails if a named one has less than it should.
 
-It reads the JSON report of coverage.py; `make cover` makes and shows it. A package's figure is the share of its lines
-and of its branches together, as coverage.py counts them. It fails if a named package has less than it should.
+    python -m bench coverage .coverage.json --at-least 90 protocol agents
+
+It reads the JSON report of coverage.py. A package's figure is the share of its lines and of its branches together, as
+coverage.py counts them.
 """
 
 from __future__ import annotations

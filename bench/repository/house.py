@@ -1,4 +1,4 @@
-"""Habits of the code that cost readers a second look, counted; `make check` fails if one of them grows.
+"""Count habits of the code that cost readers a second look; `make check` fails if one of them grows.
 
 * classes: names of public classes that more than one module has
 * participles: functions and methods named by a participle (`played`), where an imperative (`play`) says who acts
@@ -6,7 +6,7 @@
 * packed: assignments of several unlike values in one line
 * phrases: turns of phrase that have to be read twice, in docstrings, comments, texts and pages
 
-    python -m bench house            the numbers, and their limits
+    python -m bench house                   the numbers, and their limits
     python -m bench house --where packed    each place of one kind
 
 A number that shrank is written into `LIMITS`, so that it does not grow again.

@@ -1,7 +1,4 @@
-"""Ask a game what its units can do, as every observation does, and measure how long that takes.
-
-    python -m bench abilities            a table
-    python -m bench abilities --json     one JSON object on stdout
+"""Measure how long a game takes to say what its units can do, as every observation asks it.
 
 The simulator runs in its own process, and PySC2 asks it over its websocket, as in a match: the base and the
 workers that a game of Simple64 begins with, plus 30 and 100 units of sixteen types. The time is that of

@@ -144,7 +144,7 @@ def _skip_frame(stream: BinaryIO) -> bool:
     return len(stream.read(4 + size)) == 4 + size
 
 
-def main() -> None:
+def answer() -> None:
     """Be the game process."""
     mode, answers, *rest = sys.argv[1:]
     arguments = parse(rest)
@@ -156,4 +156,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answer()

@@ -1,4 +1,4 @@
-"""Which compiler makes a system of the simulator's engine fast: numpy, numba, mypyc and Cython do the same work.
+"""Compare compilers for a system of the simulator's engine: numpy, numba, mypyc and Cython do the same work.
 
 The work is that of an engaged unit in every loop: for k fighters, the offset to the target, its length and the unit
 vector, and whether the target is in reach. Each way runs in a process of its own, which says how long a call takes for
@@ -13,6 +13,7 @@ installs numba, mypy and Cython into an environment of its own first.
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,8 +23,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from bench.repository.packages import UV, run
+from bench.command_line import make_parser
+from bench.paths import ROOT
 
+UV = shutil.which("uv") or str(ROOT / ".uv" / "bin" / "uv")
 SIZES = (20, 200)
 NUMPY = """
 import numpy as np
@@ -112,37 +115,30 @@ def measure(folder: Path, python: str) -> dict[str, dict[str, Any]]:
     ways = {"with_numpy.py": NUMPY, "with_numba.py": NUMBA, "with_mypyc.py": MYPYC, "with_cython.pyx": CYTHON}
     for name, text in {**ways, "build.py": BUILD, "measure.py": MEASURE}.items():
         (folder / name).write_text(text, encoding="utf-8")
-    subprocess.run([python, "build.py", "-q", "build_ext", "--inplace"], cwd=folder, check=True, capture_output=True)
+    _run(python, "build.py", "-q", "build_ext", "--inplace", folder=folder)
     said = {}
     for label, module in (
         ("numpy", "with_numpy"), ("numba, first run", "with_numba"), ("numba, from its cache", "with_numba"),
         ("mypyc", "with_mypyc"), ("Cython", "with_cython"),
     ):  # fmt: skip
-        command = [python, "measure.py", module, json.dumps(SIZES)]
-        said[label] = json.loads(subprocess.run(command, cwd=folder, check=True, capture_output=True).stdout)
+        said[label] = json.loads(_run(python, "measure.py", module, json.dumps(SIZES), folder=folder))
     return said
 
 
+def _run(*command: str, folder: Path | None = None) -> bytes:
+    """Return the output of a command."""
+    return subprocess.run(command, cwd=folder, check=True, capture_output=True).stdout
+
+
 def main() -> None:
+    """Build and measure all ways, and print a row for each."""
+    make_parser(__doc__, json=False).parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = folder / "environment"
-        run(UV, "venv", "--quiet", "--python", sys.executable, environment, cwd=folder)
+        _run(UV, "venv", "--quiet", "--python", sys.executable, str(environment))
         python = str(environment / "bin" / "python")
-        run(
-            UV,
-            "pip",
-            "install",
-            "--quiet",
-            "--python",
-            python,
-            "numba",
-            "mypy",
-            "cython",
-            "setuptools",
-            "numpy",
-            cwd=folder,
-        )
+        _run(UV, "pip", "install", "--quiet", "--python", python, "numba", "mypy", "cython", "setuptools", "numpy")
         rows = measure(folder, python)
     table = Table("compiler", *(f"us for {size}" for size in SIZES), "ms to start", "MB", "same result")
     for name, row in rows.items():

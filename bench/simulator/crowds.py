@@ -1,4 +1,4 @@
-"""How crowds move and fight in the simulator: who comes into reach, how soon, and that no side is favoured.
+"""Measure how crowds move and fight in the simulator: who reaches whom, how soon, and that no side is favoured.
 
     python -m bench crowds                      every experiment
     python -m bench crowds --picture FILE       three moments of the first one instead, as a picture

@@ -1,8 +1,7 @@
-"""The compiled engine against the interpreted one, in one run: how many times as many game loops it plays.
+"""Measure how many times as many game loops the compiled engine plays as the interpreted one, in one run.
 
     python -m bench engines                     a table
     python -m bench engines --rounds 5          each engine plays five times, in turns
-    python -m bench engines --json              one JSON object on stdout
 
 Each round is `python -m bench simulator_engine` in a process of its own, once with KHALA_ENGINE=compiled and once with
 KHALA_ENGINE=python, so that a noisy machine treats both the same. Without a compiled engine nothing is measured.
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 ENGINES: Final = ("compiled", "python")
 BATTLES: Final[Mapping[str, float]] = {"llm_smac/2s3z": 6.0, "armies of 100": 3.0}
-"""What is played, by the name of its row in `bench.simulator.simulator_engine`: the least ratio that is good enough."""
+"""What is played, by the name of its row in `python -m bench simulator_engine`: the least ratio that is good enough."""
 PLAYED: Final = ("--maps", "llm_smac/2s3z", "--sizes", "200")
 WHICH: Final = "from khala_simulator.native.engine import check, engine; check(); print(engine())"
 MISSING: Final = "were not compiled"
@@ -54,15 +53,7 @@ def measure(rounds: int, seconds: float) -> dict[str, Any]:
     skipped = why_not()
     for _ in range(0 if skipped else rounds):
         for engine in ENGINES:
-            command = [
-                sys.executable,
-                "-m",
-                "bench.simulator.simulator_engine",
-                "--json",
-                "--seconds",
-                str(seconds),
-                *PLAYED,
-            ]
+            command = [sys.executable, "-m", "bench", "simulator_engine", "--json", "--seconds", str(seconds), *PLAYED]
             said = subprocess.run(command, env=_environ(engine), stdout=subprocess.PIPE, check=True).stdout
             rows = json.loads(said)["rows"]
             for name in BATTLES:

@@ -1,8 +1,8 @@
-"""What workers, MULEs and geysers earn, beside what it must be from distance, speed and acceleration.
+"""Measure what workers, MULEs and geysers earn, beside what follows from distance, speed and acceleration.
 
 Every row is measured on a melee base of the map, at both starts. A trip takes the time at the field, the wait after it
 and two walks that begin and end at rest: ``2 * sqrt(way / acceleration)`` each, where the way is the distance of the
-centres less both radii and the worker's body. Run ``python -m bench mining``, with ``--json`` for one JSON object.
+centres less both radii and the worker's body.
 """
 
 from __future__ import annotations

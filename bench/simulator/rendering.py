@@ -1,7 +1,4 @@
-"""The cost of rendered images: milliseconds of CPU per frame of the screen and of the minimap, while two armies fight.
-
-    python -m bench rendering                a table
-    python -m bench rendering --json         one JSON object on stdout
+"""Measure the processor time of a rendered frame of the screen and of the minimap, while two armies fight.
 
 Two armies of several types meet in the middle of an open map, all of them in the camera's view; each loop is painted.
 The first frame, in which the ground and every look are painted for the first time, is reported separately.

@@ -1,9 +1,8 @@
-"""How many game loops per second the simulator's engine plays, without the SC2 API around it.
+"""Measure how many game loops a second the simulator's engine plays, without the SC2 API around it.
 
 Some shipped maps are played with both sides on attack-move, restarted with the next seed when they end; then armies of
 10 to 400 units meet on an open map, which shows how the cost grows: `us per unit` is the mean time of a loop per
-unit alive in it. `MB` is the memory of the process at the end of a row. Run
-``python -m bench simulator_engine``, with ``--json`` for one JSON object.
+unit alive in it. `MB` is the memory of the process at the end of a row.
 """
 
 from __future__ import annotations

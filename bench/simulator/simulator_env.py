@@ -1,7 +1,6 @@
-"""Play battles on the simulator through PySC2, and measure the cost of a step and of its parts.
+"""Measure a step of battles that PySC2 plays on the simulator, and the parts of a step.
 
     python -m bench simulator_env                     a table
-    python -m bench simulator_env --json              one JSON object on stdout
     python -m bench simulator_env layers:2s3z:8       one row: interface, map and game loops per step
     python -m bench simulator_env --floor             also what the client makes of a server that answers at once
 

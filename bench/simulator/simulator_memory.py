@@ -1,4 +1,4 @@
-"""How much memory a game process holds, from its start over many games, and how soon it returns its first observation.
+"""Measure the memory of a game process over many games, and how soon it returns its first observation.
 
     python -m bench simulator_memory                a table
     python -m bench simulator_memory --games 20     fewer games

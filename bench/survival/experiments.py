@@ -1,4 +1,4 @@
-"""Experiments under attack: a runner that is killed, and an endpoint that charges and refuses.
+"""Attack experiments: kill the runner, and let the endpoint charge and refuse.
 
     python -m bench experiments kills --kills 5     SIGKILL the runner in the middle, and resume until all is played
     python -m bench experiments money --usd 0.25    a third of the requests get 429, the others are charged

@@ -1,4 +1,4 @@
-"""Break a running match in every way that is known, and look in its recording whether the turn held.
+"""Break a running match in every known way, and check in its recording that every turn held.
 
     python -m bench faults                         1 000 faults of every kind
     python -m bench faults --routers 100           restarts of the router alone, with agents that answer at once

@@ -1,8 +1,7 @@
-"""Give the host what no well-meaning agent sends, and look whether it fails, slows down or passes it on.
+"""Send the host what no well-meaning agent sends, and check that it does not fail, slow down or pass it on.
 
     python -m bench hostile                                            100 000 replies and 20 000 frames
     python -m bench hostile --replies 1000000 --frames 100000 --processes 2
-    python -m bench hostile --json                                     one JSON object on stdout
 
 Replies are mutated ones of the corpora in `tests`, and mixtures of the tokens of the language. Each is read and acted
 on as by a match, at a real observation of a task; then the length of the next observations is measured, its own and

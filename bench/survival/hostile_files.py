@@ -2,7 +2,6 @@
 
     python -m bench hostile_files                                              3000 of each
     python -m bench hostile_files --files 10000 --recordings 10000 --seed 7
-    python -m bench hostile_files --json                                       one JSON object on stdout
 
 Every file is read, or refused by an error of one sentence, a `KhalaError` or a `ScenarioError`. Anything else is
 counted, and printed with the seed of its case: another exception, a case of more than 250 ms of CPU, more than 300 MB

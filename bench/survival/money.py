@@ -1,9 +1,8 @@
-"""Ask an endpoint that counts what it bills until a budget is used up, and hold what it billed against the cap.
+"""Spend a budget at an endpoint that counts what it bills, and hold the bill against the cap.
 
     python -m bench money                              all kinds of trouble, caps of 0.05, 0.30 and 1.00, 1 and 8 jobs
     python -m bench money --kind late --cap 0.3        some of them
     python -m bench money --experiment                 whole experiments in place of single agents, N matches at once
-    python -m bench money --json                       one JSON object on stdout
 
 Each job is an agent with a ledger of its own on the same file, as processes of a match have; the clients, limits and
 retries are the real ones. The endpoint bills every answer that it began to write, whether or not it arrived, by a

@@ -1,4 +1,4 @@
-"""How long the processes of a match live after their host is killed, at random moments after it started the first one.
+"""Measure how long the processes of a match live after their host is killed at a random moment.
 
     python -m bench orphans --kills 20
 

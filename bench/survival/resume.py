@@ -1,4 +1,4 @@
-"""Kill the host of a match at random moments, and look whether the match ends as if nothing had happened.
+"""Kill the host of a match at random moments, and check that the match ends as if nothing had happened.
 
     python -m bench resume --kills 20
 

@@ -1,4 +1,4 @@
-"""Many decisions in a row over the real bus: what grows, and what slows down.
+"""Play many decisions in a row over the real bus, and measure what grows and what slows down.
 
     python -m bench soak --decisions 20000 --agents 8
 

@@ -1,12 +1,10 @@
-"""What strangers and dishonest agents can do to a match over TLS: a table of attacks, each tried on a running match.
+"""Try on a running match over TLS what strangers and dishonest agents can do to it.
 
 The match has the real host's parts (roster, turn, recording) around made-up observations, and two honest agents. Each
 attack runs in a process of its own, as a session of bare Zenoh with no certificate, a foreign one, or that of the
 agent Mallory, which has a seat in the match and plays in another process, too. "succeeded" counts what was read, or
 what reached the host or an agent under a name that is not Mallory's; "late" are steps of honest agents without a reply
 in time.
-
-Run `python -m bench strangers`; `--router` puts a router process's rules between, `--json` for one JSON object.
 """
 
 from __future__ import annotations
@@ -483,7 +481,7 @@ async def attack(match: Siege, name: str, *, seconds: float, through: Sequence[s
     """Run an attack in a process of its own, while the match goes on."""
     match.look()
     process = await asyncio.create_subprocess_exec(
-        *through, sys.executable, "-m", "bench.survival.strangers", "--attack", name,
+        *through, sys.executable, "-m", "bench", "strangers", "--attack", name,
         "--endpoint", match.endpoint, "--keys", str(match.keys), "--seconds", str(seconds),
         stdout=asyncio.subprocess.PIPE, cwd=paths.ROOT,
     )  # fmt: skip

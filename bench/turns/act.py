@@ -1,7 +1,4 @@
-"""Make commands of replies of about 2 kB, and measure the time from the text to the checked commands.
-
-    python -m bench act            a table
-    python -m bench act --json     one JSON object on stdout
+"""Measure the time from replies of about 2 kB to checked commands.
 
 One agent has five teams of four units and may use every text action of the catalogue, including other races'.
 The game has reported what each unit can do now. `read` is the reply's text → calls, `check` is calls → commands:

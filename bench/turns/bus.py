@@ -1,8 +1,7 @@
-"""One joint round over the bus: the host sends every agent an observation, and every agent replies.
+"""Measure one joint round over the bus: the host sends every agent an observation, and every agent replies.
 
     python -m bench bus                      a table
     python -m bench bus --tls                the same over TLS, next to it
-    python -m bench bus --json               one JSON object on stdout
 
 It compares, in turns of a few rounds so that a noisy machine treats them the same:
     bus    `khala_protocol.bus`: observations as STATE, replies as SPEECH
@@ -297,13 +296,9 @@ async def warm_up(host: Host) -> None:
 
 
 async def start(stack: AsyncExitStack, *arguments: str) -> str:
-    """Start this module as another process; return its first line."""
+    """Start this benchmark as another process; return its first line."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "bench.turns.bus",
-        "--process",
-        *arguments,
+        *(sys.executable, "-m", "bench", "bus", "--process", *arguments),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
     )

@@ -1,7 +1,4 @@
-"""The cost of a request to a model on this machine: many at once on one loop, each over its own client.
-
-    python -m bench http_client                 a table
-    python -m bench http_client --json          one JSON object on stdout
+"""Measure requests to a model on this machine: many at once on one loop, each over its own client.
 
 The endpoint is `khala llm` in its own process, on the same cores. It compares a plain `httpx.AsyncClient`, one
 over the transport that agents use, and an agent's whole client (prompt to bytes, bytes to completion). Medians of the

@@ -1,7 +1,4 @@
-"""Draw pictures of battles on the simulator, and measure the cost of one, from a snapshot to bytes.
-
-    python -m bench image            a table
-    python -m bench image --json     one JSON object on stdout
+"""Measure the cost of a picture of a battle on the simulator, from a snapshot to bytes.
 
 A game is played for 40 decisions, all units attacking; then each picture is made of each of its snapshots, 512 pixels
 large, with marks. `ms` is the median and `p95 ms` the 95th percentile of the time for one picture, with everything

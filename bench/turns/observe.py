@@ -1,7 +1,4 @@
-"""Make observations and joint actions of armies, and measure the cost of a turn between PySC2 and the bus.
-
-    python -m bench observe            a table
-    python -m bench observe --json     one JSON object on stdout
+"""Measure a turn between PySC2 and the bus: the observations and joint actions of armies.
 
 `observe` is everything from a snapshot to views and text of one agent with its teams, all units in sight of all
 teams, half of them hurt since the turn before. `unseen` is what a snapshot costs at which no agent looks. `act` is

@@ -1,9 +1,8 @@
-"""The cost of the map for those who watch: time of a step without scenes, with what the sides see, with the whole map.
+"""Measure what the map for those who watch costs a step: no scene, what the sides see, the whole map.
 
     python -m bench scenes                            2s3z, and a whole game
     python -m bench scenes simple64_sceb --steps 600
     python -m bench scenes --think 0.05               agents that take 50 ms, during which a scene is made
-    python -m bench scenes --json                     one JSON object on stdout
 
 The steps of one match take turns, so that all three are measured on the same armies and with the same load of the
 machine. Host, texts and game are those of a match, scenes are encoded and recorded; there is no bus. The agents answer

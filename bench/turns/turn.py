@@ -1,14 +1,12 @@
-"""The cost of a turn without the model: wall time of a step for 1 to 128 agents at an endpoint of fixed latency.
+"""Measure what a step costs beyond the model, for 1 to 128 agents at an endpoint of fixed latency.
 
 Host, agents (in two processes) and endpoint share this machine; observations are those of a real battle, 2s3z in its
-sixth second, and every agent has all of the units. The same run also measures the
-first implementation: threads that poll (`bench.turns.original`). The parts are those of the agent whose reply came last:
+sixth second, and every agent has all of the units. The same run also measures the first implementation: threads that
+poll (`original.py`). The parts are those of the agent whose reply came last:
 
     before    until its observation was made and published       http     the request beyond the endpoint's latency
     bus       the way to it and back, with coding               merge    speech, recognition and translation of all
     agent     prompt, parsing and sending, without HTTP         build    views and texts of all agents, within `before`
-
-Run `python -m bench turn`; `--json` for one JSON object.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.doors import __main__ as command
 from bench.doors import commands, playing
+from bench.doors import doors as command
 from bench.doors.registry import DOORS, load_rows
 from bench.doors.rows import Row, Skipped
 

@@ -64,7 +64,9 @@ def test_a_message_within_a_minute_of_the_same_is_said_again() -> None:
 
 
 def test_a_message_that_no_rule_judges_is_an_error() -> None:
-    with pytest.raises(UnknownMessage, match=r"'I win\.', and no rule of bench.messages judges that; add one"):
+    with pytest.raises(
+        UnknownMessage, match=r"'I win\.', and no rule of bench/language/messages.py judges that; add one"
+    ):
         judge(transcript("I win."))
 
 
