@@ -16,7 +16,7 @@ import json
 import math
 import statistics
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from bench.command_line import make_parser
 from bench.ratios import ratio_of_means
@@ -24,16 +24,13 @@ from bench.results import find, read
 from bench.tables import print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from bench.figures import Better
     from bench.results import Results
     from khala.experiment.statistics import Interval
 
-COLUMNS: Final[Mapping[str, Literal["left", "right"]]] = {
-    "measurement": "left", "figure": "left", "A": "right", "B": "right", "unit": "left", "B / A": "right",
-    "95 %": "right", "": "left",
-}  # fmt: skip
+COLUMNS: Final = ("measurement", "figure", "A", "B", "unit", "B / A", "95 %", "")
 QUIET: Final = 0.5
 """Load up to which a machine counts as quiet."""
 
@@ -121,5 +118,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(json.dumps({"a": a.title, "b": b.title, "remarks": list(remarks(a, b, found)), "changes": each}))
         return
     print(f"A: {a.title}; {a.machine}\nB: {b.title}; {b.machine}\n")
-    print_table(COLUMNS, rows(found))
+    print_table(COLUMNS, rows(found), left=("figure", "unit", ""))
     print("".join(f"\n* {remark}" for remark in remarks(a, b, found)))

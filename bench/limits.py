@@ -20,16 +20,14 @@ from bench.run import figures_of
 from bench.tables import print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from bench.figures import Figure
     from khala.experiment.statistics import Interval
 
 LIMITED: Final = {name: benchmark.limited for name, benchmark in BENCHMARKS.items() if benchmark.limited is not None}
 """By measurement, the options of a short run that has its limited ratios."""
-COLUMNS: Final[Mapping[str, Literal["left", "right"]]] = {
-    "measurement": "left", "ratio": "left", "measured": "right", "95 %": "right", "limit": "right", "": "left",
-}  # fmt: skip
+COLUMNS: Final = ("measurement", "ratio", "measured", "95 %", "limit", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.json:
         print(json.dumps([ratio.as_dict() for ratio in ratios]))
     else:
-        print_table(COLUMNS, [ratio.cells for ratio in ratios])
+        print_table(COLUMNS, (ratio.cells for ratio in ratios), left=("ratio", ""))
         for why in dict.fromkeys(ratio.figure.skipped for ratio in ratios if ratio.figure.skipped):
             print(f"* skipped: {why}")
     for ratio in broken:

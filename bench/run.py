@@ -10,7 +10,7 @@ import json
 import statistics
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING
 
 from bench import results
 from bench.paths import ROOT
@@ -18,14 +18,10 @@ from bench.registry import BENCHMARKS
 from bench.tables import print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from bench.figures import Figure
-
-COLUMNS: Final[Mapping[str, Literal["left", "right"]]] = {
-    "measurement": "left", "figure": "left", "median": "right", "least": "right", "most": "right", "unit": "left",
-}  # fmt: skip
 
 
 def show(name: str) -> None:
@@ -67,7 +63,8 @@ def keep(names: Sequence[str], options: Sequence[str], times: int, out: Path | N
         except subprocess.CalledProcessError as error:  # what took an hour is kept nevertheless
             failed.append(f"{name} ({number + 1} of {times}): exit code {error.returncode}")
     figures = tuple(series for name in names for series in results.join(name, runs[name]))
-    print_table(COLUMNS, rows(figures))
+    columns = ("measurement", "figure", "median", "least", "most", "unit")
+    print_table(columns, rows(figures), left=("figure", "unit"))
     print(f"written to {results.write(found.model_copy(update={'figures': figures}), out)}")
     for run in failed:
         print(f"failed, and without figures: {run}", file=sys.stderr)
@@ -75,7 +72,7 @@ def keep(names: Sequence[str], options: Sequence[str], times: int, out: Path | N
 
 
 def rows(figures: Sequence[results.Series]) -> Iterator[tuple[str, ...]]:
-    """Yield the cells of a table of `COLUMNS`: the median of the runs, the least and the most."""
+    """Yield the cells of each figure: the median of the runs, the least and the most."""
     for series in figures:
         of_runs = series.per_run
         cells = [f"{of(of_runs):.4g}" if of_runs else "" for of in (statistics.median, min, max)]

@@ -56,9 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--jobs {given.jobs}: take 1 or more")
     if given.list:
         chosen = (rows[number] for number in numbers)
-        print_table(
-            {"door": "left", "kind": "left", "what": "left"}, [(row.door, row.kind, row.what) for row in chosen]
-        )
+        print_table(("door", "kind", "what"), [(row.door, row.kind, row.what) for row in chosen], left=("kind", "what"))
         return 0
     end_on_sigterm()
     return run(rows, numbers, given.jobs)
@@ -91,11 +89,12 @@ def run(rows: Sequence[Row], numbers: Sequence[int], jobs: int = 1) -> int:
             print(outcome.noise, end="", file=sys.stderr, flush=True)
     played = [(rows[number], found[number]) for number in sorted(found)]
     print_table(
-        {"door": "left", "kind": "left", "what": "left", "": "left", "s": "right"},
+        ("door", "kind", "what", "", "s"),
         [
             (row.door, row.kind, row.what, outcome.through or outcome.skipped or "held", f"{outcome.took_s:.1f}")
             for row, outcome in played
         ],
+        left=("kind", "what", ""),
     )
     slowest = sorted(played, key=lambda pair: -pair[1].took_s)[:SLOWEST]
     print(f"slowest: {', '.join(f'{outcome.took_s:.1f} s {row.door}: {row.what}' for row, outcome in slowest)}")

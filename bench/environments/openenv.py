@@ -26,6 +26,7 @@ from openenv.core.generic_client import GenericEnvClient
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,15 +54,14 @@ def main() -> None:
     if given.json:
         print(json.dumps(found))
         return
-    print(
-        f"{'clients':>8} {'sessions/s':>11} {'steps/s':>8} {'reset p50':>10} {'step p50':>9}"
-        f" {'server':>8} {'a game':>8}"
-    )
-    for row in found["rows"]:
-        print(
-            f"{row['clients']:8} {row['sessions_per_s']:11.2f} {row['steps_per_s']:8.1f} {row['reset_p50_s']:8.2f} s"
-            f" {row['step_p50_s'] * 1000:6.1f} ms {row['server_mb']:5.0f} MB {row['game_mb']:5.0f} MB"
-        )
+    print_table(
+        ("clients", "sessions/s", "steps/s", "reset p50 s", "step p50 ms", "server MB", "a game MB"),
+        [
+            (row["clients"], f"{row['sessions_per_s']:.2f}", f"{row['steps_per_s']:.1f}", f"{row['reset_p50_s']:.2f}",
+             f"{row['step_p50_s'] * 1000:.1f}", f"{row['server_mb']:.0f}", f"{row['game_mb']:.0f}")
+            for row in found["rows"]
+        ],
+    )  # fmt: skip
 
 
 def of_clients(count: int, steps: int, seconds: float) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from bench.command_line import make_parser
 from bench.environments.smac import package_root
 from bench.simulator.at_once import floor
 from bench.simulator.env_games import CpuTime
+from bench.tables import print_table, two_digits
 from khala_simulator.process.install import install
 
 GOALS = {"2s3z": 400, "3s5z": 350, "2c_vs_64zg": 200}
@@ -94,7 +95,5 @@ def main() -> None:
     if options.json:
         print(json.dumps(rows))
         return
-    print(f"{'':<14}" + "".join(f"{title:>9}" for title in ("goal", "floor", "steps/s", "all", "client", "server")))
-    for name, row in rows.items():
-        cells = ("" if value is None else f"{value:.2f}" for value in row.values())
-        print(f"{name:<14}" + "".join(f"{cell:>9}" for cell in cells))
+    columns = ("", "goal", "floor", "steps/s", "all", "client", "server")
+    print_table(columns, ((name, *map(two_digits, row.values())) for name, row in rows.items()))

@@ -24,6 +24,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bench.command_line import make_parser
 from bench.paths import TESTS
+from bench.tables import print_table
 from khala_bridge.act import Actor
 from khala_bridge.knowledge import knowledge
 from khala_bridge.observe import Observer
@@ -213,10 +214,10 @@ def main() -> None:
     if chosen.json:
         print(json.dumps(figures))
         return
-    print("  ".join(f"{column:>10}" for column in ("file", *columns, "found %")))
-    for name, row in figures.items():
-        share = 100 * row["found"] / max(row["meant"], 1)
-        print("  ".join(f"{value:>10}" for value in (name, *row.values(), f"{share:.1f}")))
+    print_table(
+        ("file", *columns, "found %"),
+        [(name, *row.values(), f"{100 * row['found'] / max(row['meant'], 1):.1f}") for name, row in figures.items()],
+    )
     for name, score in found.items() if chosen.misses else ():
         for miss in score.misses:
             print(f"{name}: {miss}")

@@ -18,10 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala.playing import games
 from khala.playing.hosting import game_of
 from khala.testing import replay_host
@@ -136,21 +134,16 @@ def _hash(recording: Recording) -> str:
     return found.hexdigest()[:16]
 
 
-def table(rows: Iterable[Row]) -> Table:
-    """Return the figures as a table."""
-    shown = Table(box=None)
-    for column in ("rule", "seed", "outcome", "K/D", "game s", "lag s", "decisions", *FATES, "age", "twice", "replay"):
-        shown.add_column(column, justify="right", no_wrap=True)
-    for row in rows:
-        found = row.as_dict()
-        twice = "" if len(row.played) < 2 else "same" if len(set(found["hashes"])) == 1 else "differs"
-        kd = "none lost" if found["kd"] is None else f"{found['kd']:.2f}"
-        shown.add_row(
-            row.rule, str(row.seed), found["outcome"], kd, f"{found['game_s']:.1f}", f"{found['lag_s']:.2f}",
-            str(found["decisions"]), *(str(number) for number in found["fates"].values()),
-            f"{found['age_loops']:g}", twice, "same" if not found["differences"] else f"{found['differences']} differ",
-        )  # fmt: skip
-    return shown
+def cells(row: Row) -> tuple[object, ...]:
+    """Return a row of the table."""
+    found = row.as_dict()
+    twice = "" if len(row.played) < 2 else "same" if len(set(found["hashes"])) == 1 else "differs"
+    kd = "none lost" if found["kd"] is None else f"{found['kd']:.2f}"
+    return (
+        row.rule, row.seed, found["outcome"], kd, f"{found['game_s']:.1f}", f"{found['lag_s']:.2f}",
+        found["decisions"], *found["fates"].values(), f"{found['age_loops']:g}", twice,
+        "same" if not found["differences"] else f"{found['differences']} differ",
+    )  # fmt: skip
 
 
 def main() -> None:
@@ -165,6 +158,7 @@ def main() -> None:
     if options.json:
         print(json.dumps({"rows": [row.as_dict() for row in rows], "violations": violations}))
     else:
-        Console(width=150).print(table(rows))
+        columns = ("rule", "seed", "outcome", "K/D", "game s", "lag s", "decisions", *FATES, "age", "twice", "replay")
+        print_table(columns, map(cells, rows))
     if violations:
         raise SystemExit("\n".join(violations))

@@ -23,11 +23,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import psutil
-from rich.console import Console
-from rich.table import Table
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from khala.experiment.engine import Local, slots_of_this_machine
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner
@@ -159,17 +158,13 @@ def measures(found: Any) -> Iterator[Figure]:
         yield Figure(f"processor time of a game, {at_once}", "s", (row["cpu_s_a_game"],))
 
 
-def table(played: Sequence[Played]) -> Table:
-    """Return the games as a table."""
-    shown = Table(box=None)
-    for column in ("task", "at once", "games", "games an hour", "goal", "s", "cpu s"):
-        shown.add_column(column, justify="left" if column == "task" else "right")
+def rows(played: Sequence[Played]) -> Iterator[tuple[object, ...]]:
+    """Yield a row for the games of each task."""
     for batch in played:
         each_s = batch.wall_s * batch.at_once / batch.games
-        goal = "" if batch.goal is None else str(batch.goal)
-        cells = (str(batch.at_once), str(batch.games), f"{batch.per_hour:.0f}", goal, f"{each_s:.2f}")
-        shown.add_row(batch.task, *cells, f"{batch.cpu_s_a_game:.2f}")
-    return shown
+        goal = "" if batch.goal is None else batch.goal
+        figures = f"{batch.per_hour:.0f}", goal, f"{each_s:.2f}", f"{batch.cpu_s_a_game:.2f}"
+        yield batch.task, batch.at_once, batch.games, *figures
 
 
 def main() -> None:
@@ -185,7 +180,8 @@ def main() -> None:
             games = given.games or TASKS.get(name, Plays(1)).games * given.jobs
             played.append(asyncio.run(measure(name, games, given.jobs, Path(out) / name)))
             print(f"{name}: {played[-1].per_hour:.0f} games an hour", file=sys.stderr)
-    Console(file=sys.stderr if given.json else sys.stdout).print(table(played))
+    columns = ("task", "at once", "games", "games an hour", "goal", "s", "cpu s")
+    print_table(columns, rows(played), file=sys.stderr if given.json else sys.stdout)
     if given.json:
-        rows = [asdict(batch) | {"per_hour": batch.per_hour, "cpu_s_a_game": batch.cpu_s_a_game} for batch in played]
-        print(json.dumps({"rows": rows}))
+        found = [asdict(batch) | {"per_hour": batch.per_hour, "cpu_s_a_game": batch.cpu_s_a_game} for batch in played]
+        print(json.dumps({"rows": found}))

@@ -23,10 +23,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala.playing.local import play
 from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -146,18 +144,16 @@ def violations(mixed: Figures, quick: Figures) -> list[str]:
     return [f"{what} took {ms:.1f} ms longer with slow agents" for what, ms in costs_ms.items() if ms > MOST_MS]
 
 
-def table(title: str, figures: Figures) -> Table:
-    """Return the figures of one match as a table."""
-    caption = f"{figures.steps} steps, begun {figures.past_ms:.2f} ms late at the median; lag {figures.lag_s:.3f} s"
-    shown = Table(title=title, caption=caption, box=None)
-    for column in ("agent", "sleeps", "decisions", "over ms", "age p50", "age p95", "steps later", "late"):
-        shown.add_column(column, justify="right", no_wrap=True)
-    for agent in figures.agents:
-        shown.add_row(
-            agent.agent, f"{agent.sleep_s:g} s", str(agent.decisions), f"{agent.over_ms:.2f}",
-            f"{agent.age_p50_loops:g}", f"{agent.age_p95_loops:g}", f"{agent.steps_later:g}", str(agent.late),
-        )  # fmt: skip
-    return shown
+def show(title: str, figures: Figures) -> None:
+    """Print the figures of one match."""
+    rows = [
+        (agent.agent, f"{agent.sleep_s:g} s", agent.decisions, f"{agent.over_ms:.2f}", f"{agent.age_p50_loops:g}",
+         f"{agent.age_p95_loops:g}", f"{agent.steps_later:g}", agent.late)
+        for agent in figures.agents
+    ]  # fmt: skip
+    columns = ("agent", "sleeps", "decisions", "over ms", "age p50", "age p95", "steps later", "late")
+    print_table(columns, rows, title=title)
+    print(f"{figures.steps} steps, begun {figures.past_ms:.2f} ms late at the median; lag {figures.lag_s:.3f} s")
 
 
 def main() -> None:
@@ -174,6 +170,6 @@ def main() -> None:
         print(json.dumps({title: asdict(figures) for title, figures in found.items()} | {"violations": broken}))
     else:
         for title, figures in found.items():
-            Console(width=120).print(table(title, figures))
+            show(title, figures)
     if broken:
         raise SystemExit("\n".join(broken))

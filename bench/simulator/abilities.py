@@ -18,6 +18,7 @@ from s2clientprotocol import debug_pb2
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from khala_bridge.act.raw import RawExecutor
 from khala_bridge.game.game import GameConfig
 from khala_bridge.game.pysc2_game import PySC2Game
@@ -91,6 +92,4 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(rows))
         return
-    print(f"{'own units':>10}{'abilities':>11}{'median ms':>11}{'p95 ms':>9}")
-    for row in rows:
-        print(f"{row['units']:>10}{row['abilities']:>11}{row['median_ms']:>11}{row['p95_ms']:>9}")
+    print_table(("own units", "abilities", "median ms", "p95 ms"), [row.values() for row in rows])

@@ -20,11 +20,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
 from bench.paths import ROOT
+from bench.tables import print_table
 
 UV = shutil.which("uv") or str(ROOT / ".uv" / "bin" / "uv")
 SIZES = (20, 200)
@@ -140,11 +138,13 @@ def main() -> None:
         python = str(environment / "bin" / "python")
         _run(UV, "pip", "install", "--quiet", "--python", python, "numba", "mypy", "cython", "setuptools", "numpy")
         rows = measure(folder, python)
-    table = Table("compiler", *(f"us for {size}" for size in SIZES), "ms to start", "MB", "same result")
-    for name, row in rows.items():
-        times = (f"{us:.1f}" for us in row["us"])
-        same = "yes" if row["result"] == rows["numpy"]["result"] else "no"
-        table.add_row(name, *times, f"{row['start_ms']:.0f}", f"{row['mb']:.0f}", same)
-    Console().print(table)
+    print_table(
+        ("compiler", *(f"us for {size}" for size in SIZES), "ms to start", "MB", "same result"),
+        [
+            (name, *(f"{us:.1f}" for us in row["us"]), f"{row['start_ms']:.0f}", f"{row['mb']:.0f}",
+             "yes" if row["result"] == rows["numpy"]["result"] else "no")
+            for name, row in rows.items()
+        ],
+    )  # fmt: skip
     if any(row["result"] != rows["numpy"]["result"] for row in rows.values()):
         sys.exit("the results differ")

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from khala_simulator.native.engine import VARIABLE
 
 if TYPE_CHECKING:
@@ -87,7 +88,8 @@ def main() -> None:
     if found["skipped"]:
         print(found["skipped"])
         return
-    print(f"{'loops a second':<20}" + "".join(f"{title:>10}" for title in (*ENGINES, "ratio")))
+    rows = []
     for name, loops in found["loops_per_s"].items():
-        middles = [statistics.median(loops[engine]) for engine in ENGINES]
-        print(f"{name:<20}" + "".join(f"{value:>10.0f}" for value in middles) + f"{middles[0] / middles[1]:>10.2f}")
+        compiled, pure = (statistics.median(loops[engine]) for engine in ENGINES)
+        rows.append((name, f"{compiled:.0f}", f"{pure:.0f}", f"{compiled / pure:.2f}"))
+    print_table(("loops a second", *ENGINES, "ratio"), rows)

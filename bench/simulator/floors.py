@@ -24,6 +24,7 @@ from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.simulator.at_once import floor
 from bench.simulator.simulator_env import Measured, measure_env, setting_of
+from bench.tables import print_table
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:
@@ -77,7 +78,8 @@ def main() -> None:
     if given.json:
         print(json.dumps(found))
         return
-    print(f"{'':<24}" + "".join(f"{title:>12}" for title in ("steps/s", "cpu ms", "at once", "ratio")))
+    rows = []
     for setting, row in found.items():
         rate, ours, least = (statistics.median(row[name]) for name in ("steps_per_s", "cpu_ms", "floor_cpu_ms"))
-        print(f"{setting:<24}{rate:>12.0f}{ours:>12.2f}{least:>12.2f}{ours / least:>12.2f}")
+        rows.append((setting, f"{rate:.0f}", f"{ours:.2f}", f"{least:.2f}", f"{ours / least:.2f}"))
+    print_table(("", "steps/s", "cpu ms", "at once", "ratio"), rows)

@@ -12,10 +12,8 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.economy import melee_start
@@ -138,7 +136,5 @@ def main() -> None:
                   sys.stdout)  # fmt: skip
         return
     for part in parts:
-        table = Table("", *next(iter(part.values())), title="minerals")
-        for name, row in part.items():
-            table.add_row(name, *(f"{value:.1f}" for value in row.values()))
-        Console().print(table)
+        rows = [(name, *(f"{value:.1f}" for value in row.values())) for name, row in part.items()]
+        print_table(("", *next(iter(part.values()))), rows, title="minerals")

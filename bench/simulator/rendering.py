@@ -13,12 +13,11 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.layers import Frame
 from khala_simulator.maps.game_map import load_map
@@ -95,10 +94,12 @@ def main() -> None:
     if arguments.json:
         sys.stdout.write(json.dumps({"results": results, "memory_mb": memory_mb}) + "\n")
         return
-    table = Table("screen", "units", "CPU ms per frame", "95 %", "first frame", "minimap ms")
-    for row in results:
-        size, units = f"{row['screen_px']:.0f}", f"{row['units_first']:.0f} to {row['units_last']:.0f}"
-        times = (f"{row[key]:.2f}" for key in ("screen_ms", "screen_p95_ms", "first_ms", "minimap_ms"))
-        table.add_row(size, units, *times)
-    Console().print(table)
+    print_table(
+        ("screen", "units", "CPU ms per frame", "95 %", "first frame", "minimap ms"),
+        [
+            (f"{row['screen_px']:.0f}", f"{row['units_first']:.0f} to {row['units_last']:.0f}",
+             *(f"{row[key]:.2f}" for key in ("screen_ms", "screen_p95_ms", "first_ms", "minimap_ms")))
+            for row in results
+        ],
+    )  # fmt: skip
     print(f"largest memory of the process: {memory_mb:.0f} MB")

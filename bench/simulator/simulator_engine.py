@@ -11,14 +11,12 @@ import json
 import sys
 import time
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from rich.console import Console
-from rich.table import Table
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.memory import rss_mb
+from bench.tables import print_table
 from khala_simulator.abilities import commands
 from khala_simulator.combat import lifecycle
 from khala_simulator.maps.game_map import load_map
@@ -88,14 +86,8 @@ def measure(make: Callable[[int], World], seconds: float, max_loops: int = 1440)
         "us_per_unit": round(playing / max(lived, 1) * 1e6, 2),
         "ms_to_make": round(making / seed * 1e3, 2),
         "games": seed,
-        "mb": round(resident_mb(), 1),
+        "mb": round(rss_mb(), 1),
     }
-
-
-def resident_mb() -> float:
-    """Return the resident memory of this process."""
-    status = Path("/proc/self/status").read_text(encoding="ascii")
-    return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 
 
 def measures(found: Any) -> Iterator[Figure]:
@@ -117,18 +109,9 @@ def main() -> None:
     if options.json:
         json.dump({"command": " ".join(sys.argv), "rows": rows}, sys.stdout)
         return
-    table = Table(
-        "battle",
-        "units",
-        "loops/s",
-        "ms per loop",
-        "us per unit",
-        "ms to make",
-        "MB",
+    columns = ("units", "loops_per_s", "ms_per_loop", "us_per_unit", "ms_to_make", "mb")
+    print_table(
+        ("battle", "units", "loops/s", "ms per loop", "us per unit", "ms to make", "MB"),
+        [(name.rpartition("/")[2], *(f"{row[column]:g}" for column in columns)) for name, row in rows.items()],
         title="simulator engine, one core",
     )
-    for name, row in rows.items():
-        names = ("units", "loops_per_s", "ms_per_loop", "us_per_unit", "ms_to_make", "mb")
-        cells = (row[name] for name in names)
-        table.add_row(name.rpartition("/")[2], *(f"{cell:g}" for cell in cells))
-    Console().print(table)

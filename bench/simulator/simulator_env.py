@@ -43,6 +43,7 @@ from bench.simulator.env_games import (
     fighters,
     reinforcements,
 )
+from bench.tables import print_table, two_digits
 from khala_simulator.process.client import Client, interface
 from khala_simulator.process.install import install
 
@@ -200,7 +201,4 @@ def main() -> None:
         print(json.dumps(rows))
         return
     head = ("steps/s", "goal", "floor", "step ms", "p50", "client", "server", "tick", "observe", "act", "start ms")
-    print(f"{'':<28}" + "".join(f"{title:>9}" for title in head))
-    for name, row in rows.items():
-        cells = ("" if value is None else f"{value:.2f}" for value in row.values())
-        print(f"{name:<28}" + "".join(f"{cell:>9}" for cell in cells))
+    print_table(("", *head), ((name, *map(two_digits, row.values())) for name, row in rows.items()))

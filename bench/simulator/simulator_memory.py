@@ -15,11 +15,11 @@ import os
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 from absl import flags
 
 from bench.command_line import make_parser
+from bench.memory import rss_mb
 from bench.simulator.env_games import make_env
 from khala_bridge.compat import actions
 from khala_simulator.process.install import install
@@ -30,13 +30,6 @@ SETTLED = 10
 STEPS = 20
 
 
-def resident_mb(env: Any) -> float:
-    """Return the resident memory of the game process."""
-    pid = env._sc2_procs[0].pid  # noqa: SLF001  # PySC2 tells the process nowhere else
-    status = Path(f"/proc/{pid}/status").read_text()
-    return int(status.partition("VmRSS:")[2].split()[0]) / 1024
-
-
 def measure(name: str, games: int) -> tuple[float, list[float]]:
     """Return the seconds to the first observation, and MB after each game."""
     begun_s = time.perf_counter()
@@ -44,11 +37,12 @@ def measure(name: str, games: int) -> tuple[float, list[float]]:
     try:
         env.reset()
         start_s = time.perf_counter() - begun_s
+        pid = env._sc2_procs[0].pid  # noqa: SLF001  # PySC2 tells the process nowhere else
         held = []
         for _ in range(games):
             for _ in range(STEPS):
                 env.step([actions.FUNCTIONS.no_op()])
-            held.append(resident_mb(env))
+            held.append(rss_mb(pid))
             env.reset()
         return start_s, held
     finally:

@@ -33,11 +33,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
 from bench.survival.processes import Processes, free_port, until_listening
+from bench.tables import print_table
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.policy import Policy
@@ -54,7 +52,7 @@ from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
     import subprocess
-    from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+    from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping, Sequence
 
     from khala_agents.policy import Context
     from khala_protocol.bus import Bus
@@ -596,16 +594,11 @@ def full_disk(processes: Processes, rule: str) -> bool:
     return said and (code == 0 if rule == "go_on" else code not in {0, 3})
 
 
-def table(verdict: Verdict) -> Table:
-    """Return a row for each kind of fault."""
-    shown = Table(title=f"{verdict.counted.total()} faults in {verdict.steps} steps", box=None)
-    for column in ("fault", "times", "goes on after, median s", "longest s"):
-        shown.add_column(column, justify="left" if column == "fault" else "right", no_wrap=True)
+def rows(verdict: Verdict) -> Iterator[tuple[object, ...]]:
+    """Yield a row for each kind of fault."""
     for kind, times in sorted(verdict.counted.items()):
         seconds = verdict.recovery_s.get(kind)
-        figures = (f"{statistics.median(seconds):.2f}", f"{max(seconds):.2f}") if seconds else ("", "")
-        shown.add_row(kind, str(times), *figures)
-    return shown
+        yield kind, times, *((f"{statistics.median(seconds):.2f}", f"{max(seconds):.2f}") if seconds else ("", ""))
 
 
 def summary(verdict: Verdict) -> str:
@@ -648,8 +641,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     verdict = measure(arguments.faults, arguments.routers, arguments.seed, arguments.only)
-    Console(file=sys.stderr if arguments.json else sys.stdout).print(table(verdict))
-    print(summary(verdict), file=sys.stderr if arguments.json else sys.stdout)
+    file = sys.stderr if arguments.json else sys.stdout
+    title = f"{verdict.counted.total()} faults in {verdict.steps} steps"
+    print_table(("fault", "times", "goes on after, median s", "longest s"), rows(verdict), title=title, file=file)
+    print(summary(verdict), file=file)
     if arguments.json:
         print(json.dumps(verdict.__dict__, default=list))
     raise SystemExit(0 if verdict.is_good() else 1)

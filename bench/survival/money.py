@@ -339,12 +339,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(json.dumps([asdict(row) | {"kept": row.kept} for row in rows]))
     else:
         print_table(
-            {"trouble": "left", "cap": "right", "jobs": "right", "requests": "right", "billed": "right",
-             "booked": "right", "used": "right", "": "left"},
+            ("trouble", "cap", "jobs", "requests", "billed", "booked", "used", ""),
             [
-                (row.kind, f"{row.cap_usd:.2f}", str(row.jobs), str(row.requests), f"{row.billed_usd:.4f}",
+                (row.kind, f"{row.cap_usd:.2f}", row.jobs, row.requests, f"{row.billed_usd:.4f}",
                  f"{row.booked_usd:.4f}", f"{row.used:.0%}", "kept" if row.kept else "EXCEEDED")
                 for row in rows
             ],
+            left=("",),
         )  # fmt: skip
     return 0 if all(row.kept for row in rows) else 1

@@ -25,11 +25,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
 from bench.survival.processes import Processes, free_port, until_listening
+from bench.tables import print_table
 from khala.playing.local import shares
 from khala.testing import replay_host
 from khala_orchestrator.config import load_task
@@ -324,15 +322,11 @@ async def _judge(seen: Sequence[Kill], played: Whole, whole: Whole, case: Case, 
     return [Kill(kill.case, kill.step, kill.replay_s, kill.away_s, equal and complete, prompts) for kill in seen]
 
 
-def table(found: Sequence[Kill]) -> Table:
-    """Return a row for each kill."""
-    shown = Table(title=f"hosts killed in a match of {STEPS} steps ({TASK})", box=None)
-    for column in ("case", "killed after step", "replay s", "steps/s", "away s", "equal", "other prompts"):
-        shown.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
+def rows(found: Sequence[Kill]) -> Iterator[tuple[object, ...]]:
+    """Yield a row for each kill."""
     for kill in found:
         figures = f"{kill.replay_s:.2f}", f"{kill.steps_per_s:.0f}", f"{kill.away_s:.1f}"
-        shown.add_row(kill.case, str(kill.step), *figures, "yes" if kill.equal else "NO", str(kill.prompts))
-    return shown
+        yield kill.case, kill.step, *figures, "yes" if kill.equal else "NO", kill.prompts
 
 
 def main() -> None:
@@ -343,7 +337,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     resumed = asyncio.run(measure(arguments.kills, arguments.seed, arguments.only))
-    Console(file=sys.stderr if arguments.json else sys.stdout).print(table(resumed.kills))
+    print_table(
+        ("case", "killed after step", "replay s", "steps/s", "away s", "equal", "other prompts"),
+        rows(resumed.kills),
+        title=f"hosts killed in a match of {STEPS} steps ({TASK})",
+        file=sys.stderr if arguments.json else sys.stdout,
+    )
     for line in resumed.failed:
         print(line, file=sys.stderr)
     print(

@@ -21,12 +21,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.table import Table
-
 from bench.command_line import make_parser
+from bench.memory import rss_mb
 from bench.survival.orphans import processes_of
 from bench.survival.processes import Processes, free_port
+from bench.tables import print_table
 from khala.playing.local import shares
 from khala_orchestrator.config import change, load_task
 from khala_protocol.bus import Delivery
@@ -90,12 +89,6 @@ class Soaked:
 async def decide(briefing: Briefing, observation: Observation) -> str:  # noqa: ARG001  # an agent that does nothing
     """Order nothing."""
     return "Actions:"
-
-
-def rss_mb(pid: int) -> float:
-    """Return the memory of a process, in megabytes of 2^20 bytes."""
-    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmRSS"))
 
 
 class Soak:
@@ -169,17 +162,12 @@ async def measure(decisions: int, agents: int) -> Soaked:
     )
 
 
-def table(soaked: Soaked) -> Table:
-    """Return a row for each tenth."""
-    names = list(soaked.marks[0].rss_mb)
-    shown = Table(title=f"{soaked.decisions} decisions, {TASK}", box=None)
-    for column in ("decisions", "wall s", *(f"{name} MB" for name in names), "overhead ms", "game ms", "recording MB"):
-        shown.add_column(column, justify="right", no_wrap=True)
+def rows(soaked: Soaked) -> Iterator[tuple[object, ...]]:
+    """Yield a row for each tenth."""
     for mark, overhead_ms, game_ms in zip(soaked.marks, soaked.overhead_ms, soaked.game_ms, strict=True):
-        memory = (f"{mark.rss_mb[name]:.0f}" for name in names)
+        memory = (f"{mark.rss_mb[name]:.0f}" for name in soaked.marks[0].rss_mb)
         rest = f"{overhead_ms:.1f}", f"{game_ms:.1f}", f"{mark.recording_mb:.1f}"
-        shown.add_row(str(mark.decisions), f"{mark.wall_s:.0f}", *memory, *rest)
-    return shown
+        yield mark.decisions, f"{mark.wall_s:.0f}", *memory, *rest
 
 
 def main() -> None:
@@ -189,7 +177,10 @@ def main() -> None:
     parser.add_argument("--agents", type=int, default=8)
     arguments = parser.parse_args()
     soaked = asyncio.run(measure(arguments.decisions, arguments.agents))
-    Console(file=sys.stderr if arguments.json else sys.stdout, width=120).print(table(soaked))
+    memory = (f"{name} MB" for name in soaked.marks[0].rss_mb)
+    columns = ("decisions", "wall s", *memory, "overhead ms", "game ms", "recording MB")
+    file = sys.stderr if arguments.json else sys.stdout
+    print_table(columns, rows(soaked), title=f"{soaked.decisions} decisions, {TASK}", file=file)
     each_bytes = soaked.marks[-1].recording_mb * 2**20 / soaked.decisions
     grown = ", ".join(f"{name} {mb:+.1f} MB" for name, mb in soaked.grown_mb.items())
     print(f"{each_bytes:.0f} bytes of recording a decision; {soaked.not_ok} not ok; from the third tenth on: {grown}",

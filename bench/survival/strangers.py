@@ -19,17 +19,16 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import zenoh
-from rich.console import Console
-from rich.table import Table
 from zenoh.handlers import Callback
 
 from bench import paths
 from bench.command_line import make_parser
+from bench.tables import print_table
 from bench.turns.bus import open_raw
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
@@ -511,16 +510,6 @@ async def measure(
         return [await attack(match, name, seconds=seconds, through=through) for name in names]
 
 
-def table(rows: Sequence[Row]) -> Table:
-    """Return the rows as a table."""
-    shown = Table(title=f"attacks on a match with {len(HONEST)} honest agents, {ANSWER_S:g} s to answer", box=None)
-    for column in ("attack", "tried", "succeeded", "steps", "late", "slowest ms"):
-        shown.add_column(column, justify="left" if column == "attack" else "right", no_wrap=True)
-    for row in rows:
-        shown.add_row(*(str(value) for value in asdict(row).values()))
-    return shown
-
-
 def main() -> None:
     """Attack, and print a table or a JSON object."""
     parser = make_parser(__doc__)
@@ -540,6 +529,11 @@ def main() -> None:
     rows = asyncio.run(
         measure(arguments.only, arguments.listen, arguments.seconds, arguments.through, separate=arguments.router)
     )
-    Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
+    print_table(
+        ("attack", "tried", "succeeded", "steps", "late", "slowest ms"),
+        (astuple(row) for row in rows),
+        title=f"attacks on a match with {len(HONEST)} honest agents, {ANSWER_S:g} s to answer",
+        file=sys.stderr if arguments.json else sys.stdout,
+    )
     if arguments.json:
         print(json.dumps({"rows": [asdict(row) for row in rows]}))

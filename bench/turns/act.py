@@ -19,6 +19,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import general
@@ -150,7 +151,4 @@ def main() -> None:
     if given.json:
         print(json.dumps(results))
         return
-    columns = list(results["right"])
-    print("  ".join(f"{column:>12}" for column in ("reply", *columns)))
-    for name, result in results.items():
-        print("  ".join(f"{value:>12}" for value in (name, *(result[column] for column in columns))))
+    print_table(("reply", *results["right"]), [(name, *result.values()) for name, result in results.items()])

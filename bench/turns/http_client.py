@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import httpx
 
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala_agents.llm.client import Request
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
@@ -104,6 +105,7 @@ def main() -> None:
     if options.json:
         print(json.dumps({"latency_s": LATENCY_S, "prompt_bytes": len(BODY), "rows": [asdict(row) for row in rows]}))
         return
-    print(f"{'client':26}{'at once':>8}{'over latency, ms':>18}{'CPU a call, ms':>16}")
-    for row in rows:
-        print(f"{row.client:26}{row.calls_at_once:8}{row.over_latency_ms:18.1f}{row.cpu_ms_per_call:16.2f}")
+    print_table(
+        ("client", "at once", "over latency, ms", "CPU a call, ms"),
+        [(row.client, row.calls_at_once, f"{row.over_latency_ms:.1f}", f"{row.cpu_ms_per_call:.2f}") for row in rows],
+    )

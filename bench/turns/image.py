@@ -19,6 +19,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bench.command_line import make_parser
+from bench.tables import print_table
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.names import unit_name
@@ -110,8 +111,5 @@ def main() -> None:
     if options.parse_args().json:
         print(json.dumps(results))
         return
-    columns = ("units", "first ms", "ms", "p95 ms", "cpu ms", "kB")
-    print(f"{'battle':>12}  {'picture':>22}  " + "  ".join(f"{column:>9}" for column in columns))
-    for battle, by_name in results.items():
-        for name, row in by_name.items():
-            print(f"{battle:>12}  {name:>22}  " + "  ".join(f"{row[column]:>9}" for column in columns))
+    rows = [(battle, name, *row.values()) for battle, by_name in results.items() for name, row in by_name.items()]
+    print_table(("battle", "picture", "units", "first ms", "ms", "p95 ms", "cpu ms", "kB"), rows, left=("picture",))

@@ -22,6 +22,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.functions import general
 from khala_bridge.knowledge import knowledge
@@ -222,7 +223,4 @@ def main() -> None:
     if given.json:
         print(json.dumps(results))
         return
-    columns = list(results["2s3z"])
-    print("  ".join(f"{column:>16}" for column in ("battle", *columns)))
-    for name, result in results.items():
-        print("  ".join(f"{value:>16}" for value in (name, *(result[column] for column in columns))))
+    print_table(("battle", *results["2s3z"]), [(name, *result.values()) for name, result in results.items()])

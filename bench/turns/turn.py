@@ -24,11 +24,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from bench.command_line import make_parser
 from bench.figures import Figure
+from bench.tables import print_table
 from bench.turns.original import step_s
 from khala.playing import games
 from khala.playing.children import Children
@@ -287,18 +286,6 @@ async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bo
     return found
 
 
-def table(rows: list[dict[str, Any]]) -> Table:
-    """Return the figures, in milliseconds over the endpoint's latency."""
-    shown = Table(title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms", box=None)
-    columns = ("link", "agents", "over", "goal", "p99", *PARTS, "original")
-    for column in columns:
-        shown.add_column(column, justify="right", no_wrap=True)
-    for row in rows:
-        shown.add_row(*(f"{row[column]:.1f}" if isinstance(row[column], float) else str(row[column])
-                        for column in columns))  # fmt: skip
-    return shown
-
-
 def measures(found: Any) -> Iterator[Figure]:
     """Yield what a step costs beyond the endpoint's latency."""
     for row in found["rows"]:
@@ -322,6 +309,12 @@ def main() -> None:
         measure(arguments.agents, arguments.steps, arguments.original_steps, tcp=arguments.tcp, tls=arguments.tls)
     )
     rows = [turn.row(LATENCY_S) for turn in measured]
-    Console(file=sys.stderr if arguments.json else sys.stdout).print(table(rows))
+    columns = ("link", "agents", "over", "goal", "p99", *PARTS, "original")
+    print_table(
+        columns,
+        [[f"{row[name]:.1f}" if isinstance(row[name], float) else row[name] for name in columns] for row in rows],
+        title=f"a step's wall time over the endpoint's {LATENCY_S:g} s, medians in ms",
+        file=sys.stderr if arguments.json else sys.stdout,
+    )
     if arguments.json:
         print(json.dumps({"latency_s": LATENCY_S, "rows": rows}))
