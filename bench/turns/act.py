@@ -145,8 +145,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the figures."""
-    options = make_parser(__doc__)
-    given = options.parse_args()
+    given = make_parser(__doc__).parse_args()
     results = {"right": measure(CALLS), "wrong": measure(WRONG)}
     if given.json:
         print(json.dumps(results))

@@ -59,6 +59,8 @@ def play(map_name: str) -> list[Snapshot]:
             client.act(command(ATTACK, own, point=middle))
         seen = client.step(LOOPS)
         snapshots.append(read_snapshot(seen, info))
+        if seen.player_result:
+            break
     return [shown for shown in snapshots if shown.own]
 
 
@@ -103,12 +105,12 @@ def measure(snapshots: list[Snapshot], spec: ImageSpec) -> dict[str, Any]:
 
 
 def main() -> None:
-    options = make_parser(__doc__)
+    given = make_parser(__doc__).parse_args()
     results = {}
     for battle, map_name in BATTLES.items():
         snapshots = play(map_name)
         results[battle] = {name: measure(snapshots, spec) for name, spec in PICTURES.items()}
-    if options.parse_args().json:
+    if given.json:
         print(json.dumps(results))
         return
     rows = [(battle, name, *row.values()) for battle, by_name in results.items() for name, row in by_name.items()]

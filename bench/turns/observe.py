@@ -216,8 +216,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 
 def main() -> None:
-    options = make_parser(__doc__)
-    given = options.parse_args()
+    given = make_parser(__doc__).parse_args()
     results = {name: measure(name) for name in BATTLES}
     results |= {"12 in one place": measure_full_game(1), "12 at four": measure_full_game(4)}
     if given.json:
