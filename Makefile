@@ -65,15 +65,15 @@ interpreted: install-tests ## Unit tests of the rules in the interpreter, as a d
 cover: install-tests ## Branch coverage per package by the tests of `make test`; fails below COVERED per cent
 	rm -f .coverage .coverage.*
 	$(RUN)pytest $(PARALLEL) --cov --cov-report=json:.coverage.json
-	$(RUN)python -m bench.coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
+	$(RUN)python -m bench coverage .coverage.json --at-least $(COVERED) $(COVERED_PACKAGES)
 
 check: install-tests ## Lint, format, types, import contracts, rows of bench/doors for every command, and habits of the code
 	$(RUN)ruff check .
 	$(RUN)ruff format --check .
 	$(RUN)mypy
 	$(RUN)lint-imports --no-logo
-	$(RUN)python -m bench.doors --check
-	$(RUN)python -m bench.house
+	$(RUN)python -m bench doors --check
+	$(RUN)python -m bench house
 
 format: install ## Format the code and fix what the linter can
 	$(RUN)ruff format .
@@ -99,7 +99,7 @@ limits: install ## Fail if a ratio that is measured within one run is beyond its
 	$(RUN)python -m bench limits
 
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
-	$(RUN)python -m bench.scenarios
+	$(RUN)python -m bench scenarios
 
 docs: install ## Write the generated pages of docs/reference, and build the site with search into site/
 	$(RUN)python -m docs.generate

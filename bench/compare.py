@@ -12,28 +12,25 @@ each side (`python -m bench --times 3`): values inside of one run scatter less t
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import statistics
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
+from bench.command_line import make_parser
 from bench.ratios import ratio_of_means
 from bench.results import find, read
 from bench.tables import print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from bench.figures import Better
     from bench.results import Results
     from khala.experiment.statistics import Interval
 
-COLUMNS: Final[Mapping[str, Literal["left", "right"]]] = {
-    "measurement": "left", "figure": "left", "A": "right", "B": "right", "unit": "left", "B / A": "right",
-    "95 %": "right", "": "left",
-}  # fmt: skip
+COLUMNS: Final = ("measurement", "figure", "A", "B", "unit", "B / A", "95 %", "")
 QUIET: Final = 0.5
 """Load up to which a machine counts as quiet."""
 
@@ -63,7 +60,8 @@ def changes(a: Results, b: Results, only: Sequence[str] = ()) -> Iterator[Change
     """Yield how the figures differ that both have, in the order of `b`."""
     before = {series.key: series.per_run for series in a.figures}
     for series in b.figures:
-        old, new = before.get(series.key, []), series.per_run
+        old = before.get(series.key, [])
+        new = series.per_run
         if (only and series.bench not in only) or not old or not new:
             continue
         yield Change(
@@ -81,13 +79,13 @@ def remarks(a: Results, b: Results, found: Sequence[Change]) -> Iterator[str]:
     """Yield what a reader must know before believing the factors."""
     if a.machine != b.machine:
         yield f"the machines differ, so factors are not those of the code: A {a.machine}; B {b.machine}"
-    for name, one in (("A", a), ("B", b)):
-        if one.load > QUIET:
-            yield f"{name} began on a machine with a load of {one.load:g}: measure it again when nothing else runs"
-    missing = {one.key for one in a.figures} ^ {one.key for one in b.figures}
+    for name, results in (("A", a), ("B", b)):
+        if results.load > QUIET:
+            yield f"{name} began on a machine with a load of {results.load:g}: measure it again when nothing else runs"
+    missing = {series.key for series in a.figures} ^ {series.key for series in b.figures}
     if missing:
         yield f"{len(missing)} figures are in one of the two alone, and are left out"
-    if sure := [one for one in found if math.isfinite(one.factor.high)]:
+    if sure := [change for change in found if math.isfinite(change.factor.high)]:
         yield f"of {len(sure)} figures that are the same, {len(sure) / 20:.1f} would stand out by chance"
     if len(sure) < len(found):
         yield "figures without an interval were measured in one run of A or B; `python -m bench --times 3` makes three"
@@ -95,10 +93,10 @@ def remarks(a: Results, b: Results, found: Sequence[Change]) -> Iterator[str]:
 
 def rows(found: Sequence[Change]) -> Iterator[tuple[str, ...]]:
     """Yield the cells of a table of `COLUMNS`."""
-    for one in found:
-        factor = "" if one.factor.value is None else f"{one.factor.value:.3f}"
-        sure = f"{one.factor.low:.3f} to {one.factor.high:.3f}" if math.isfinite(one.factor.high) else ""
-        yield one.bench, one.name, f"{one.a:.4g}", f"{one.b:.4g}", one.unit, factor, sure, one.verdict
+    for change in found:
+        factor = "" if change.factor.value is None else f"{change.factor.value:.3f}"
+        sure = f"{change.factor.low:.3f} to {change.factor.high:.3f}" if math.isfinite(change.factor.high) else ""
+        yield change.bench, change.name, f"{change.a:.4g}", f"{change.b:.4g}", change.unit, factor, sure, change.verdict
 
 
 def _finite(factor: Interval) -> dict[str, float | None]:
@@ -108,24 +106,17 @@ def _finite(factor: Interval) -> dict[str, float | None]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print how two results differ."""
-    parser = argparse.ArgumentParser(
-        prog="python -m bench compare", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = make_parser(__doc__)
     parser.add_argument("a", help="a file, or the beginning of a commit or a date")
     parser.add_argument("b", help="the same")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="measurements to compare")
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     given = parser.parse_args(arguments)
     a, b = read(find(given.a)), read(find(given.b))
     found = list(changes(a, b, given.only))
     if given.json:
-        each = [asdict(one) | {"factor": _finite(one.factor), "verdict": one.verdict} for one in found]
+        each = [asdict(change) | {"factor": _finite(change.factor), "verdict": change.verdict} for change in found]
         print(json.dumps({"a": a.title, "b": b.title, "remarks": list(remarks(a, b, found)), "changes": each}))
         return
     print(f"A: {a.title}; {a.machine}\nB: {b.title}; {b.machine}\n")
-    print_table(COLUMNS, rows(found))
+    print_table(COLUMNS, rows(found), left=("figure", "unit", ""))
     print("".join(f"\n* {remark}" for remark in remarks(a, b, found)))
-
-
-if __name__ == "__main__":
-    main()

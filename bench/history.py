@@ -1,4 +1,4 @@
-"""Write the page of all results that are kept, with a picture of each figure over time: `python -m bench history`.
+"""Write the page of all kept results, with a picture of each figure over time.
 
 It reads `bench/results` and writes `docs/measurements-over-time.md` and `docs/images/measurements`. Results of code
 that differed from its commit are left out. Machines have colours of their own: values of two say nothing of the code.
@@ -6,7 +6,6 @@ that differed from its commit are left out. Machines have colours of their own: 
 
 from __future__ import annotations
 
-import argparse
 import io
 import itertools
 import re
@@ -14,7 +13,9 @@ import statistics
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from bench.results import RESULTS, ROOT, SHORT, every
+from bench.command_line import make_parser
+from bench.paths import RESULTS, ROOT
+from bench.results import SHORT, every
 from docs.pages import markdown
 from khala.experiment.report.figures import COLOURS, FAINT, MARKS, STYLE
 
@@ -78,13 +79,15 @@ class Line:
 def lines(kept: Sequence[Results]) -> list[Line]:
     """Return all figures over time, by measurement, each as its newest results describe it."""
     points: dict[Key, list[Point]] = {}
-    newest = {series.key: series for one in kept for series in one.figures}
-    for at, one in enumerate(kept):
-        for series in one.figures:
+    newest = {series.key: series for entry in kept for series in entry.figures}
+    for at, entry in enumerate(kept):
+        for series in entry.figures:
             if values := series.per_run:
-                points.setdefault(series.key, []).append(Point(at, values, one.machine))
+                points.setdefault(series.key, []).append(Point(at, values, entry.machine))
     found = [(newest[key], those) for key, those in points.items()]
-    every_line = [Line(one.bench, one.name, one.unit, one.better, one.limit, those) for one, those in found]
+    every_line = [
+        Line(series.bench, series.name, series.unit, series.better, series.limit, those) for series, those in found
+    ]
     order = list(dict.fromkeys(line.bench for line in every_line))
     return sorted(every_line, key=lambda line: order.index(line.bench))
 
@@ -95,13 +98,13 @@ def page(kept: Sequence[Results]) -> str:
         return markdown.join(HEAD, NOTHING)
     rows = [
         (
-            f"{one.date:%Y-%m-%d}",
-            markdown.code(one.commit[:SHORT]),
-            one.machine,
-            max((len(series.runs) for series in one.figures), default=0),
-            one.load,
+            f"{entry.date:%Y-%m-%d}",
+            markdown.code(entry.commit[:SHORT]),
+            entry.machine,
+            max((len(series.runs) for series in entry.figures), default=0),
+            entry.load,
         )
-        for one in kept
+        for entry in kept
     ]
     results = markdown.table(("date", "commit", "machine", "runs", "load before"), rows)
     return markdown.join(HEAD, results, *_sections(lines(kept)))
@@ -135,7 +138,8 @@ def picture(line: Line, titles: Sequence[str], colours: Mapping[Machine, int]) -
             here = [point for point in line.points if point.machine == machine]
             if not here:
                 continue
-            colour, at = COLOURS[number % len(COLOURS)], [point.at for point in here]
+            colour = COLOURS[number % len(COLOURS)]
+            at = [point.at for point in here]
             axes.vlines(at, [min(p.values) for p in here], [max(p.values) for p in here], color=colour, alpha=0.4)
             middles = [statistics.median(point.values) for point in here]
             axes.plot(at, middles, color=colour, marker=MARKS[number % len(MARKS)], markersize=4.8, linewidth=1.2,
@@ -161,8 +165,8 @@ def picture(line: Line, titles: Sequence[str], colours: Mapping[Machine, int]) -
 def write(kept: Sequence[Results], page_path: Path = PAGE, pictures: Path = PICTURES) -> list[Path]:
     """Write the page and its pictures, take away pictures of figures that are gone, and return what was written."""
     found = lines(kept)
-    titles = [f"{one.date:%Y-%m-%d}\n{one.commit[:SHORT]}" for one in kept]
-    colours = {machine: number for number, machine in enumerate(dict.fromkeys(one.machine for one in kept))}
+    titles = [f"{entry.date:%Y-%m-%d}\n{entry.commit[:SHORT]}" for entry in kept]
+    colours = {machine: number for number, machine in enumerate(dict.fromkeys(entry.machine for entry in kept))}
     wanted = {pictures / line.file: line for line in found}
     for old in set(pictures.glob("*.svg")) - set(wanted):
         old.unlink()
@@ -175,18 +179,12 @@ def write(kept: Sequence[Results], page_path: Path = PAGE, pictures: Path = PICT
 
 def kept_results(among: Path = RESULTS) -> list[Results]:
     """Return the results of a commit, oldest first."""
-    return [one for _, one in every(among) if one.commit and not one.changed]
+    return [entry for _, entry in every(among) if entry.commit and not entry.changed]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the page."""
-    argparse.ArgumentParser(
-        prog="python -m bench history", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args(arguments)
+    make_parser(__doc__, json=False).parse_args(arguments)
     kept = kept_results()
     first, *rest = write(kept)
     print(f"{first.relative_to(ROOT)}: {len(kept)} results, {len(rest)} pictures")
-
-
-if __name__ == "__main__":
-    main()

@@ -20,14 +20,13 @@ import psutil
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.figures import Better
+from bench.paths import RESULTS, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from bench.figures import Figure
 
-ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "bench" / "results"
 SHORT = 8
 """Characters of a commit in names."""
 CPUINFO = Path("/proc/cpuinfo")
@@ -117,7 +116,7 @@ def _short(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-def begun() -> Results:
+def begin() -> Results:
     """Return results without figures: the commit, the machine and the moment."""
     commit = _git("rev-parse", "HEAD")
     return Results(
@@ -194,7 +193,7 @@ def find(name: str, *, among: Path = RESULTS) -> Path:
     if Path(name).is_file():
         return Path(name)
     kept = every(among)
-    found = [path for path, one in kept if one.commit.startswith(name) or path.stem.startswith(name)]
+    found = [path for path, results in kept if results.commit.startswith(name) or path.stem.startswith(name)]
     if found and name:
         return found[-1]
     there = ", ".join(path.stem for path, _ in kept) or "none"
@@ -204,4 +203,4 @@ def find(name: str, *, among: Path = RESULTS) -> Path:
 def every(among: Path = RESULTS) -> list[tuple[Path, Results]]:
     """Return all results that are kept, oldest first."""
     kept = [(path, read(path)) for path in among.glob("*.json")]
-    return sorted(kept, key=lambda one: (one[1].date, one[0]))
+    return sorted(kept, key=lambda entry: (entry[1].date, entry[0]))

@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from typing import Literal
+    from collections.abc import Collection, Iterable
 
 LEAST_WIDTH = 140
 """Characters of a line that goes into a file."""
 
 
-def print_table(columns: Mapping[str, Literal["left", "right"]], rows: Iterable[Sequence[str]]) -> None:
-    """Print rows of cells under the names of their columns."""
-    table = Table(box=None, pad_edge=False)
-    for name, side in columns.items():
-        table.add_column(name, justify=side)
+def print_table(
+    columns: Iterable[str],
+    rows: Iterable[Iterable[object]],
+    *,
+    left: Collection[str] = (),
+    title: str | None = None,
+    file: TextIO | None = None,
+) -> None:
+    """Print rows of cells under the names of their columns.
+
+    Args:
+        columns: the first one holds words, the others hold numbers.
+        rows: cells in the order of the columns.
+        left: further columns that hold words.
+        title: of the table.
+        file: stdout if not given.
+    """
+    table = Table(title=title, box=None, pad_edge=False)
+    for number, name in enumerate(columns):
+        table.add_column(name, justify="left" if not number or name in left else "right")
     for row in rows:
-        table.add_row(*row)
-    console = Console()
-    Console(width=None if console.is_terminal else LEAST_WIDTH, highlight=False).print(table)
+        table.add_row(*map(str, row))
+    console = Console(file=file)
+    Console(file=file, width=None if console.is_terminal else LEAST_WIDTH, highlight=False).print(table)
+
+
+def two_digits(value: float | None) -> str:
+    """Return a number with two digits, or nothing for none."""
+    return "" if value is None else f"{value:.2f}"

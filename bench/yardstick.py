@@ -1,7 +1,4 @@
-"""A fixed piece of work that no change of the project touches: how fast this machine is at the moment.
-
-    python -m bench.yardstick            the milliseconds of processor time that it takes
-    python -m bench.yardstick --json     one JSON object on stdout
+"""Measure how fast this machine is at the moment, by a piece of work that no change of the project touches.
 
 It is what hosts, agents and games mostly do: objects of Python, small arrays of numpy, JSON. `python -m bench compare`
 shows its factor beside the others, which says how much of them is the machine.
@@ -9,7 +6,6 @@ shows its factor beside the others, which says how much of them is the machine.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 import time
@@ -17,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.command_line import make_parser
 from bench.figures import Figure
 
 if TYPE_CHECKING:
@@ -56,12 +53,7 @@ def measures(found: Any) -> Iterator[Figure]:
 
 def main() -> None:
     """Print the figure."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    parser = make_parser(__doc__)
     given = parser.parse_args()
     found = measure()
     print(json.dumps(found) if given.json else f"{statistics.median(found['took_ms']):.2f} ms")
-
-
-if __name__ == "__main__":
-    main()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 import cv2
 import numpy as np
 
-from bench.browser import browsing, go_to, steps_of, viewing
+from bench.recordings.browser import browsing, go_to, steps_of, viewing
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:

@@ -67,14 +67,17 @@ if TYPE_CHECKING:
 
 EVIL: Final = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e[red][link=http://e]"
 """A title, an empty screen, a colour, letters from right to left, and markup."""
-AGENT, GAME = "Stalkers", GameIdentity("4.10", "B0", "Map.SC2Map", "0" * 64)
+AGENT = "Stalkers"
+GAME = GameIdentity("4.10", "B0", "Map.SC2Map", "0" * 64)
 FILE = "name: e\nfixed: {model: scripted}\nfactors: {task: [2s3z_pair]}\nseeds: 2\n"
 
 
 # --- what is attacked -----------------------------------------------------------------------------------
 
 
-def _recorded(path: Path, labels: Mapping[str, str], *, seed: int = 1, finished: bool = True, words: str = "") -> None:
+def _write_recording(
+    path: Path, labels: Mapping[str, str], *, seed: int = 1, finished: bool = True, words: str = ""
+) -> None:
     """Write the recording of a match of one step."""
     config = MatchConfig(task=load_task("2s3z_pair"), run="e", seed=seed, labels=dict(labels))
     where: dict[str, Any] = {"run": "e", "side": "blue", "episode": 0}
@@ -111,12 +114,12 @@ def _experiment(directory: Path, *, words: str = "") -> Store:
     store.adopt()
     for seed in (1, 2):
         path = store.recording_for(f"m{seed}")
-        _recorded(path, {"match": f"m{seed}", "factor.task": f"2s3z_pair{words}"}, seed=seed, words=words)
+        _write_recording(path, {"match": f"m{seed}", "factor.task": f"2s3z_pair{words}"}, seed=seed, words=words)
         store.take(path, attempts=1)
     return store
 
 
-def printed(command: Callable[[], object]) -> tuple[str, str]:
+def capture(command: Callable[[], object]) -> tuple[str, str]:
     """Return what a command prints, and how it got through if it did not end in a sentence or well."""
     with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
         try:
@@ -183,7 +186,7 @@ async def _broken_index(damage: Callable[[Path], object], directory: Path) -> st
     before = sorted(map(repr, store.results()))
     damage(store.directory / INDEX)
     fresh = Store(store.directory)
-    _, traceback = printed(lambda: _export(fresh))
+    _, traceback = capture(lambda: _export(fresh))
     if traceback:
         return traceback
     return "" if sorted(map(repr, fresh.results())) == before else "results were lost"
@@ -192,7 +195,7 @@ async def _broken_index(damage: Callable[[Path], object], directory: Path) -> st
 async def _late_copy(directory: Path) -> str:
     store = _experiment(directory)
     path = store.recording_for("m1")
-    _recorded(path, {"match": "m1"}, finished=False)
+    _write_recording(path, {"match": "m1"}, finished=False)
     os.utime(path.with_name("recording.mcap"), (0, 0))
     store.rebuild()
     return "" if store.played()["m1"].state == "done" else "a crashed try hides a done match"
@@ -201,7 +204,7 @@ async def _late_copy(directory: Path) -> str:
 async def _old_time(directory: Path) -> str:
     for number in range(11, 0, -1):
         name = "recording.mcap" if number == 1 else f"recording-{number}.mcap"
-        _recorded(directory / "run" / name, {"try": str(number)})
+        _write_recording(directory / "run" / name, {"try": str(number)})
         os.utime(directory / "run" / name, (2000 - number, 2000 - number))
     card = newest_recording(directory / "run").run
     return "" if card and card.labels["try"] == "11" else "an older try is resumed"
@@ -209,7 +212,7 @@ async def _old_time(directory: Path) -> str:
 
 async def _forged_view(directory: Path) -> str:
     path = directory / "a.mcap"
-    _recorded(path, {})
+    _write_recording(path, {})
     forged = path.with_name(f".{path.name}.index")
     with mock.patch.dict(os.environ, {"KHALA_CACHE": str(directory / "cache")}):
         index = Opened("x", path).index
@@ -252,11 +255,11 @@ class FullFile:
 async def _full_disk(work: Callable[[Store], object], directory: Path) -> str:
     """Play a command on a disk on which no file gets longer than 100 bytes; what was there must stay."""
     store = _experiment(directory)
-    printed(lambda: work(store))
+    capture(lambda: work(store))
     before = _contents(directory)
     fdopen = os.fdopen
     with mock.patch("os.fdopen", lambda *given: FullFile(fdopen(*given), 100)):
-        said, traceback = printed(lambda: work(store))
+        said, traceback = capture(lambda: work(store))
     if traceback:
         return traceback
     if "No space left" not in said:
@@ -294,7 +297,7 @@ async def _tiny_disk(directory: Path) -> str:
             lambda: _report(store),
             lambda: _export(store),
         ):
-            said, traceback = printed(work)
+            said, traceback = capture(work)
             if traceback or "No space left" not in said:
                 return traceback or f"it says {said!r}"
         found = sorted(map(repr, Store(store.directory).results()))
@@ -306,9 +309,9 @@ async def _tiny_disk(directory: Path) -> str:
 
 
 async def _half_data_set(directory: Path) -> str:
-    _recorded(directory / "a.mcap", {})
+    _write_recording(directory / "a.mcap", {})
     with mock.patch("json.dumps", side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))):
-        said, traceback = printed(partial(_data_set, directory))
+        said, traceback = capture(partial(_data_set, directory))
     left = _contents(directory).keys() - {str(directory / "a.mcap")}
     return traceback or (f"{left} is left, and it says {said!r}" if left or "nothing of it is kept" not in said else "")
 
@@ -322,10 +325,10 @@ async def _modes(directory: Path) -> str:
     umask = os.umask(0o022)
     try:
         store = _experiment(directory)
-        printed(lambda: _report(store))
-        printed(lambda: _export(store))
-        _recorded(directory / "a.mcap", {})
-        printed(partial(_data_set, directory))
+        capture(lambda: _report(store))
+        capture(lambda: _export(store))
+        _write_recording(directory / "a.mcap", {})
+        capture(partial(_data_set, directory))
         with mock.patch.dict(os.environ, {"KHALA_CACHE": str(directory / "cache")}):
             index = Opened("x", directory / "a.mcap").index
             whole(index)
@@ -344,7 +347,7 @@ async def _link(directory: Path) -> str:
     store = _experiment(directory)
     (directory / "precious").write_text("mine")
     (store.directory / "x.csv").symlink_to(directory / "precious")
-    _, traceback = printed(lambda: _export(store))
+    _, traceback = capture(lambda: _export(store))
     return traceback or (
         "" if (directory / "precious").read_text() == "mine" else "a file behind a link is overwritten"
     )
@@ -363,7 +366,7 @@ async def _odd_recordings(make: Callable[[Path], object], directory: Path) -> st
         lambda: _export(Store(store.directory)),
         partial(commands.status, store.directory, game="simulator", out=directory, as_json=False),
     ):
-        if traceback := printed(command)[1]:
+        if traceback := capture(command)[1]:
             return traceback
     return ""
 
@@ -375,7 +378,7 @@ def _torn(path: Path) -> None:
 def _with_labels(labels: dict[str, str]) -> Callable[[Path], None]:
     def make(path: Path) -> None:
         path.unlink()
-        _recorded(path, labels)
+        _write_recording(path, labels)
 
     return make
 
@@ -386,12 +389,13 @@ async def _foreign_words(directory: Path) -> str:
     with Recorder(path) as recorder:
         recorder.write(agent_key("e", "blue", AGENT, Topic.REPLY), encode(Reply(**where, text="I surrender")))
     options = {"agent": "Zealots", "steps": None, "text": True, "images": None, "new": None, "pace": False}
-    said, traceback = printed(partial(replay, path, **options, as_json=False))  # type: ignore[arg-type]
+    said, traceback = capture(partial(replay, path, **options, as_json=False))  # type: ignore[arg-type]
     return traceback or ("words stand in the mouth of another agent" if "surrender" in said else "")
 
 
 async def _foreign_reply(directory: Path) -> str:
-    broker, key = MemoryBroker(), agent_key("e", "blue", AGENT, Topic.REPLY)
+    broker = MemoryBroker()
+    key = agent_key("e", "blue", AGENT, Topic.REPLY)
     agent = await broker.session().publisher(key, Delivery.SPEECH)
     with Recorder(directory / "a.mcap") as recorder:
         bus = RecordingBus(broker.session(), recorder, [Seat("blue", AGENT), Seat("blue", "Zealots")])
@@ -431,8 +435,10 @@ async def _last_exchange(directory: Path) -> str:
 
 
 async def _broken_view(_: Path) -> str:
-    broker, stop = MemoryBroker(), asyncio.Event()
-    host, where = broker.session(), {"run": "e", "side": "blue", "agent": AGENT}
+    broker = MemoryBroker()
+    stop = asyncio.Event()
+    host = broker.session()
+    where = {"run": "e", "side": "blue", "agent": AGENT}
     replies = await host.subscribe(every_agent("e", Topic.REPLY), Delivery.SPEECH)
     briefings, observations = [
         await host.publisher(agent_key("e", "blue", AGENT, topic), Delivery.STATE)
@@ -463,7 +469,7 @@ async def _broken_view(_: Path) -> str:
 
 
 async def _printing(command: Callable[[Path], object], directory: Path) -> str:
-    said, traceback = printed(partial(command, directory))
+    said, traceback = capture(partial(command, directory))
     return traceback or _acts(said) or ("" if "owned" in said else f"it printed none of the words: {said!r}")
 
 
@@ -478,18 +484,18 @@ def _status(directory: Path, *, shows: bool) -> None:
         commands.status(directory / "e", game="simulator", out=directory, as_json=False)
 
 
-def _listed(_: Path) -> None:
+def _list(_: Path) -> None:
     card = MatchCard(run="a", number="1", owner=EVIL, task=EVIL, state="failed", reason=EVIL)
     with mock.patch.object(service_commands, "ask", return_value=Matches(matches=(card,))):
         service_commands.matches(None, tls=None, insecure=False, as_json=False)
 
 
-def _ended(_: Path) -> None:
+def _end(_: Path) -> None:
     card = MatchCard(run="a", number="1", owner=EVIL, task=EVIL, state="failed", reason=EVIL)
     service_commands.end(card, as_json=False)
 
 
-def _watched(_: Path) -> None:
+def _watch(_: Path) -> None:
     report = Report(
         run="e",
         episode=0,
@@ -506,13 +512,13 @@ def _watched(_: Path) -> None:
         progress(ended)
 
 
-def _replayed(directory: Path) -> None:
-    _recorded(directory / "a.mcap", {}, words=EVIL)
+def _replay(directory: Path) -> None:
+    _write_recording(directory / "a.mcap", {}, words=EVIL)
     options: dict[str, Any] = {"agent": None, "steps": None, "text": True, "images": None, "new": None, "pace": False}
     replay(directory / "a.mcap", **options, as_json=False)
 
 
-def _compared(directory: Path) -> None:
+def _compare(directory: Path) -> None:
     store = _experiment(directory, words=EVIL)
     results.compare(
         *[f"{store.directory}:task=2s3z_pair{EVIL}"] * 2, allow=(), measures=["win"], out=directory, as_json=False
@@ -578,11 +584,11 @@ ODD: Final[dict[str, Callable[[Path], object]]] = {
 PRINTING: Final[dict[str, Callable[[Path], object]]] = {
     "experiment show": partial(_status, shows=True),
     "experiment status": partial(_status, shows=False),
-    "experiment compare": _compared,
-    "matches": _listed,
-    "stop": _ended,
-    "watch": _watched,
-    "replay": _replayed,
+    "experiment compare": _compare,
+    "matches": _list,
+    "stop": _end,
+    "watch": _watch,
+    "replay": _replay,
     "replay (a name of a file)": _missing_file,
 }
 ROWS: Final[tuple[Row, ...]] = (

@@ -232,7 +232,7 @@ async def _is_honest_answered(target: Target) -> str:
     return f"an honest client waited {took_s:.1f} s" if took_s > STEP_S else ""
 
 
-def _refused(
+def _wrong_status(
     name: str, statuses: Sequence[int], allowed: Sequence[int] = (0, 400, 401, 403, 405, 408, 413, 429)
 ) -> str:
     wrong = [status for status in statuses if status not in allowed]
@@ -280,7 +280,7 @@ async def _play_trick(serving: Serving, trick: Trick, directory: Path) -> str:
         lines = [line.replace("PORT", str(target.port)) for line in trick.lines]
         host = trick.host.replace("PORT", str(target.port)) or None
         status = await send(target, *lines, host=host, **trick.options)
-        return _refused("it", [status], trick.expected) or await _is_honest_answered(target)
+        return _wrong_status("it", [status], trick.expected) or await _is_honest_answered(target)
 
 
 # --- connections --------------------------------------------------------------------------------------
@@ -346,7 +346,7 @@ async def _play_without_token(serving: Serving, directory: Path) -> str:
             await send(target, "Authorization: Bearer x", path=bare),
             await send(target, "Cookie: token=x; khala_0=x", path=bare),
         ]
-        return _refused("a request without the token", tries, (401, 403)) or await _is_honest_answered(target)
+        return _wrong_status("a request without the token", tries, (401, 403)) or await _is_honest_answered(target)
 
 
 async def _play_guesses(directory: Path) -> str:
@@ -369,7 +369,7 @@ async def _play_token_guesses(directory: Path) -> str:
         tries = [await send(target, path=f"/schema?token={secrets.token_urlsafe(24)}") for _ in range(60)]
         if 429 not in tries:
             return "60 guesses were looked at"
-        return _refused("a guess", tries, (401, 429)) or await _is_honest_answered(target)
+        return _wrong_status("a guess", tries, (401, 429)) or await _is_honest_answered(target)
 
 
 # --- khala view ---------------------------------------------------------------------------------------
@@ -384,7 +384,9 @@ async def _play_paths(directory: Path) -> str:
     async with view(directory) as target:
         query = target.path.partition("?")[2]
         statuses = [await send(target, path=f"{path}?{query}") for path in PATHS]
-        return _refused("a path out of the recordings", statuses, (303, 400, 404)) or await _is_honest_answered(target)
+        return _wrong_status("a path out of the recordings", statuses, (303, 400, 404)) or await _is_honest_answered(
+            target
+        )
 
 
 async def _play_view_socket(directory: Path) -> str:
@@ -476,7 +478,7 @@ async def _send_much(target: Target) -> str:
     with contextlib.suppress(ConnectionError):
         line = await asyncio.wait_for(reader.readline(), ANSWER_S) or line
     writer.close()
-    return _refused("a body in chunks", [int(line.split()[1])], (413,))
+    return _wrong_status("a body in chunks", [int(line.split()[1])], (413,))
 
 
 async def _talk_nonsense(target: Target) -> str:
@@ -551,7 +553,7 @@ async def _play_long_answer(directory: Path) -> str:
     """Send an answer of 100 kB, which the recording would keep."""
     async with mcp(directory) as target:
         body = INITIALIZE.replace(b'"doors"', b'"' + b"x" * 100_000 + b'"')
-        return _refused("a body of 100 kB", [await send(target, body=body)], (413,))
+        return _wrong_status("a body of 100 kB", [await send(target, body=body)], (413,))
 
 
 # --- files and processes ------------------------------------------------------------------------------

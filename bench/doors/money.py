@@ -1,4 +1,4 @@
-"""An endpoint that bills, in every kind of trouble: no cent over the cap. `python -m bench.money` has the table."""
+"""An endpoint that bills, in every kind of trouble: no cent over the cap. `python -m bench money` has the table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from bench.doors.rows import Row
-from bench.money import KINDS, spend
+from bench.survival.money import KINDS, spend
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,6 +1,6 @@
 """Which module has the rows of which doors, so that a row is loaded without the imports of all others.
 
-`python -m bench.doors --check` reads this table alone; a test holds it to the rows.
+`python -m bench doors --check` reads this table alone; a test holds it to the rows.
 """
 
 from __future__ import annotations

@@ -23,9 +23,9 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.x509.oid import NameOID
 
-from bench.doors.files import EVIL, GAME, FullFile, printed
+from bench.doors.files import EVIL, GAME, FullFile, capture
 from bench.doors.rows import Row
-from bench.doors.trust import GOLDEN
+from bench.paths import GOLDEN
 from khala.calibrate import commands as calibrating
 from khala.commands.advise import Adviser, Advising, told
 from khala.knowledge import cli as knowledge
@@ -123,7 +123,9 @@ def _result(words: str = "") -> Result:
 
 async def _advise(payloads: Mapping[Topic, list[bytes]]) -> tuple[list[Any], list[str]]:
     """Advise in a match whose host sends these bytes; return what was shown, and the complaints."""
-    broker, shown, complaints = MemoryBroker(), list[Any](), list[str]()
+    broker = MemoryBroker()
+    shown = list[Any]()
+    complaints = list[str]()
     host = broker.session()
     await host.announce(host_key(RUN))
     cards = await host.publisher(run_key(RUN, Topic.RUN), Delivery.STATE)
@@ -228,14 +230,14 @@ SAMPLES: Final = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 
 def _calibration() -> dict[str, Any]:
-    def measured(samples: tuple[float, ...], *, exact: bool) -> Measured:
+    def measurement(samples: tuple[float, ...], *, exact: bool) -> Measured:
         return Measured(
             unit="s", exact=exact, resolution=0, run_s=1, loops=1, values={"a": Values.of(samples)}
         )  # fmt: skip
 
     made = Calibration(
         khala="1", game="g", version="4.10", build=1, data_version="d", platform="p", seed=1,
-        probes={"move.speed": measured(SAMPLES, exact=False), "weapon.range": measured((1.0,), exact=True)},
+        probes={"move.speed": measurement(SAMPLES, exact=False), "weapon.range": measurement((1.0,), exact=True)},
     )  # fmt: skip
     return made.model_dump(mode="json")
 
@@ -245,7 +247,7 @@ def _compare(path: Path, directory: Path) -> str:
     good = directory / "good.json"
     good.write_text(json.dumps(_calibration()), encoding="utf-8")
     for pair in ((good, path), (path, good)):
-        said, through = printed(partial(calibrating.show_comparison, *pair, as_json=False))
+        said, through = capture(partial(calibrating.show_comparison, *pair, as_json=False))
         if through:
             return through
         if "no file of `khala calibrate`" not in said and "cannot be read" not in said:
@@ -308,7 +310,7 @@ async def _forged_heading(directory: Path) -> str:
     path.write_text(json.dumps(made), encoding="utf-8")
     good = directory / "good.json"
     good.write_text(json.dumps(_calibration()), encoding="utf-8")
-    said, through = printed(partial(calibrating.show_comparison, good, path, as_json=False))
+    said, through = capture(partial(calibrating.show_comparison, good, path, as_json=False))
     if through or "owned" not in said:
         return through or "the names are not shown at all"
     if any(line.startswith("# All is well") for line in said.splitlines()):
@@ -326,7 +328,7 @@ async def _calibrate_onto(directory: Path) -> str:
         return "a file behind a link is overwritten"
     before = (directory / "link.json").read_bytes()
     with mock.patch("os.fdopen", side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))):
-        said, through = printed(lambda: made.but(seed=2).save(directory / "link.json"))
+        said, through = capture(lambda: made.but(seed=2).save(directory / "link.json"))
     if through or "No space left" not in said:
         return through or f"it says {said!r}"
     return "" if (directory / "link.json").read_bytes() == before else "the file of before is lost"
@@ -430,7 +432,8 @@ def _show_keys(make: Callable[[Path], object], *command: str) -> Play:
 
 async def _mutated_certificates(directory: Path) -> str:
     """Change bytes of a certificate: it is read, or refused in a sentence."""
-    path, dice = _certificate(directory), random.Random(7)
+    path = _certificate(directory)
+    dice = random.Random(7)
     lines = path.read_text().splitlines()
     whole = b64decode("".join(lines[1:-1]))
     for _ in range(1500):
@@ -443,7 +446,7 @@ async def _mutated_certificates(directory: Path) -> str:
     return ""
 
 
-def _signed(directory: Path, name: str, days: int) -> Path:
+def _write_certificate(directory: Path, name: str, days: int) -> Path:
     """Write a certificate of a name and a time that `khala keys` would not give it."""
     from datetime import UTC, datetime, timedelta  # noqa: PLC0415  # this row alone needs a calendar
 
@@ -464,15 +467,15 @@ def _signed(directory: Path, name: str, days: int) -> Path:
 
 
 def _names_with_escapes(directory: Path) -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
-    return ("keys", "show", str(_signed(directory, EVIL[:60], 9))), (0,), ("owned",)
+    return ("keys", "show", str(_write_certificate(directory, EVIL[:60], 9))), (0,), ("owned",)
 
 
-def _expired(directory: Path) -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
-    return ("doctor", "--tls", str(_signed(directory, "router", -9))), (1,), ("expired on",)
+def _expired_for_doctor(directory: Path) -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
+    return ("doctor", "--tls", str(_write_certificate(directory, "router", -9))), (1,), ("expired on",)
 
 
-def _expired_shown(directory: Path) -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
-    return ("keys", "show", str(_signed(directory, "router", -9))), (0,), ("expired",)
+def _expired_for_show(directory: Path) -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
+    return ("keys", "show", str(_write_certificate(directory, "router", -9))), (0,), ("expired",)
 
 
 def _readable(directory: Path) -> Path:
@@ -505,7 +508,7 @@ async def _full_disk(directory: Path) -> str:
         before = {path.name: path.read_bytes() for path in where.iterdir()}
         fdopen = os.fdopen
         with mock.patch("os.fdopen", lambda *given: FullFile(fdopen(*given), 5)):
-            said, through = printed(partial(knowledge.write, version="4.10", check=False))
+            said, through = capture(partial(knowledge.write, version="4.10", check=False))
         if through or "No space left" not in said:
             return through or f"it says {said!r}"
         return "" if {path.name: path.read_bytes() for path in where.iterdir()} == before else "facts are lost"
@@ -526,7 +529,7 @@ def _damaged_facts(damage: Callable[[Path], object]) -> Play:
             facts.write("4.10")
             (where / "units.json").unlink()
             damage(where / "units.json")
-            said, through = printed(partial(knowledge.write, version="4.10", check=True))
+            said, through = capture(partial(knowledge.write, version="4.10", check=True))
         return through or ("" if "4.10/units.json" in said and "abilities" not in said else f"it says {said!r}")
 
     return play
@@ -546,7 +549,8 @@ async def _ask(http: aiohttp.ClientSession, endpoint: Endpoint, body: bytes, **h
 
 async def _mutated_requests(_: Path) -> str:
     """Change what a request says, byte by byte and value by value: a status says what is wrong, never 500."""
-    dice, whole = random.Random(3), json.dumps(REQUEST).encode()
+    dice = random.Random(3)
+    whole = json.dumps(REQUEST).encode()
     junk = [b"", b"null", b"[]", b"{", b"[" * 50_000, b'{"model": "\\ud800", "messages": []}', b"\xff" * 50]
     junk += [json.dumps(REQUEST | change).encode() for change in CHANGES]
     for _number in range(150):
@@ -583,7 +587,7 @@ async def _long_prompts(_: Path) -> str:
     return ""
 
 
-async def _zipped(_: Path) -> str:
+async def _send_zipped(_: Path) -> str:
     """Send a body that is small until it is unpacked."""
     import gzip  # noqa: PLC0415  # this row alone packs
 
@@ -739,13 +743,13 @@ def _rows() -> Iterator[Row]:
     yield Row(doctor, "a proxy with a password", _proxy_password)
     for what, (environ, words) in DOCTORS.items():
         yield Row(doctor, what, _doctor(environ, *words), "attack" if "escape" in what else "quirk")
-    yield Row(doctor, "a certificate that has expired", _command(_expired), "fault")
+    yield Row(doctor, "a certificate that has expired", _command(_expired_for_doctor), "fault")
     for what, damage in BAD_CERTIFICATES.items():
         yield Row("khala keys show", f"a certificate that is {what}", _show_keys(damage, "keys", "show"))
     yield Row(doctor, "a certificate that is half a file", _show_keys(_torn, "doctor", "--tls"), "fault")
     yield Row("khala keys show", "1500 certificates with broken bytes", _mutated_certificates, "fault")
     yield Row("khala keys show", "a name with escape sequences", _command(_names_with_escapes))
-    yield Row("khala keys show", "a certificate that has expired", _command(_expired_shown), "fault")
+    yield Row("khala keys show", "a certificate that has expired", _command(_expired_for_show), "fault")
     yield Row("khala keys show", "a key that others can read", _command(_readable_shown), "fault")
     yield Row("khala knowledge write", "a disk that fills up", _full_disk, "fault")
     yield Row("khala knowledge write", "a link where a file is to be", _linked_facts)
@@ -753,7 +757,7 @@ def _rows() -> Iterator[Row]:
         yield Row("khala knowledge write", f"--check of {what}", _damaged_facts(damage), "fault")
     yield Row("khala llm", "150 requests with broken bytes, and odd values", _mutated_requests, "fault")
     yield Row("khala llm", "prompts that take patterns long to read", _long_prompts)
-    yield Row("khala llm", "a body of 64 MB in 64 kB", _zipped)
+    yield Row("khala llm", "a body of 64 MB in 64 kB", _send_zipped)
     yield Row("khala router", "garbage, and handshakes that are half-open", _garbage)
     yield Row("khala router", "a certificate of another authority", partial(_refused_peer, tls=_foreign))
     yield Row("khala router", "TLS without a certificate", _no_certificate)

@@ -10,12 +10,12 @@ import os
 import shutil
 import sys
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import yaml
 
 from bench.doors.rows import Row
+from bench.paths import GOLDEN
 from khala.service.orders import match_of
 from khala_configs import CONFIGS
 from khala_protocol.codec import decode, encode
@@ -26,10 +26,10 @@ from khala_protocol.service import Submit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     Json = dict[str, Any]
 
-GOLDEN: Final = Path(__file__).parent.parent.parent / "tests" / "khala" / "golden.mcap"
 MODULE: Final = "open('it-ran', 'w').close()\n"
 SECTIONS: Final = ["foreign_code:mine"]
 PATIENCE_S: Final = 60.0
@@ -41,10 +41,10 @@ SIDES: Final = {"one side": "llm_smac/2s3z_pair.yaml", "two sides": "duels/duel_
 def _forged_task(sides: str) -> Json:
     """Return a task whose agents all read a section of the module."""
     task: Json = yaml.safe_load((CONFIGS / "tasks" / SIDES[sides]).read_text(encoding="utf-8"))
-    return _forged(task)
+    return _forge(task)
 
 
-def _forged(task: Json) -> Json:
+def _forge(task: Json) -> Json:
     for side in (task, *task.get("sides", ())):
         if side.get("agents"):
             side["agents"] = [agent | {"sections": SECTIONS} for agent in side["agents"]]
@@ -65,7 +65,7 @@ def _write_recording(directory: Path, sides: str) -> str:
         for sample in Recording.open(GOLDEN):
             message = decode(sample.payload) if sample.is_of(Run) else None
             if isinstance(message, Run):
-                task = dict(_forged_task(sides)) if sides == "two sides" else _forged(dict(message.config))
+                task = dict(_forged_task(sides)) if sides == "two sides" else _forge(dict(message.config))
                 recorder.write(sample.key, encode(message.but(config=task)))
             elif not sample.key.endswith("/result"):
                 recorder.write(sample.key, sample.payload, log_time_ns=sample.log_time_ns)

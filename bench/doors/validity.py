@@ -1,6 +1,6 @@
 """Agents that do not decide, in real matches: the verdict, the exit code and the last line must say so.
 
-`python -m bench.doors --door "khala run"` plays these rows among others.
+`python -m bench doors --door "khala run"` plays these rows among others.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ PATIENCE_S: Final = 20.0
 # requests -------------------------------------------------------------------------------------------------------------
 
 
-def _answered(client: Client, data: bytes) -> str:
+def _fault_of(client: Client, data: bytes) -> str:
     """Return what is wrong with the answer to a request, and with the game after it; "" if nothing is."""
     with contextlib.redirect_stderr(io.StringIO()):
         response = sc.Response.FromString(client.session.handle(data))
@@ -78,7 +78,7 @@ def _request(make: Callable[[list[int]], list[sc.Request]]) -> Play:
     async def play(_: Path) -> str:
         client = _game()
         tags = [unit.tag for unit in client.observe().observation.raw_data.units]
-        return next(filter(None, (_answered(client, made.SerializeToString()) for made in make(tags))), "")
+        return next(filter(None, (_fault_of(client, made.SerializeToString()) for made in make(tags))), "")
 
     return play
 
@@ -138,18 +138,19 @@ async def _broken_texts(_: Path) -> str:
         sc.Request(save_map=sc.RequestSaveMap(map_path="@@@", map_data=b"x")),
         _actions(sc.Action(action_chat=sc.ActionChat(message="@@@"))),
     ]
-    broken = (_answered(_game(), request.SerializeToString().replace(b"@@@", b"\xff\xfe\xfd")) for request in requests)
+    broken = (_fault_of(_game(), request.SerializeToString().replace(b"@@@", b"\xff\xfe\xfd")) for request in requests)
     return next(filter(None, broken), "")
 
 
 async def _broken_bytes(_: Path) -> str:
-    client, dice = _game(), random.Random(1)
+    client = _game()
+    dice = random.Random(1)
     whole = [made.SerializeToString() for made in (*_questions([1]), *_unknown_types([]), *_numbers([1])[:9])]
     for _number in range(300):
         data = bytearray(dice.choice(whole))
         for _change in range(dice.randint(1, 4)):
             data[dice.randrange(len(data))] = dice.randrange(256)
-        if fault := _answered(client, bytes(data[: dice.randint(0, len(data))])):
+        if fault := _fault_of(client, bytes(data[: dice.randint(0, len(data))])):
             return fault
     return ""
 
@@ -359,7 +360,7 @@ async def _replays(_: Path) -> str:
         for _change in range(dice.randint(1, 4)):
             data[dice.randrange(len(data))] = dice.randrange(256)
         broken = bytes(data[: dice.choice((len(data), dice.randrange(len(data))))])
-        if fault := _answered(
+        if fault := _fault_of(
             client, sc.Request(replay_info=sc.RequestReplayInfo(replay_data=broken)).SerializeToString()
         ):
             return fault

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 import websocket
 
-from bench.at_once import keep, repeat
+from bench.simulator.at_once import keep, repeat
 from khala_simulator.__main__ import listen
 
 if TYPE_CHECKING:

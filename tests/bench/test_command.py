@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from bench import __main__ as command
-from bench import results
+from bench import results, run
 from bench.figures import Figure
-from bench.limits import LIMITED
-from bench.run import KEPT, PRINTED, figures_of
+from bench.registry import having
+from bench.run import figures_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,22 +40,14 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[str, ...]]]:
     """Return what was run, which measures nothing."""
     found: list[tuple[str, tuple[str, ...]]] = []
 
-    def run(name: str, options: Any = ()) -> list[Figure]:
+    def note(name: str, options: Any = ()) -> list[Figure]:
         found.append((name, tuple(options)))
         return [Figure(f"figure of {name}", "ms", (float(len(found)),))]
 
-    monkeypatch.setattr(command, "show", run)
-    monkeypatch.setattr(command, "figures_of", run)
+    monkeypatch.setattr(run, "show", note)
+    monkeypatch.setattr(run, "figures_of", note)
+    monkeypatch.setattr(command, "run_here", lambda *words: note(*words) and 0)
     return found
-
-
-def test_every_measurement_is_a_module_and_those_that_are_kept_have_measures() -> None:
-    for name in KEPT:
-        assert callable(importlib.import_module(f"bench.{name}").measures)
-    assert not set(KEPT) & set(PRINTED)
-    assert set(LIMITED) <= set(KEPT)
-    assert set(SHORT) == set(KEPT)
-    assert all(importlib.util.find_spec(f"bench.{name}") for name in PRINTED)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +68,11 @@ def test_a_named_measurement_runs_as_it_always_did_with_its_own_options(ran: lis
     assert command.main(["turn", "--tls", "--times", "9"]) == 0
     assert command.main(["bus", "soak"]) == 0
     assert command.main(["floors", "layers:2s3z:8"]) == 0
-    assert ran == [("turn", ("--tls", "--times", "9")), ("bus", ()), ("soak", ()), ("floors", ("layers:2s3z:8",))]
+    assert command.main(["limits", "bus", "--json"]) == 0
+    assert ran == [
+        ("turn", ("--tls", "--times", "9")), ("bus", ()), ("soak", ()), ("floors", ("layers:2s3z:8",)),
+        ("limits", ("bus", "--json")),
+    ]  # fmt: skip
 
 
 def test_figures_of_several_runs_in_turns_go_into_a_file(ran: list[Any], tmp_path: Path) -> None:
@@ -98,10 +93,10 @@ def test_figures_are_kept_when_a_measurement_fails_and_the_exit_code_says_so(
     def fail_once(name: str, _: Any) -> list[Figure]:
         asked.append(name)
         if asked == ["turn", "bus"]:
-            raise subprocess.CalledProcessError(2, ["bench.bus"])
+            raise subprocess.CalledProcessError(2, ["bench", "bus"])
         return [Figure(f"figure of {name}", "ms", (float(len(asked)),))]
 
-    monkeypatch.setattr(command, "figures_of", fail_once)
+    monkeypatch.setattr(run, "figures_of", fail_once)
     assert command.main(["--times", "2", "--out", str(tmp_path / "a.json"), "turn", "bus"]) == 1
     assert [one.runs for one in results.read(tmp_path / "a.json").figures] == [((1.0,), (3.0,)), ((4.0,),)]
     assert "failed, and without figures: bus (1 of 2): exit code 2" in capsys.readouterr().err
@@ -113,16 +108,18 @@ def test_without_names_all_is_measured_and_the_figures_are_kept(
     written: list[Path | None] = []
     monkeypatch.setattr(results, "write", lambda _, out: written.append(out))
     assert command.main([]) == 0
-    assert [name for name, _ in ran] == [*KEPT * command.TIMES, *PRINTED]
+    assert [name for name, _ in ran] == [*having("figures") * command.TIMES, *having("table")]
     assert written == [None]
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["nothing"], "there is no measurement 'nothing'; there are yardstick, turn"),
-        (["turn", "bus", "nothing"], "there is no measurement 'nothing'; there are yardstick, turn"),
-        (["turn", "bus", "--tls"], "--tls is an option of one measurement: name it before, such as `turn --tls`"),
+        (["nothing"], "there is no benchmark 'nothing'; there are yardstick, turn"),
+        (["turn", "bus", "nothing"], "there is no benchmark 'nothing'; there are yardstick, turn"),
+        (["turn", "bus", "duels"], "duels runs alone: name no other"),
+        (["turn", "bus", "--tls"], "--tls is an option of one benchmark: name it before, such as `turn --tls`"),
+        (["--times", "2", "duels"], "duels has no figures that can be kept: run it without --times and --out"),
         (["--times", "2", "soak"], "soak has no figures that can be kept: run it without --times and --out"),
         (["--times", "0", "turn"], "0 times is no measurement"),
     ],

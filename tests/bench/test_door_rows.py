@@ -1,4 +1,4 @@
-"""Every row of `python -m bench.doors`, one test each. To list them takes the imports of all doors: see `conftest`."""
+"""Every row of `python -m bench doors`, one test each. To list them takes the imports of all doors: see `conftest`."""
 
 from __future__ import annotations
 

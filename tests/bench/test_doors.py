@@ -1,4 +1,4 @@
-"""`python -m bench.doors`: every command has rows, a row that gets through is seen, and no row does."""
+"""`python -m bench doors`: every command has rows, a row that gets through is seen, and no row does."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.doors import __main__ as command
 from bench.doors import commands, playing
+from bench.doors import doors as command
 from bench.doors.registry import DOORS, load_rows
 from bench.doors.rows import Row, Skipped
 

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from bench.faults import AGENTS, SIDE, is_answered
+from bench.survival.faults import AGENTS, SIDE, is_answered
 from khala_protocol.messages import AgentReport, AgentStatus, Report
 
 UNANSWERED = {"late", "gone"}

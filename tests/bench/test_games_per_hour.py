@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from bench.games_per_hour import TASKS, measures, planned
+from bench.matches.games_per_hour import TASKS, measures, plan_games
 from khala_orchestrator.config import load_task
 
 
 def test_games_have_seeds_of_their_own_and_full_games_end_after_seven_minutes() -> None:
-    games = planned("simple64_eceb", 3)
+    games = plan_games("simple64_eceb", 3)
     assert [game.seed for game in games] == [1, 2, 3]
     for game in games:
         task = game.config.task
         assert task.max_steps == pytest.approx(7 * 60 * 22.4 / task.clock.step_loops, rel=0.01)
-    (battle,) = planned("2s3z_pair", 1)
+    (battle,) = plan_games("2s3z_pair", 1)
     assert battle.config.task.max_steps == load_task("2s3z_pair").max_steps
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from bench.history import PAGE, PICTURES, kept_results, lines, page, write
-from bench.results import ROOT
+from bench.paths import ROOT
 from bench.results import write as write_results
 
 if TYPE_CHECKING:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench import engines, limits
+from bench import limits
 from bench.figures import Figure
 from bench.limits import judge, main
+from bench.simulator import engines
 
 if TYPE_CHECKING:
     from bench.figures import Better

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from bench.figures import Figure
-from bench.results import begun, every, find, join, read, this_machine, write
+from bench.results import begin, every, find, join, read, this_machine, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +62,7 @@ def test_a_figure_that_could_not_be_measured_says_why() -> None:
 
 
 def test_this_machine_is_described_without_its_name() -> None:
-    results, machine = begun(), this_machine()
+    results, machine = begin(), this_machine()
     assert results.machine == machine
     assert machine.cores >= 1
     assert machine.python.startswith("3.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench.resume import Watch
+from bench.survival.resume import Watch
 from khala_protocol.bus.memory import MemoryBroker
 
 

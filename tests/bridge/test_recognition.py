@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bench.recognition import Score, corpus, read, scores
+from bench.language.recognition import Score, corpus, read, scores
 
 if TYPE_CHECKING:
     import pytest

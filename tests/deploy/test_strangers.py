@@ -1,4 +1,4 @@
-"""Attacks on a running match over TLS: none succeeds, the match goes on. They are in `bench/strangers.py`."""
+"""Attacks on a running match over TLS: none succeeds, the match goes on. They are in `bench/survival/strangers.py`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.strangers import ANSWER_S, ATTACKS, Row, attack_here, siege
+from bench.survival.strangers import ANSWER_S, ATTACKS, Row, attack_here, siege
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,7 +47,7 @@ async def test_strangers_and_dishonest_agents_get_nowhere() -> None:
 
 @pytest.mark.slow
 async def test_the_attacks_would_succeed_without_access_rules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.strangers.router_settings", lambda *_: {})
+    monkeypatch.setattr("bench.survival.strangers.router_settings", lambda *_: {})
     async with siege() as match:
         for name in REPRESENTATIVES[3:]:
             assert (await attack_here(match, name, seconds=0.5)).succeeded, name
@@ -85,7 +85,7 @@ def _ip(namespace: str, *arguments: str) -> None:
 @pytest.mark.parametrize("topology", ["the host is the router", "a router between"])
 async def test_no_attack_from_another_machine_succeeds(machines: tuple[str, str], topology: str) -> None:
     host, stranger = machines
-    command = [sys.executable, "-m", "bench.strangers", "--json", "--seconds", "2"]
+    command = [sys.executable, "-m", "bench", "strangers", "--json", "--seconds", "2"]
     command += ["--listen", f"tls/{HOST_ADDRESS}:7447", "--through", "ip", "netns", "exec", stranger]
     command += ["--router"] if topology == "a router between" else []
     process = await asyncio.create_subprocess_exec(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench.hostile import LONGEST_S, MOST_GROWTH, Scene, frames, is_forged, replies, scenes
+from bench.survival.hostile import LONGEST_S, MOST_GROWTH, Scene, frames, is_forged, replies, scenes
 
 pytestmark = pytest.mark.game
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.clocks import RULES, measure, play
-from bench.pace import measure as measure_pace
+from bench.matches.clocks import RULES, measure, play
+from bench.matches.pace import measure as measure_pace
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import LOOPS_PER_S, Report
 from khala_protocol.recording import Recording

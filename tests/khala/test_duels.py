@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench import duels
-from bench.duels import Game, table
+from bench.matches import duels
+from bench.matches.duels import Game, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def test_sides_are_swapped_and_only_different_players_meet_twice_on_a_seed(
         said.append(command)
         return subprocess.CompletedProcess(command, 0, stdout='{"results": []}', stderr="")
 
-    monkeypatch.setattr("bench.duels.subprocess.run", run)
+    monkeypatch.setattr("bench.matches.duels.subprocess.run", run)
     assert duels.duels("duel_3m", "x", b, games=3, seed=1, out=tmp_path) == []
     assert [command[command.index("--seed") + 1] for command in said] == seeds
     assert [command[command.index("--episodes") + 1] for command in said] == ["2", "1"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bench.ladder import Game, Pairing, table
+from bench.matches.ladder import Game, Pairing, table
 
 if TYPE_CHECKING:
     from khala_bridge.task.maps import Difficulty, Race

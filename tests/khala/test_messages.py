@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from bench.messages import GOAL, Transcript, Turn, UnknownMessage, judge, measure
+from bench.language.messages import GOAL, Transcript, Turn, UnknownMessage, judge, measure
 from khala_agents.scripted.reading import read
 from khala_agents.scripted.skilled import skilled
 from khala_protocol.speech import parse
@@ -64,7 +64,9 @@ def test_a_message_within_a_minute_of_the_same_is_said_again() -> None:
 
 
 def test_a_message_that_no_rule_judges_is_an_error() -> None:
-    with pytest.raises(UnknownMessage, match=r"'I win\.', and no rule of bench.messages judges that; add one"):
+    with pytest.raises(
+        UnknownMessage, match=r"'I win\.', and no rule of bench/language/messages.py judges that; add one"
+    ):
         judge(transcript("I win."))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.scenarios import PLAYERS, SHAME, Row, play, scenarios, table
+from bench.matches.scenarios import PLAYERS, SHAME, Row, play, scenarios, table
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from bench import faults, orphans, resume, soak
+from bench.survival import faults, orphans, resume, soak
 
 pytestmark = [pytest.mark.game, pytest.mark.slow, pytest.mark.timeout(900)]
 

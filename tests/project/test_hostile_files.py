@@ -1,4 +1,4 @@
-"""Files that are made to do harm are read or refused: some of what `python -m bench.hostile_files` tries."""
+"""Files that are made to do harm are read or refused: some of what `python -m bench hostile_files` tries."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.hostile_files import SLOWEST_MS, Tally, files, recordings, scenarios
+from bench.survival.hostile_files import SLOWEST_MS, Tally, files, recordings, scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,7 +51,7 @@ def _taking(took_s: tuple[float, ...], monkeypatch: pytest.MonkeyPatch) -> Calla
     """Return a case that takes this CPU time, run by run, by a clock of its own."""
     now_s = 0.0
     runs = iter(took_s)
-    monkeypatch.setattr("bench.hostile_files.time.process_time", lambda: now_s)
+    monkeypatch.setattr("bench.survival.hostile_files.time.process_time", lambda: now_s)
 
     def case() -> None:
         nonlocal now_s

@@ -1,6 +1,6 @@
 """The access rules of a router: who may read and write which topic, over links of certificates that they were made for.
 
-Each row is tried on a real router, with bare sessions; `bench/strangers.py` tries it in a running match.
+Each row is tried on a real router, with bare sessions; `bench/survival/strangers.py` tries it in a running match.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from bench.hostile import TOKENS
+from bench.survival.hostile import TOKENS
 from khala_protocol.speech import MAX_REPLY_CHARACTERS, parse
 
 PAIRS = list(itertools.product(TOKENS, TOKENS))

@@ -2,8 +2,8 @@
 
 httpx's own transport spends most of a call's CPU, and cancelled calls keep slots of its pool
 (httpcore 1.0.9, encode/httpcore#1093). Over aiohttp's connections, a call costs half as much when many are made at
-once, see `bench/http_client.py`. The package httpx-aiohttp joins the two as well, but a connection that was refused and
-one that broke after the request was sent are the same `ConnectTimeout` there (0.2.0), and only the second may be
+once: `python -m bench http_client`. The package httpx-aiohttp joins the two as well, but a connection that was refused
+and one that broke after the request was sent are the same `ConnectTimeout` there (0.2.0), and only the second may be
 billed. Bodies are read whole, because no completion is streamed here, and up to `MAX_BODY_BYTES`; aiohttp unpacks them
 in pieces, so that a small body that unpacks to gigabytes is noticed after a few megabytes.
 """

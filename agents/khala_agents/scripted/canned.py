@@ -1,6 +1,6 @@
 """An HTTP server whose answers are given: for what endpoints and gateways do that the scripted endpoint never would.
 
-Tests and `bench.doors` ask it. It answers every path and method, and notes what it was asked.
+Tests and `python -m bench doors` ask it. It answers every path and method, and notes what it was asked.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""The learner of `bench.train`: its slopes are those of its loss, and it finds out what is worth more."""
+"""The learner of `bench.environments.train`: its slopes are those of its loss, and it finds out what is worth more."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from bench import ppo, train
-from bench.ppo import Learner, Rollout, Settings
+from bench.environments import ppo, train
+from bench.environments.ppo import Learner, Rollout, Settings
 
 
 def loss(out: np.ndarray, chosen: ppo._Policy) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from typer.testing import CliRunner
 
-from bench import experiments
+from bench.survival import experiments
 from khala.cli import app
 from khala.experiment.engine import Local
 from khala.experiment.job import Job

@@ -18,7 +18,7 @@ from statsmodels.stats.proportion import (  # type: ignore[import-untyped]
     proportion_confint,
 )
 
-from bench.intervals import average_coverage, bootstrap_coverage, difference_coverage, type_one_errors
+from bench.matches.intervals import average_coverage, bootstrap_coverage, difference_coverage, type_one_errors
 from khala.experiment.statistics import (
     Interval,
     compare_paired_ratios,

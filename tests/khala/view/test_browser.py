@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench.browser import CHROMIUM, Viewer, answer, browsing, go_to, steps_of, viewing
+from bench.recordings.browser import CHROMIUM, Viewer, answer, browsing, go_to, steps_of, viewing
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Observation, Reply, Report, Scene
 from khala_protocol.recording import Recorder, Recording

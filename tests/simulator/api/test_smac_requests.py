@@ -1,6 +1,6 @@
 """The requests of SMAC in its own order: it kills every unit between two episodes and waits for the next ones.
 
-Its package is played whole by `python -m bench.smac`.
+Its package is played whole by `python -m bench smac`.
 """
 
 import pytest

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from bench.simulator_engine import battle
+from bench.simulator.simulator_engine import battle
 from khala_simulator import tick
 from khala_simulator.maps.game_map import load_map
 from tests.simulator.engine import random_orders

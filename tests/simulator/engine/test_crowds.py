@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from bench.crowds import BATTLES, binomial, mirror
+from bench.simulator.crowds import BATTLES, binomial, mirror
 from khala_simulator.abilities import commands
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.simulator_engine import battle
+from bench.simulator.simulator_engine import battle
 from khala_simulator import tick
 from khala_simulator.native import engine
 from tests.simulator.engine import recorded

@@ -1,0 +1,116 @@
+"""Play random episodes on SMAC's package and on `khala.env.numeric` at once, and compare everything.
+
+    python -m bench env_parity ~/smac                             23 maps, 500 episodes in all
+    python -m bench env_parity ~/smac --maps 3m MMM --episodes 50
+
+The path is a checkout of https://github.com/oxwhirl/smac. SMAC plays through PySC2 on the simulator's server, ours in
+this process, with the same seed and actions. Compared after each step, to the bit: observations, state, available
+actions, what each agent sees, reward, end and info. After each episode the worlds have the same digest: SMAC's game is
+played again from its replay, since a server does not tell its own.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bench.command_line import make_parser
+from bench.environments.smac import package_root
+from khala.env.numeric import MAPS, StarCraft2Env
+from khala.playing import games
+from khala_simulator.api.game import HostedGame
+from khala_simulator.process.replay import Replay
+from khala_simulator.tables.versions import DEFAULT_VERSION
+
+EPISODES = 500
+
+
+class Compared(NamedTuple):
+    """The outcome on one map."""
+
+    episodes: int
+    steps: int
+    differences: int
+    """Steps in which something was not the same."""
+    worlds: int
+    """Episodes after which both worlds had the same digest."""
+
+
+def compare(theirs: Any, map_name: str, episodes: int, seed: int) -> Compared:
+    """Play episodes of one map on both.
+
+    Args:
+        theirs: SMAC's class.
+        map_name: of the map.
+        episodes: how many.
+        seed: of the game and of the actions.
+    """
+    smac = theirs(map_name=map_name, seed=seed)
+    ours = StarCraft2Env(map_name, seed=seed)
+    rng = np.random.default_rng(seed)
+    ends = list[tuple[int, str]]()
+    steps = 0
+    differences = 0
+    for _ in range(episodes):
+        smac.reset()
+        ours.reset()
+        differences += _differ(smac, ours)
+        over = False
+        while not over:
+            actions = [int(rng.choice(np.flatnonzero(can))) for can in ours.masks()]
+            told, own = smac.step(list(actions)), ours.step(actions)
+            over, steps = own[1], steps + 1
+            differences += told != own or _differ(smac, ours)
+        ends.append((ours.battle.loop, ours.battle.digest()))
+    differences += smac.get_env_info() != ours.get_env_info() or smac.get_stats() != ours.get_stats()
+    replay = Replay.decode(smac._controller.save_replay())  # noqa: SLF001  # SMAC only writes it to a file
+    smac.close()
+    return Compared(episodes, steps, differences, _same_worlds(replay, ends))
+
+
+def _differ(smac: Any, ours: StarCraft2Env) -> bool:
+    """Return whether anything differs that a learner can ask for."""
+    pairs = (
+        (np.array(smac.get_obs()), ours.observations()),
+        (smac.get_state(), ours.get_state()),
+        (np.array(smac.get_avail_actions()), ours.masks()),
+        (smac.get_visibility_matrix(), ours.get_visibility_matrix()),
+    )
+    return not all(np.array_equal(told, own) for told, own in pairs)
+
+
+def _same_worlds(replay: Replay, ends: list[tuple[int, str]]) -> int:
+    game = HostedGame(replay.setup, DEFAULT_VERSION, replay.log)
+    for player, options in replay.interfaces.items():
+        game.sit(player, options)
+    same = 0
+    for loop, digest in ends:
+        game.step(loop - game.world.loop)
+        same += game.world.digest() == digest
+    return same
+
+
+def main() -> None:
+    """Compare what the command line asks for; exit with 1 if anything differs."""
+    parser = make_parser(__doc__, json=False)
+    parser.add_argument("path", type=Path)
+    parser.add_argument("--maps", nargs="+", default=list(MAPS))
+    parser.add_argument("--episodes", type=int, default=EPISODES, help="of all maps together")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    sys.path.insert(0, str(package_root(options.path)))
+    os.environ["SC2PATH"] = str(games.find("simulator")[0])
+    from smac.env import StarCraft2Env as Smac  # noqa: PLC0415  # a package that only this measurement needs
+
+    each = -(-options.episodes // len(options.maps))
+    wrong = False
+    print("| map | episodes | steps | differences | same worlds |\n|---|---:|---:|---:|---:|")
+    for map_name in options.maps:
+        found = compare(Smac, map_name, each, options.seed)
+        wrong |= found.differences > 0 or found.worlds < found.episodes
+        print(f"| {map_name} | {found.episodes} | {found.steps} | {found.differences} | {found.worlds} |", flush=True)
+    sys.exit(wrong)
