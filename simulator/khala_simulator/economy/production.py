@@ -1,6 +1,6 @@
 """Production: the queues of structures and eggs, and how something gets into one and out of it again.
 
-A ``ProductionJob`` is one product in a queue; ``systems.production`` works on the first one, with a reactor on the
+A ``Job`` is one product in a queue; ``systems.production`` works on the first one, with a reactor on the
 first two. What an ability means for a queue is in ``abilities.shared.production`` and ``research``.
 """
 
@@ -12,7 +12,7 @@ from khala_simulator.economy import payments
 from khala_simulator.economy.payments import ALL, CANCELLED
 from khala_simulator.tables import prices
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.jobs import ProductionJob
+from khala_simulator.world.jobs import Job
 
 if TYPE_CHECKING:
     from khala_simulator.tables.abilities import Ability
@@ -42,11 +42,11 @@ def room(world: World, slot: int) -> int:
     return max(0, size - len(world.jobs.get(slot, ())))
 
 
-def enqueue(world: World, slot: int, ability: Ability, *, makes: str, loops: float, site: int = 0) -> ProductionJob:
+def enqueue(world: World, slot: int, ability: Ability, *, makes: str, loops: float, site: int = 0) -> Job:
     """Charge the owner and put a job at the end of a queue."""
     owner = int(world.owner[slot])
     paid = payments.charge(world, owner, prices.cost_of(ability))
-    job = ProductionJob(
+    job = Job(
         ability.id, ability.effect, makes, owner, loops, paid, supply=ability.supply, count=ability.count, site=site
     )
     world.jobs.setdefault(slot, []).append(job)
@@ -54,7 +54,7 @@ def enqueue(world: World, slot: int, ability: Ability, *, makes: str, loops: flo
     return job
 
 
-def drop(world: World, slot: int, job: ProductionJob) -> None:
+def drop(world: World, slot: int, job: Job) -> None:
     """Take a job out of its queue, finished or not."""
     queue = world.jobs.get(slot, [])
     queue.remove(job)
@@ -63,7 +63,7 @@ def drop(world: World, slot: int, job: ProductionJob) -> None:
     forget(world, job)
 
 
-def forget(world: World, job: ProductionJob) -> None:
+def forget(world: World, job: Job) -> None:
     """Stop counting a job's product as under way."""
     underway = world.players[job.owner].underway
     if job.makes in underway:

@@ -19,7 +19,7 @@ from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
     from khala_simulator.tables.records import UnitType
-    from khala_simulator.world.jobs import ProductionJob
+    from khala_simulator.world.jobs import Job
     from khala_simulator.world.world import Rally, World
 
 DOORSTEP: Final = 0.25  # from a structure's edge to the body of the unit that comes out
@@ -57,34 +57,34 @@ def _advance(world: World, slot: int) -> None:
             index += 1
 
 
-def _is_done(world: World, job: ProductionJob) -> bool:
+def _is_done(world: World, job: Job) -> bool:
     if job.kind != "addon":
         return job.done >= job.loops
     site = world.slot_of(job.site)
     return site == NOBODY or bool(world.build_progress[site] >= 1.0)
 
 
-def _begin(world: World, slot: int, job: ProductionJob) -> bool:
+def _begin(world: World, slot: int, job: Job) -> bool:
     """Begin a job if supply allows; a waiting one holds up the queue."""
     owner = int(world.owner[slot])
     job.begun = supply.has_room(world, owner, job.supply)
     return job.begun
 
 
-def finish(world: World, slot: int, job: ProductionJob) -> None:
+def finish(world: World, slot: int, job: Job) -> None:
     """Put a job's product into the world."""
     production.drop(world, slot, job)
     FINISH.get(job.kind, _nothing)(world, slot, job)
 
 
-def _nothing(_: World, __: int, ___: ProductionJob) -> None:
+def _nothing(_: World, __: int, ___: Job) -> None:
     """Do nothing: the structure itself is the product."""
 
 
 # units ----------------------------------------------------------------------------------------------------------------
 
 
-def _hatch(world: World, slot: int, job: ProductionJob) -> None:
+def _hatch(world: World, slot: int, job: Job) -> None:
     unit = world.catalog.unit(job.makes)
     parent = world.unit_type(slot)
     owner = int(world.owner[slot])
@@ -140,18 +140,18 @@ def _nearest_parent(world: World, slot: int) -> int:
 # everything else ------------------------------------------------------------------------------------------------------
 
 
-def _add_interceptor(world: World, slot: int, _: ProductionJob) -> None:
+def _add_interceptor(world: World, slot: int, _: Job) -> None:
     """Put a Carrier's new Interceptor into its hangar at once."""
     carrier.add_interceptor(world, slot)
 
 
-def _grant_upgrade(world: World, slot: int, job: ProductionJob) -> None:
+def _grant_upgrade(world: World, slot: int, job: Job) -> None:
     owner = int(world.owner[slot])
     commands.grant_upgrade(world, owner, world.catalog.upgrade(job.makes).id)
     world.alert(owner, "ResearchComplete")
 
 
-def _morph(world: World, slot: int, job: ProductionJob) -> None:
+def _morph(world: World, slot: int, job: Job) -> None:
     unit = world.catalog.unit(job.makes)
     owner = int(world.owner[slot])
     had_energy = bool(world.energy_max[slot])
@@ -161,7 +161,7 @@ def _morph(world: World, slot: int, job: ProductionJob) -> None:
     world.alert(owner, "MorphComplete")
 
 
-def _connect_addon(world: World, slot: int, job: ProductionJob) -> None:
+def _connect_addon(world: World, slot: int, job: Job) -> None:
     site = world.slot_of(job.site)
     if site != NOBODY:
         world.addon[slot] = site

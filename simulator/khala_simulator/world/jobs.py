@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class ProductionJob:
+class Job:
     """One thing in the making.
 
     ``makes`` is the name of a unit type or an upgrade, ``done`` the loops of work that went into it, ``paid`` the

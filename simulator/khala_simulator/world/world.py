@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from khala_simulator.tables.catalog import Catalog, UnitType
     from khala_simulator.world.area_effects import AreaEffect
     from khala_simulator.world.casts import Cast
-    from khala_simulator.world.jobs import ProductionJob
+    from khala_simulator.world.jobs import Job
     from khala_simulator.world.shots import Missile, PendingHit, Sweep
 
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
@@ -137,7 +137,7 @@ class World(UnitColumns, WorldCaches):
         self.channelling: dict[int, Cast] = {}  # slot -> what goes on since it took effect
         self.mishaps: list[Mishap] = []
         self.alerts: list[PlayerAlert] = []
-        self.jobs: dict[int, list[ProductionJob]] = {}  # slot -> its products, in order
+        self.jobs: dict[int, list[Job]] = {}  # slot -> its products, in order
         self.invested: dict[int, tuple[float, float]] = {}  # slot -> the price paid for its construction
         self.rallies: dict[int, dict[str, Rally]] = {}  # slot -> where its "units" and its "workers" are sent
         self.deaths: list[Death] = []
@@ -340,7 +340,10 @@ class World(UnitColumns, WorldCaches):
     # bookkeeping --------------------------------------------------------------------------------------------------
 
     def digest(self) -> str:
-        """Return the SHA-256 of everything that decides the future, the same on every run with the same actions."""
+        """Return the SHA-256 of everything that decides the future, the same on every run with the same actions.
+
+        It hashes values as ``repr`` prints them, so the names of their classes, such as ``Job``, are part of it.
+        """
         sha = hashlib.sha256(self.map.digest.encode())
         sha.update(repr((self.loop, self.ended, self.scan_now, self.hurt, self.rng.bit_generator.state)).encode())
         sha.update(self.state_bytes(self.top))
