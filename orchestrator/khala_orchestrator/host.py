@@ -128,7 +128,9 @@ def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat
 
 def _resume(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:
     """Play a match from where its recording ends; what was published then is not published again."""
-    pacing, match.pacing, observer.live = match.pacing, AtOnce(), False
+    pacing = match.pacing
+    match.pacing = AtOnce()
+    observer.live = False
 
     async def go_live() -> None:
         match.pacing = pacing

@@ -11,7 +11,7 @@ from khala_bridge.errors import CatalogueError
 from khala_bridge.knowledge import VERSIONS, abilities, advice, knowledge, short, upgrades
 from khala_bridge.knowledge.facts import ability_facts, buff_facts, unit_facts, upgrade_facts
 from khala_bridge.knowledge.load import ability_words, unit_words, upgrade_words
-from khala_bridge.knowledge.words import PLACEHOLDER, Filler, listed, price, round_number
+from khala_bridge.knowledge.words import PLACEHOLDER, Filler, join_names, price, round_number
 
 BY_THEIR_ABILITIES = {
     ("HighTemplar", "Mutalisk"), ("HighTemplar", "Viper"), ("HighTemplar", "Medivac"), ("HighTemplar", "Raven"),
@@ -144,7 +144,8 @@ def test_numbers_are_said_with_three_digits(value: float, said: str) -> None:
 def test_prices_and_lists_are_said_in_words() -> None:
     assert price(125, 50, 2) == "125 minerals, 50 vespene, 2 supply"
     assert price(0, 0) == "nothing"
-    assert [listed(names) for names in ((), ("A",), ("A", "B"), ("A", "B", "C"))] == ["", "A", "A and B", "A, B and C"]
+    lists = ((), ("A",), ("A", "B"), ("A", "B", "C"))
+    assert [join_names(names) for names in lists] == ["", "A", "A and B", "A, B and C"]
 
 
 def test_the_lines_of_a_prompt_say_what_a_type_is_and_what_it_does() -> None:

@@ -83,14 +83,11 @@ def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameR
     found: dict[int, GameRefusal | None] = {}
     for error in after.errors:
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
-        same = [i for i in suspects if _order(commands[i]) == order_name(error.ability_id)]
+        ordered = {i: order_name(commands[i].function.ability_id) for i in suspects}
+        same = [i for i in suspects if ordered[i] == order_name(error.ability_id)]
         for index in (same or ([] if _by_itself(error.ability_id) else suspects))[-1:]:
             found.setdefault(index, refuse(commands[index], words(error.result)))
     return tuple(refusal for _, refusal in sorted(found.items()) if refusal is not None)
-
-
-def _order(command: Command) -> str:
-    return order_name(command.function.ability_id)
 
 
 def _by_itself(ability_id: int) -> bool:

@@ -62,11 +62,7 @@ def works(name: str) -> bool:
     if known is None:
         return False
     facts = (abilities()[number] for number in known.ability_ids if number in abilities())
-    return known.worker or (known.structure and any(_makes(fact.does) for fact in facts))
-
-
-def _makes(does: str) -> bool:
-    return does in {"train", "research"}
+    return known.worker or (known.structure and any(fact.does in ("train", "research") for fact in facts))
 
 
 def _production(own: Iterable[UnitView]) -> Iterator[Production]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.pacing import Pacing
     from khala_orchestrator.match.scenery import Scenery
-    from khala_orchestrator.match.schedule import Chosen
+    from khala_orchestrator.match.schedule import SeatChoice
     from khala_orchestrator.match.side import MatchSide
     from khala_orchestrator.match.turn import AgentPool, Answers, Question
     from khala_orchestrator.roster import Seat
@@ -169,7 +169,7 @@ class Match:
             reports = self._whole(at, reports, results)
         return StepOutcome(reports, snapshots, answers.lost)
 
-    def _choose(self, at: StepId, loop: int) -> Chosen:
+    def _choose(self, at: StepId, loop: int) -> SeatChoice:
         return self.schedule.choose(
             at,
             loop,

@@ -70,7 +70,7 @@ class Decision:
     due_loop: int
 
 
-class Chosen(NamedTuple):
+class SeatChoice(NamedTuple):
     """Who is asked in a step, in the order of the match, and why other free agents are not."""
 
     seats: Sequence[Seat]
@@ -113,7 +113,7 @@ class Schedule:
         loop: int,
         happened: Callable[[Seat], Collection[Trigger]],
         is_needed: Callable[[Seat], bool] = lambda _: True,
-    ) -> Chosen:
+    ) -> SeatChoice:
         """Choose the agents to ask now, which think from now on; say why the other free agents are not asked.
 
         Args:
@@ -128,7 +128,7 @@ class Schedule:
         for seat in asked:
             self._places[seat].asked = (at, loop)
             self._places[seat].thinks = True
-        return Chosen(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
+        return SeatChoice(asked, {seat: "no_units" if seat in due else "not_due" for seat in free if seat not in asked})
 
     def decide(self, answers: Mapping[Seat, Answer], loop: int) -> None:
         """Take the answers that arrived by this loop."""

@@ -278,7 +278,10 @@ class MatchSide:
             step=at.step,
             game_loop=result.snapshot.game_loop,
             agents=tuple(
-                self._agent_report(at, decision, turn, feedback[decision.seat.agent]) for decision in turn.decisions
+                _agent_report(
+                    at, decision, turn.before.game_loop, self._fate(decision, turn), feedback[decision.seat.agent]
+                )
+                for decision in turn.decisions
             ),
             messages=tuple(Received(sender=m.agent, recipient=m.recipient, text=m.text) for m in turn.post.taken),
             advisers=tuple(m.agent for m in turn.post.taken if m.human),
@@ -308,9 +311,8 @@ class MatchSide:
         received = turn.post.received.get(seat, ())
         return Feedback(accepted, shorten(rejections), received, ordered=bool(accepted) or wrote)
 
-    def _agent_report(self, at: StepId, decision: Decision, turn: SideTurn, heard: Feedback) -> AgentReport:
-        fate: Fate | None = "refused" if self._is_too_old(decision) else turn.joint.fates.get(decision.seat.agent)
-        return _agent_report(at, decision, turn.before.game_loop, fate, heard)
+    def _fate(self, decision: Decision, turn: SideTurn) -> Fate | None:
+        return "refused" if self._is_too_old(decision) else turn.joint.fates.get(decision.seat.agent)
 
     def report_dropped(self, at: StepId, decisions: Sequence[Decision], loop: int) -> Sequence[AgentReport]:
         """Return the reports of decisions that did not take effect before the end of the episode."""
