@@ -1,7 +1,7 @@
 """Measure how many times as long a client's step takes on the simulator as at a server that answers at once.
 
     python -m bench floors                                       a table
-    python -m bench floors layers:2s3z:8 --rounds 5 --steps 300  interface:map:loops, as in bench.simulator_env
+    python -m bench floors layers:2s3z:8 --rounds 5 --steps 300  interface:map:loops, as simulator_env takes it
 
 In each round a battle is played on the simulator, and again with a server that repeats its answers. What that takes is
 the client's own; a ratio of 1 would be a simulator that costs nothing, at 1.5 a third of a step is the simulator's. The

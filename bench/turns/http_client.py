@@ -10,8 +10,6 @@ from __future__ import annotations
 import asyncio
 import json
 import statistics
-import subprocess
-import sys
 import time
 from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass
@@ -21,6 +19,7 @@ import httpx
 
 from bench.command_line import make_parser
 from bench.tables import print_table
+from bench.turns.endpoint import endpoint
 from khala_agents.llm.client import Request
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
@@ -93,15 +92,9 @@ def main() -> None:
     parser.add_argument("--calls", type=int, nargs="+", default=[1, 8, 32, 128], help="requests at once")
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
-    command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        assert server.stdout is not None
-        try:
-            base_url = json.loads(server.stdout.readline())["base_url"]
-            tidy_memory()
-            rows = [row for count in options.calls for row in asyncio.run(compare(base_url, count, options.rounds))]
-        finally:
-            server.terminate()
+    with endpoint(LATENCY_S) as base_url:
+        tidy_memory()
+        rows = [row for count in options.calls for row in asyncio.run(compare(base_url, count, options.rounds))]
     if options.json:
         print(json.dumps({"latency_s": LATENCY_S, "prompt_bytes": len(BODY), "rows": [asdict(row) for row in rows]}))
         return

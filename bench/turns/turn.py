@@ -15,7 +15,6 @@ import asyncio
 import contextlib
 import json
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,6 +27,7 @@ import numpy as np
 from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.tables import print_table
+from bench.turns.endpoint import endpoint
 from bench.turns.original import step_s
 from khala.playing import games
 from khala.playing.children import Children
@@ -248,18 +248,6 @@ def listener(keys: Path, task: TaskConfig, agents: int) -> BusConfig:
     return BusConfig(mode="router", listen=("tls/127.0.0.1:0",), tls=files_of(keys, "router"), zenoh=rules)
 
 
-@contextlib.contextmanager
-def endpoint() -> Iterator[str]:
-    """Yield the address of the scripted model, in a process of its own."""
-    command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(LATENCY_S)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as llm:
-        try:
-            assert llm.stdout is not None
-            yield str(json.loads(llm.stdout.readline())["base_url"])
-        finally:
-            llm.terminate()
-
-
 async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bool, tls: bool) -> list[Measured]:
     """Measure every number of agents, ours, over TLS as well if asked for, and the original's way."""
     task = load_task("2s3z")
@@ -267,7 +255,7 @@ async def measure(agents: list[int], steps: int, original_steps: int, *, tcp: bo
     found = []
     async with contextlib.AsyncExitStack() as stack:
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        base_url = stack.enter_context(endpoint())
+        base_url = stack.enter_context(endpoint(LATENCY_S))
         here = LOOPBACK if tcp else stack.enter_context(local_endpoint())
         links = [BusConfig(mode="router", listen=(here,))]
         links += [listener(logs / "keys", task, max(agents))] if tls else []
