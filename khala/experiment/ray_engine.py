@@ -14,9 +14,9 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from khala.experiment import worker
-from khala.experiment.engine import END_S, MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
-from khala.experiment.job import Done, Job
+from khala.experiment.engine import MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
+from khala.playing import logs, worker
+from khala.playing.jobs import END_S, Ended, Job
 from khala_agents.llm.money import SUFFIX, Ledger
 from khala_protocol.errors import ConfigError
 
@@ -72,32 +72,32 @@ class Ray:
     ) -> None:
         ray.shutdown()  # Ray ends what still runs with the runner, and each game its process is gone
 
-    async def play(self, job: Job) -> Done:
+    async def play(self, job: Job) -> Ended:
         """Play a match on a node that has room for it."""
         assert job.config.record is not None
         with Ledger(job.config.record.with_suffix(SUFFIX)) as ledger:
             return await self._play(job, job.config.record, ledger)
 
-    async def _play(self, job: Job, record: Path, ledger: Ledger) -> Done:
+    async def _play(self, job: Job, record: Path, ledger: Ledger) -> Ended:
         """Play a match; until it is known what it has cost, it counts with all that it may spend."""
         part_usd = sum(mind.budget_usd or 0.0 for mind in job.minds.values())
         entry = ledger.hold("", part_usd, None) if part_usd else None
         playing = _match.remote(job.model_dump_json(), self._game, self._url, self._endpoints)
         try:
-            done, recording, cost_usd = await playing
+            ended, recording, cost_usd = await playing
         except asyncio.CancelledError:
             ray.cancel(playing)
             await asyncio.to_thread(ray.wait, [playing], timeout=END_S)  # its game ends in order
             raise
         except RayError as error:  # the node took the recording with it, and its own ledger
-            return Done(state="lost", words=f"Ray says: {str(error).strip().splitlines()[-1]}")
+            return Ended(state="lost", words=f"Ray says: {str(error).strip().splitlines()[-1]}")
         if entry is not None:
             ledger.settle(entry, cost_usd)
         if isinstance(recording, str):
             recording = await asyncio.to_thread(_read, recording)
         if recording is not None:
             _write(record, recording)
-        return Done.model_validate_json(done)
+        return Ended.model_validate_json(ended)
 
     def _connect(self) -> None:
         ended_by = signal.getsignal(signal.SIGTERM)
@@ -139,21 +139,22 @@ def _room_of_the_cluster() -> int:
 @ray.remote(num_cpus=1, memory=MATCH_BYTES, max_retries=0, max_calls=MATCHES_OF_A_PROCESS)
 def _match(text: str, game: str, url: str | None, actor: Any) -> tuple[str, bytes | str | None, float]:
     """Play a match; return how it ended, its recording, or where it is, None if there is none, and what it has cost."""
-    worker.log_quietly()
+    logs.set_up()
     job = Job.model_validate_json(text)
     assert job.config.record is not None
     with tempfile.TemporaryDirectory(prefix="khala-") as directory:
         here = Path(directory) / job.config.record.name
         config = job.config.model_copy(update={"record": here})
-        done = asyncio.run(worker.played(job.model_copy(update={"config": config}), game, gates_at(actor)))
+        job_here = job.model_copy(update={"config": config})
+        ended = asyncio.run(worker.play(job_here, game=game, gates=gates_at(actor)))
         recording = here.read_bytes() if here.exists() else None
         with Ledger(here.with_suffix(SUFFIX)) as ledger:
             cost_usd = ledger.booked_usd()
     if url is None or recording is None:
-        return done.model_dump_json(), recording, cost_usd
+        return ended.model_dump_json(), recording, cost_usd
     place = f"{url.rstrip('/')}/{job.directory.name}/{job.config.record.name}"
     _put(place, recording)
-    return done.model_dump_json(), place, cost_usd
+    return ended.model_dump_json(), place, cost_usd
 
 
 # --- recordings ---------------------------------------------------------------------------------------

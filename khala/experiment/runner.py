@@ -16,8 +16,8 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-from khala.experiment.job import Job
 from khala.experiment.played import unread
+from khala.playing.jobs import Job
 from khala.playing.minds import share_budget
 from khala_orchestrator.match.tally import REFUSED
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from khala.experiment.engine import Engine
-    from khala.experiment.job import Done
     from khala.experiment.plan import PlannedMatch
     from khala.experiment.played import Played
     from khala.experiment.spec import Budget, Experiment
     from khala.experiment.store import Store
+    from khala.playing.jobs import Ended
 
 LEAST_USD = 1e-6
 """Smaller sums are ignored: floating-point money is not exact."""
@@ -37,7 +37,7 @@ SPARE = 1.2
 """A match is begun with so many times what is usual: its last requests are held at the most that they may cost."""
 ROOM = 2.0
 """A match may spend this many times what the dearest one of its cell has cost."""
-_CRASHES = {"lost": "crash", "error": "crash", "timeout": "timeout"}
+_CRASHES = {"lost": "crash", "stopped": "crash", "error": "crash", "timeout": "timeout"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +147,9 @@ class Runner:
             timeout_s=3600 * self.experiment.match_hours,
             processes=self.processes,
         )
-        done = await self.engine.play(job)
+        ended = await self.engine.play(job)
         tries = self._tries[match.key]
-        crash = _CRASHES.get(done.state, "")
+        crash = _CRASHES.get(ended.state, "")
         found = await asyncio.to_thread(self.store.read, record, attempts=tries, crash=crash)
         if found is None:
             cost_usd = (await asyncio.to_thread(self.store.booked_usd)).get(match.key)
@@ -160,11 +160,11 @@ class Runner:
         self.spent.held_usd -= part_usd or 0.0
         if found[0].cause == "budget" and part_usd is not None:
             self._was_short(match.cell, part_usd)
-        self._end(match, done, found[0])
-        ended, self._next_end = self._next_end, asyncio.Event()
-        ended.set()
+        self._end(match, ended, found[0])
+        self._next_end.set()
+        self._next_end = asyncio.Event()
 
-    def _end(self, match: PlannedMatch, done: Done, played: Played) -> None:
+    def _end(self, match: PlannedMatch, ended: Ended, played: Played) -> None:
         self.spent.usd -= self._unread_usd.pop(match.key, 0.0)
         if before := self._played.get(match.key):
             self._count(before, -1)  # what its tries have cost together is in the new account
@@ -172,9 +172,9 @@ class Runner:
         self._played[match.key] = played
         if played.state == "crashed" and self._tries[match.key] <= self.experiment.retries:
             self._waiting.append(match)
-            self.see(Event("again", match, played, done.words))
+            self.see(Event("again", match, played, ended.words))
         else:
-            self.see(Event("ends", match, played, done.words))
+            self.see(Event("ends", match, played, ended.words))
 
     def _count(self, played: Played, sign: int = 1) -> None:
         self.spent.usd += sign * (played.cost_usd or 0.0)

@@ -8,7 +8,7 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala.experiment.job import Job
+from khala.playing.jobs import Job
 from khala.playing.minds import groups_of, share_budget
 from khala.playing.spending import paid_usd
 from khala_orchestrator.past.fork import advice_of, write_beginning

@@ -1,25 +1,19 @@
 """The processes that a match on one machine needs next to its host: started, watched, started again, ended with it.
 
-Each child leads its own session, so that Ctrl-C reaches the host alone, which ends the others in order; if the host is
-killed, they end by themselves (`khala_protocol.parent_watch`). The output of a child goes to its log file; its last
-lines are quoted when it ends too early.
+The output of a child goes to its log file; its last lines are quoted when it ends too early.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
-import signal
-import subprocess
-import sys
 from collections import deque
 from typing import TYPE_CHECKING, Protocol, Self
 
 from khala.playing import environment
+from khala.playing.processes import end_process, start_process
 from khala_protocol.errors import KhalaError
 from khala_protocol.files import open_private
-from khala_protocol.parent_watch import named_parent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,19 +46,7 @@ class Spawn(Protocol):
 
 async def spawn(arguments: Sequence[str], environ: Mapping[str, str], log: Path) -> asyncio.subprocess.Process:
     """Start a new process; see `Spawn`."""
-    with open_private(log, "ab") as stderr:
-        return await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-P",  # with no module of the current directory on its path
-            "-m",
-            "khala",
-            *arguments,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=stderr,
-            env=environ,
-            start_new_session=True,
-        )
+    return await start_process("khala", *arguments, environ=environ, log=log)
 
 
 class Children:
@@ -103,7 +85,7 @@ class Children:
 
     def _add(self, name: str, arguments: tuple[str, ...], environ: Mapping[str, str] | None) -> _Child:
         environ = environment.plain() if environ is None else environ
-        child = _Child(name, arguments, {**environ, **named_parent()}, self._logs / f"{name}.log", self._spawn)
+        child = _Child(name, arguments, environ, self._logs / f"{name}.log", self._spawn)
         self._children[name] = child
         return child
 
@@ -111,7 +93,9 @@ class Children:
 class _Child:
     """One process, and what it takes to start it again."""
 
-    def __init__(self, name: str, arguments: tuple[str, ...], environ: dict[str, str], log: Path, spawn: Spawn) -> None:
+    def __init__(
+        self, name: str, arguments: tuple[str, ...], environ: Mapping[str, str], log: Path, spawn: Spawn
+    ) -> None:
         self.arguments = arguments
         self._spawn = spawn
         self._name = name
@@ -143,16 +127,8 @@ class _Child:
 
     async def end(self) -> None:
         """End the process in order, or kill it."""
-        if self._process is None:
-            return
-        with contextlib.suppress(ProcessLookupError):
-            self._process.send_signal(signal.SIGTERM)
-        try:
-            async with asyncio.timeout(END_S):
-                await self._process.wait()
-        except TimeoutError:
-            self._process.kill()
-            await self._process.wait()
+        if self._process is not None:
+            await end_process(self._process, END_S)
 
     def quote(self) -> str:
         """Return the last lines that the process wrote, to be appended to what happened."""

@@ -14,15 +14,15 @@ import importlib
 import json
 import os
 import runpy
-import subprocess
 import sys
 from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from khala.playing import environment
-from khala.playing.children import spawn
-from khala_protocol.parent_watch import PARENT, end_with_parent, named_parent
+from khala.playing.children import END_S, spawn
+from khala.playing.processes import end_process, start_process
+from khala_protocol.parent_watch import end_with_parent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,17 +42,14 @@ class Spares:
     async def __aenter__(self) -> Self:
         """Start the processes; they are of use before they are ready."""
         for _ in range(self._count):
-            self._stock.append(await _started())
+            process = await start_process("khala.playing.spare", environ=environment.plain(), piped=True)
+            self._stock.append(process)
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        while self._stock:
-            process = self._stock.popleft()
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+        await asyncio.gather(*(end_process(process, END_S) for process in self._stock))
 
     async def ready(self) -> None:
         """Wait until all have imported what they need."""
@@ -76,19 +73,6 @@ class Spares:
         return await spawn(arguments, environ, log)
 
 
-async def _started() -> asyncio.subprocess.Process:
-    return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-P",  # with no module of the current directory on its path
-        "-m",
-        "khala.playing.spare",
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**environment.plain(), **named_parent()},
-        start_new_session=True,
-    )
-
-
 def main() -> None:
     """Import everything, wait for a job on stdin, and do it."""
     end_with_parent()
@@ -101,7 +85,7 @@ def main() -> None:
         return
     job = json.loads(line)
     os.environ.clear()
-    os.environ.update({name: value for name, value in job["environ"].items() if name != PARENT})
+    os.environ.update(job["environ"])
     _redirect(Path(job["log"]))
     sys.argv = ["khala", *job["arguments"]]
     runpy.run_module("khala", run_name="__main__")

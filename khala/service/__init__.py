@@ -4,11 +4,8 @@ cli        the commands: serve, submit, matches, watch, stop
 client     what the commands say to a service, over the bus
 daemon     the service: orders in, matches out
 book       which matches there are, and whose turn it is; no process, no bus
-pool       workers, and those that wait for a match
-worker     the process that plays one match, with `khala.playing.local.play`
-spare      a process that has imported everything, and becomes a `khala agent` or `khala llm`
+pool       workers (`khala.playing.jobs`) that wait for a match
 memory     what processes take
 metrics    for Prometheus, from the messages of matches
 traces     for OpenTelemetry, from the same messages
-logs       log lines as JSON
 """

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import os
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,11 +18,13 @@ from rich.table import Table
 from rich.text import Text
 
 from khala.commands.exit_codes import DONE, FAILED, NOT_VALID
+from khala.playing import logs
+from khala.playing.jobs import MatchWorker
 from khala.playing.local_bus import local_endpoint
-from khala.service import client, logs, memory
+from khala.service import client, memory
 from khala.service.book import Limits
 from khala.service.daemon import Service
-from khala.service.pool import Pool, Worker
+from khala.service.pool import Pool
 from khala_orchestrator.console import Progress, stderr_console, stdout_console
 from khala_protocol.access import service_settings
 from khala_protocol.bus.config import BusConfig
@@ -66,13 +69,14 @@ def serve(
 ) -> None:
     """Play matches on order until a signal arrives."""
     logs.set_up(as_json=log_json)
+    logging.getLogger("khala.service").setLevel(logging.INFO)
     memory_mb = int(memory_gb * 1024) if memory_gb else memory.machine_mb() * 8 // 10
     trust_files(trust)  # and its workers
     limits = Limits(matches or os.cpu_count() or 1, memory_mb, queue, trusts=trust)
     config = router_config(listen, tls=tls, insecure=insecure, rules=service_settings() if tls else None)
-    arguments = ["--game", game, "--spares", str(spares), *(["--log-json"] if log_json else [])]
+    options = ["--live", "--game", game, "--spares", str(spares), *(["--log-json"] if log_json else [])]
     traced = otlp is not None or any(name.startswith("OTEL_EXPORTER_OTLP") for name in os.environ)
-    asyncio.run(_serve(config, limits, out, drain_s, warm, arguments, metrics, otlp, traced=traced, as_json=as_json))
+    asyncio.run(_serve(config, limits, out, drain_s, warm, options, metrics, otlp, traced=traced, as_json=as_json))
 
 
 async def _serve(
@@ -81,7 +85,7 @@ async def _serve(
     out: Path,
     drain_s: float,
     warm: int,
-    arguments: list[str],
+    options: list[str],
     metrics: int | None,
     otlp: str | None,
     *,
@@ -94,7 +98,7 @@ async def _serve(
         bus = await open_bus(config.model_copy(update={"listen": (*config.listen_on, socket)}))
         stack.push_async_callback(bus.close)
         listeners, port = await _listeners(stack, metrics, otlp, traced=traced)
-        pool = await stack.enter_async_context(Pool(warm, lambda: Worker.start(arguments)))
+        pool = await stack.enter_async_context(Pool(warm, lambda: MatchWorker.start(*options)))
         service = Service(
             bus, BusConfig(connect=(socket,)), pool.take, out, limits, drain_s, listeners, exchanges=traced,
             used_mb=lambda: memory.rss_mb(os.getpid()),

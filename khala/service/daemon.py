@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
+from khala.playing.jobs import Ended, Job
 from khala.playing.matches import free_recording
 from khala.service.book import Book, Entry, Limits
 from khala.service.memory import rss_mb
 from khala.service.orders import match_of
-from khala.service.pool import Ending
-from khala.service.worker import Job
 from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode, encode
 from khala_protocol.errors import KhalaError, PeerError
@@ -182,29 +181,35 @@ class Service:
 
     async def _play(self, entry: Entry) -> None:
         """Play a match in a worker, and in another one if that is lost."""
-        ending = Ending("lost")
+        ended = Ended(state="lost", words="its worker was lost")
         try:
-            while ending.state == "lost" and entry.card.starts < STARTS and not entry.stop_because:
+            while ended.state == "lost" and entry.card.starts < STARTS and not entry.stop_because:
                 entry.update(starts=entry.card.starts + 1)
-                ending = await self._once(entry)
-                if ending.state == "lost":
-                    log.warning("%s", ending.words, extra={"run": entry.card.run})
+                ended = await self._once(entry)
+                if ended.state == "lost":
+                    log.warning("%s", ended.words, extra={"run": entry.card.run})
         except Exception as error:  # whatever it is, it is this match's alone
             log.exception("the match could not be played", extra={"run": entry.card.run})
-            ending = Ending("error", f"{type(error).__name__}: {error}")
-        self._close(entry, *_outcome(entry, ending))
+            ended = Ended(state="error", words=f"{type(error).__name__}: {error}")
+        self._close(entry, *_outcome(entry, ended))
 
-    async def _once(self, entry: Entry) -> Ending:
+    async def _once(self, entry: Entry) -> Ended:
         assert entry.config is not None
         resume = entry.resume or (entry.card.starts > 1 and entry.card.step + len(entry.card.outcomes) > 0)
-        record = free_recording(self.out / entry.card.run)
-        config = entry.config.model_copy(update={"record": record})
+        directory = self.out / entry.card.run
+        job = Job(
+            config=entry.config.model_copy(update={"record": free_recording(directory)}),
+            minds=dict(entry.minds),
+            processes=True,
+            bus=self.joins,
+            beginning=directory if resume else None,
+        )
         player = await self.take()
         self._players[entry.card.number] = player
         try:
             if entry.stop_because:
-                return Ending("stopped")
-            return await player.play(Job(config=config, minds=dict(entry.minds), bus=self.joins, resume=resume))
+                return Ended(state="stopped")
+            return await player.play(job)
         finally:
             del self._players[entry.card.number]
             await player.close()
@@ -272,16 +277,16 @@ class Service:
             await asyncio.wait(set(self._playing))
 
 
-def _outcome(entry: Entry, ending: Ending) -> tuple[MatchState, str]:
+def _outcome(entry: Entry, ended: Ended) -> tuple[MatchState, str]:
     """Return what became of a match."""
     how = f"; `khala submit --resume {entry.card.run}` goes on" if entry.card.step else ""
-    state = "stopped" if entry.stop_because and ending.state != "done" else ending.state
+    state = "stopped" if entry.stop_because and ended.state != "done" else ended.state
     match state:
         case "done":
-            return "done", f"not valid: {ending.words}" if ending.words else ""
+            return "done", f"not valid: {ended.words}" if ended.words else ""
         case "error":
-            return "failed", ending.words
+            return "failed", ended.words
         case "stopped":
             became: MatchState = "failed" if "--memory-gb" in entry.stop_because else "stopped"
-            return became, (entry.stop_because or "its worker was told to end") + how
-    return "failed", f"{ending.words or 'its worker was lost'}, {entry.card.starts} times{how}"
+            return became, (entry.stop_because or ended.words) + how
+    return "failed", f"{ended.words}, {entry.card.starts} times{how}"

@@ -16,14 +16,13 @@ import pytest
 
 from khala.cli import main
 from khala.commands.exit_codes import NOT_VALID, SIGNALLED
-from khala.experiment.job import Done
-from khala.experiment.worker import played
 from khala.fork.figures import are_alike, figures, of_side, rate
 from khala.fork.futures import Future, Plan, Purse, play_all
 from khala.fork.players import players_of
 from khala.fork.recorded import repeated
 from khala.fork.scan import ranked, steps_of
-from khala.playing import one_process
+from khala.playing import one_process, worker
+from khala.playing.jobs import Ended
 from khala.playing.minds import Minds
 from khala.testing import replay_host
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -34,7 +33,7 @@ from khala_protocol.messages import Casualties, ModelCall, Observation, Reply, R
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
-    from khala.experiment.job import Job
+    from khala.playing.jobs import Job
 
 GOLDEN = Path(__file__).with_name("golden.mcap")
 SIDE = "blue"
@@ -51,8 +50,8 @@ class Here:
     async def __aexit__(self, *_: object) -> None:
         """Leave nothing behind."""
 
-    async def play(self, job: Job) -> Done:
-        return await played(job, "simulator")
+    async def play(self, job: Job) -> Ended:
+        return await worker.play(job, game="simulator")
 
 
 @pytest.fixture(scope="module")
@@ -370,10 +369,10 @@ def test_a_fork_takes_a_number_that_is_free(golden: Trunk, tmp_path: Path) -> No
 
 async def test_a_fork_that_could_not_be_played_says_why(golden: Trunk, tmp_path: Path) -> None:
     class Broken(Here):
-        async def play(self, job: Job) -> Done:
+        async def play(self, job: Job) -> Ended:
             assert job.beginning is not None
             assert job.beginning.exists()
-            return Done(state="lost", words="its process ended with SIGKILL")
+            return Ended(state="lost", words="its process ended with SIGKILL")
 
     (future,) = await play_all(planned(golden, tmp_path, "silent").forks(3, 1), Broken(), budget_usd=1.0)
     assert (future.error, future.results) == ("its process ended with SIGKILL", ())

@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
-from khala.experiment.job import Done
+from khala.playing.jobs import Ended
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala.experiment.job import Job
+    from khala.playing.jobs import Job
     from khala_orchestrator.config import MatchConfig
 
 
@@ -72,7 +72,7 @@ class MadeEngine:
     async def __aexit__(self, *error: object) -> None:
         pass
 
-    async def play(self, job: Job) -> Done:
+    async def play(self, job: Job) -> Ended:
         key = job.config.labels["match"]
         self._tries[key] += 1
         how = self.ends(job, self._tries[key])
@@ -83,7 +83,7 @@ class MadeEngine:
             await asyncio.sleep(0)
         self._now -= 1
         if how == "nothing":
-            return Done(state="lost", words="killed")
+            return Ended(state="lost", words="killed")
         assert job.config.record is not None
         left_usd = job.minds["blue"].budget_usd
         cost = self.cost_usd(job) if left_usd is None else min(self.cost_usd(job), left_usd)
@@ -91,4 +91,4 @@ class MadeEngine:
         record(job.config.record, job.config, cost_usd=cost, result=how != "lost", spent_out=spent_out,
                won=job.config.seed % 2 == 0, valid=how not in {"invalid", "refused"},
                refused=how == "refused")  # fmt: skip
-        return Done(state="lost", words="killed") if how == "lost" else Done(state="done")
+        return Ended(state="lost", words="killed") if how == "lost" else Ended(state="done")

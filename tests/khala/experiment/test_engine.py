@@ -16,12 +16,11 @@ from typer.testing import CliRunner
 from bench.survival import experiments
 from khala.cli import app
 from khala.experiment.engine import Local
-from khala.experiment.job import Job
 from khala.experiment.plan import plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store
-from khala.experiment.worker import played
-from khala.playing import local, one_process
+from khala.playing import local, one_process, worker
+from khala.playing.jobs import Job
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.recording import Recording
 
@@ -41,8 +40,8 @@ def job(directory: Path, *, task: str = "2s3z_pair", **fields: Any) -> Job:
 
 
 async def test_a_match_is_played_and_recorded_in_one_process(tmp_path: Path) -> None:
-    done = await played(job(tmp_path), "simulator")
-    assert (done.state, done.words) == ("done", "")
+    ended = await worker.play(job(tmp_path), game="simulator")
+    assert (ended.state, ended.words) == ("done", "")
     recording = Recording.open(tmp_path / "recording.mcap")
     assert [(result.steps, set(result.statuses)) for result in recording.results] == [(3, {"Stalkers", "Zealots"})]
     assert recording.run is not None
@@ -51,19 +50,13 @@ async def test_a_match_is_played_and_recorded_in_one_process(tmp_path: Path) -> 
     assert len(recording.run.code_sha256) == 64
 
 
-async def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
-    done = await played(job(tmp_path), str(tmp_path / "no game"))
-    assert done.state == "error"
-    assert "no game" in done.words
-
-
 async def test_a_worker_that_dies_loses_its_match_and_the_next_one_is_played(tmp_path: Path) -> None:
     async with Local(1, game="simulator", logs=tmp_path / "logs") as engine:
-        engine._free.append(worker := await engine._start())
+        engine._idle.append(process := await engine._start())
         playing = asyncio.create_task(engine.play(job(tmp_path / "first")))
-        os.kill(worker._process.pid, signal.SIGKILL)
-        done = await playing
-        assert (done.state, done.words.partition(";")[0]) == ("lost", "its process ended with SIGKILL")
+        os.kill(process.pid, signal.SIGKILL)
+        ended = await playing
+        assert (ended.state, ended.words.partition(";")[0]) == ("lost", "its process ended with SIGKILL")
         (tmp_path / "second").mkdir()
         assert (await engine.play(job(tmp_path / "second"))).state == "done"
 

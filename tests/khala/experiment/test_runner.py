@@ -18,8 +18,8 @@ from tests.khala.experiment.made import MadeEngine, record
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.experiment.job import Job
     from khala.experiment.plan import PlannedMatch
+    from khala.playing.jobs import Job
 
 
 def experiment(**fields: Any) -> Experiment:

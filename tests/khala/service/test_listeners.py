@@ -1,9 +1,7 @@
-"""What the service tells of its matches: metrics, spans, log lines. All of it comes from messages."""
+"""What the service tells of its matches: metrics and spans. All of it comes from messages."""
 
 from __future__ import annotations
 
-import json
-import logging
 from typing import TYPE_CHECKING
 
 import httpx
@@ -11,7 +9,6 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from prometheus_client import generate_latest
 
-from khala.service import logs
 from khala.service.book import Book
 from khala.service.metrics import Metrics
 from khala.service.traces import KEPT, Traces
@@ -87,23 +84,6 @@ def test_model_calls_without_a_report_are_forgotten_in_the_end() -> None:
     for step in range(KEPT + 5):
         traces.hear(call(step))
     assert len(traces._calls) == KEPT
-
-
-def test_a_log_line_is_json_with_run_agent_and_step() -> None:
-    error = ValueError("broken")
-    about = (type(error), error, None)
-    record = logging.LogRecord("khala.service", logging.WARNING, "", 1, "late: %s", ("so\nlong",), about)
-    record.agent, record.step = "blue/Stalkers", 3
-    logs.here["run"] = "first"
-    try:
-        line = logs.JsonFormatter().format(record)
-    finally:
-        logs.here.clear()
-    assert "\n" not in line
-    said = json.loads(line)
-    assert (said["run"], said["agent"], said["step"]) == ("first", "blue/Stalkers", 3)
-    assert (said["message"], said["level"]) == ("late: so\nlong", "WARNING")
-    assert "ValueError: broken" in said["error"]
 
 
 def times(span: ReadableSpan) -> tuple[int, int]:

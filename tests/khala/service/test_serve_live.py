@@ -110,7 +110,7 @@ async def test_matches_are_played_side_by_side_and_survive_a_worker_and_the_end(
         await service.submit("long", 10_000, ENDLESS)
         await service.step("long")
         assert (await service.over("short")).state == "done"
-        (worker,) = [p for p in service.below("khala.service.worker") if _is_playing(p)]
+        (worker,) = [p for p in service.below("khala.playing.worker") if _is_playing(p)]
         worker.kill()
         await service.step("long")
         card = client.find(await client.listed(service.bus), "long")

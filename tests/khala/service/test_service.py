@@ -6,17 +6,17 @@ import asyncio
 import contextlib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import pytest
 
+from khala.playing.jobs import Ended
 from khala.playing.matches import new
 from khala.playing.minds import Minds
 from khala.service import client
 from khala.service.book import KEPT, Limits
 from khala.service.client import NoService, Refused
 from khala.service.daemon import STARTS, Service
-from khala.service.pool import Ending
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.config import change, load_task
 from khala_orchestrator.match.cards import run_card
@@ -33,7 +33,7 @@ from khala_protocol.service import MAX_ORDER_BYTES, MatchCard, Stop, Submit
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from khala.service.worker import Job
+    from khala.playing.jobs import Job
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Wire
 
@@ -47,18 +47,18 @@ class Pretender:
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
-        self._ending: asyncio.Future[Ending] = asyncio.get_running_loop().create_future()
+        self._ended: asyncio.Future[Ended] = asyncio.get_running_loop().create_future()
         self.job: Job | None = None
 
-    async def play(self, job: Job) -> Ending:
+    async def play(self, job: Job) -> Ended:
         self.job = job
         self._stage.playing[job.config.run] = self
         self._stage.begun.append(job.config.run)
-        return await self._ending
+        return await self._ended
 
-    def end(self, state: str, words: str = "") -> None:
-        if not self._ending.done():
-            self._ending.set_result(Ending(state, words))
+    def end(self, state: Literal["done", "stopped", "lost"], words: str = "") -> None:
+        if not self._ended.done():
+            self._ended.set_result(Ended(state=state, words=words))
 
     def stop(self) -> None:
         self.end("stopped")
@@ -223,7 +223,7 @@ async def test_a_match_is_gone_on_with_from_its_recording(stage: Stage, monkeypa
     await asyncio.sleep(1)
     job = stage.playing["first"].job
     assert job is not None
-    assert (job.resume, job.config.seed, job.directory) == (True, 7, stage.out / "first")
+    assert (job.beginning, job.config.seed, job.directory) == (stage.out / "first", 7, stage.out / "first")
     assert len(read) == 2
     stage.playing["first"].end("done")
     (stage.out / "first").rename(stage.out / "second")
@@ -328,10 +328,10 @@ async def test_the_match_of_a_lost_worker_goes_on_in_another_and_touches_no_othe
     await stage.report("first", 4)
     await asyncio.sleep(1)
     lost, other = stage.playing["first"], stage.playing["second"]
-    lost.end("lost", "its worker ended with SIGKILL")
+    lost.end("lost", "its process ended with SIGKILL")
     await asyncio.sleep(1)
     assert stage.playing["first"].job is not None
-    assert stage.playing["first"].job.resume
+    assert stage.playing["first"].job.beginning == stage.out / "first"
     assert (await stage.card("first")).starts == 2
     assert stage.playing["second"] is other
 
@@ -340,9 +340,9 @@ async def test_a_match_that_loses_every_worker_has_failed(stage: Stage) -> None:
     await stage.submit("first")
     for _ in range(STARTS):
         await asyncio.sleep(0.1)
-        stage.playing.pop("first").end("lost", "its worker ended with SIGSEGV")
+        stage.playing.pop("first").end("lost", "its process ended with SIGSEGV")
     card = await stage.card("first")
-    assert (card.state, card.reason) == ("failed", "its worker ended with SIGSEGV, 3 times")
+    assert (card.state, card.reason) == ("failed", "its process ended with SIGSEGV, 3 times")
 
 
 async def test_a_match_waits_for_memory_and_the_largest_ends_when_it_is_used_up(tmp_path: Path) -> None:

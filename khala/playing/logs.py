@@ -1,4 +1,4 @@
-"""Log lines of the service, for people or as JSON: one object a line, with run, agent and step where they are known."""
+"""Log lines of processes that play matches, for people or as JSON: one object a line, with run, agent and step."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(line, default=str)
 
 
-def set_up(*, as_json: bool) -> None:
-    """Log to stderr, from INFO on for the service itself."""
+def set_up(*, as_json: bool = False) -> None:
+    """Log to stderr what a person should know."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter() if as_json else VisibleFormatter(TEXT))
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
-    logging.getLogger("khala.service").setLevel(logging.INFO)
+    logging.getLogger("absl").setLevel(logging.ERROR)  # PySC2 warns at each step of abilities that it has no name for
