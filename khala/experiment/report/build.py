@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from khala.experiment.plan import cells as planned_cells
-from khala.experiment.report import html, latex, markdown
 from khala.experiment.report.calls import calls
 from khala.experiment.report.conditions import conditions, warnings
 from khala.experiment.report.document import Document, Section
 from khala.experiment.report.figures import figures
+from khala.experiment.report.html import Html
+from khala.experiment.report.latex import Latex
+from khala.experiment.report.markdown import Markdown
 from khala.experiment.report.summary import cells, summary
 from khala.experiment.report.tables import beside, not_counted, overview, tables
 from khala.experiment.selection import factors_of
@@ -17,28 +19,16 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.files import make_private, write_together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from khala.experiment.report.summary import Summary
+    from khala.experiment.report.writer import Writer
     from khala.experiment.spec import Experiment
     from khala.experiment.store import Store
 
 
-class Format(NamedTuple):
-    """How a document is written."""
-
-    suffix: str
-    text: Callable[[Document], str]
-    picture: str
-    """Suffix of the pictures beside it; "" if it holds them."""
-
-
-FORMATS = {
-    "markdown": Format("md", markdown.text, "png"),
-    "latex": Format("tex", latex.text, "pdf"),
-    "html": Format("html", html.text, ""),
-}
+FORMATS: dict[str, Writer] = {"markdown": Markdown(), "latex": Latex(), "html": Html()}
 
 
 class Report(NamedTuple):
@@ -90,11 +80,13 @@ def write(document: Document, directory: Path, formats: Sequence[str]) -> list[P
     make_private(directory)
     texts: dict[Path, bytes] = {}
     pictures: dict[Path, bytes] = {}
-    for one in (FORMATS[name] for name in formats):
-        texts[directory / f"report.{one.suffix}"] = one.text(document).encode()
-        if one.picture:
-            found = (figure for section in document.sections for figure in section.figures)
-            pictures |= {directory / f"{figure.name}.{one.picture}": figure.draw(one.picture) for figure in found}
+    figures = [figure for section in document.sections for figure in section.figures]
+    for name in formats:
+        writer = FORMATS[name]
+        texts[directory / f"report.{writer.suffix}"] = writer.text(document).encode()
+        if writer.picture:
+            drawn = {f"{figure.name}.{writer.picture}": figure.draw(writer.picture) for figure in figures}
+            pictures |= {directory / file: picture for file, picture in drawn.items()}
     write_together(texts | pictures)
     return [*texts, *pictures]
 
