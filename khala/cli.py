@@ -21,7 +21,7 @@ from khala import __version__
 from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
 from khala.commands.actions import EPILOG as ACTIONS_EPILOG
 from khala.commands.actions import actions
-from khala.commands.help import Group
+from khala.commands.help import Commands
 from khala.commands.keys import app as keys
 from khala.commands.options import (
     Game,
@@ -49,7 +49,7 @@ from khala_protocol.visible import VisibleFormatter
 
 app = typer.Typer(
     name="khala",
-    cls=Group,
+    cls=Commands,
     help="Teams of LLM agents play StarCraft II together over a message bus.",
     epilog="Begin with: khala run 2s3z_pair",
     no_args_is_help=True,
