@@ -138,7 +138,7 @@ class Workshop:
     def _model(self, name: str) -> tuple[ModelConfig, Limits]:
         if name not in self._models:
             file = load_model(name)
-            config = _changed(_located(file), self._overrides, source="command line")
+            config = _change(_with_address(file), self._overrides, source="command line")
             config = config.model_copy(update={"prices": _prices(config, file)})
             if self._budget.limit_usd is not None:
                 check_priced(config.prices, config.model, config.base_url)
@@ -152,11 +152,11 @@ class Workshop:
         return self._models[name]
 
 
-def _located(config: ModelConfig) -> ModelConfig:
+def _with_address(config: ModelConfig) -> ModelConfig:
     """Return the model, at the address from the environment if there is one."""
     variable = config.base_url_env
     address = os.environ.get(variable) if variable else None
-    return _changed(config, {"base_url": address}, source=variable) if address else config
+    return _change(config, {"base_url": address}, source=variable) if address else config
 
 
 def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
@@ -165,7 +165,7 @@ def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
     return config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
 
 
-def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
+def _change(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
     try:
         return ModelConfig.model_validate({**config.model_dump(), **changes})
     except ValidationError as error:

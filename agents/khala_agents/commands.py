@@ -175,7 +175,7 @@ async def _play(
     await _check(policies.values())
     where = ", ".join(links[0].config.connect_to)
     async with AsyncExitStack() as stack:
-        buses = [await _opened(link, stack) for link in links]
+        buses = [await _open(link, stack) for link in links]
         of = {name: bus for bus, link in zip(buses, links, strict=True) for name in link.names}
         _say(f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {where}")
         tidy_memory()
@@ -190,7 +190,7 @@ async def _play(
     return {name: tally for task in playing for name, tally in task.result().items()}
 
 
-async def _opened(link: Link, stack: AsyncExitStack) -> Bus:
+async def _open(link: Link, stack: AsyncExitStack) -> Bus:
     bus = await open_bus(link.config)
     stack.push_async_callback(bus.close)
     return bus

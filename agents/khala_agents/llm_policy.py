@@ -129,7 +129,7 @@ class LLMPolicy(Policy):
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        completion = await self._completed(_Tries(self, context, messages, pictures))
+        completion = await self._complete(_Tries(self, context, messages, pictures))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
@@ -156,11 +156,11 @@ class LLMPolicy(Policy):
         prompt = self._prompt_for(context.briefing).messages(summary.ask(context.observation))
         asking = _Tries(self, dataclasses.replace(context, trace=trace), prompt, {}, purpose="summary")
         try:
-            await self._completed(asking)
+            await self._complete(asking)
         except LLMError as error:
             log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
 
-    async def _completed(self, tries: _Tries) -> Completion:
+    async def _complete(self, tries: _Tries) -> Completion:
         """Return the model's answer.
 
         Raises:
@@ -265,7 +265,7 @@ class _Tries:
             request = self._request(began)
             outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
             try:
-                completion = await self._completed(request)
+                completion = await self._complete(request)
                 outcome = _Outcome(
                     completion.verdict, completion, completion.reason, self._with_images(completion.usage)
                 )
@@ -284,7 +284,7 @@ class _Tries:
                 self._trace(began, ticket, outcome)
             return completion
 
-    async def _completed(self, request: Request) -> Completion:
+    async def _complete(self, request: Request) -> Completion:
         """Return the completion; tell the breaker how the call ended."""
         breaker, deadline = self._policy.breaker, self._context.deadline
         try:

@@ -198,7 +198,7 @@ async def _late_copy(directory: Path) -> str:
     _write_recording(path, {"match": "m1"}, finished=False)
     os.utime(path.with_name("recording.mcap"), (0, 0))
     store.rebuild()
-    return "" if store.played()["m1"].state == "done" else "a crashed try hides a done match"
+    return "" if store.matches()["m1"].state == "done" else "a crashed try hides a done match"
 
 
 async def _old_time(directory: Path) -> str:

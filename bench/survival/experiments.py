@@ -116,7 +116,7 @@ async def kills(
         differ = [key for key in {**ours, **theirs} if ours.get(key) != theirs.get(key)]
         tries = [found.read(path, attempts=1) for path in found.directory.glob("matches/*/*.mcap")]
         whole = [read for read in tries if read is not None and read[0].state == "done"]
-        return Killed(killed, len(ours), differ, len(whole) - len(found.played()))
+        return Killed(killed, len(ours), differ, len(whole) - len(found.matches()))
 
 
 class Charging(Endpoint):
@@ -194,7 +194,7 @@ async def _account(file: Path, out: Path, cap_usd: float | None, pilot: int, slo
             print(words_of(rest), file=sys.stderr)
             estimated = runner.spent.usd + (rest.usd or 0.0)
         await runner.play(matches)
-    print(f"{len(store.played())} matches; {runner.stopped}", file=sys.stderr)
+    print(f"{len(store.matches())} matches; {runner.stopped}", file=sys.stderr)
     return runner.spent.usd, estimated
 
 

@@ -57,7 +57,8 @@ def _differences(found: Compared) -> Iterator[str]:
 def _exact(rows: list[Difference]) -> Iterator[str]:
     yield f"| | A | B | B - A ({rows[0].unit}) |\n|---|---:|---:|---:|"
     for row in rows[:MOST_ROWS]:
-        yield f"| {row.name} | {number(row.a.mean)} | {number(row.b.mean)} | {_signed(row.b.mean - row.a.mean)} |"
+        difference = row.b.mean - row.a.mean
+        yield f"| {row.name} | {number(row.a.mean)} | {number(row.b.mean)} | {number(difference, signed=True)} |"
 
 
 def _random(rows: list[Difference]) -> Iterator[str]:
@@ -66,10 +67,6 @@ def _random(rows: list[Difference]) -> Iterator[str]:
         assert row.test is not None
         sides = (f"{number(side.mean)} (n = {side.n}, sd {number(side.sd)})" for side in (row.a, row.b))
         yield f"| {row.name} | {' | '.join(sides)} | {difference_with(row.test.effect)} | {p_value(row.p)} |"
-
-
-def _signed(value: float) -> str:
-    return number(value, signed=True)
 
 
 def _missing(found: Compared) -> Iterator[str]:

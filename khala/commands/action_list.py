@@ -64,7 +64,7 @@ def print_actions(
         console.print(_groups(known))
         console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them")
     else:
-        for line in _listed(found, console.width) if found else [_none(wanted)]:
+        for line in _lines(found, console.width) if found else [_none(wanted)]:
             console.print(line, soft_wrap=True)
 
 
@@ -112,7 +112,7 @@ def _is_for(action: Action, unit: str) -> bool:
     return action.fits(unit) and (action.subject != "side" or bool(action.units))
 
 
-def _listed(found: list[Action], width: int) -> Iterator[Text]:
+def _lines(found: list[Action], width: int) -> Iterator[Text]:
     """Yield lines for each action, under headings of group and race; names and calls are never broken."""
     for (group, race), members in itertools.groupby(found, key=lambda action: (action.group, action.race)):
         yield Text(f"\n{group}, {race or 'every race'}", style="bold underline")
@@ -128,12 +128,12 @@ def _block(action: Action, width: int) -> Iterator[Text]:
         yield Text(INDENT + function, style="cyan")
     if action.args:
         yield Text(INDENT + example(action))
-    yield from map(Text, _folded(action.about, width))
+    yield from map(Text, _wrap(action.about, width))
     aliases = f"; also {', '.join(action.aliases)}" if action.aliases else ""
-    yield from (Text(line, style="dim") for line in _folded(_who(action) + aliases, width))
+    yield from (Text(line, style="dim") for line in _wrap(_who(action) + aliases, width))
 
 
-def _folded(text: str, width: int) -> list[str]:
+def _wrap(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=INDENT, subsequent_indent=INDENT, break_long_words=False)
 
 

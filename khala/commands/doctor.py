@@ -48,7 +48,7 @@ class Finding:
 
 def examine(tls: Path | None = None, game: str | None = None) -> Iterator[Finding]:
     """Run every check, in the order in which a newcomer would ask; of certificates and of a game if they are named."""
-    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_started(game)] if game else [])):
+    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
@@ -103,8 +103,8 @@ def _game() -> Iterator[Finding]:
     yield Finding("maps", "ok" if maps else "wrong", f"{maps} below {root / 'Maps'}", advice)
 
 
-def _started(source: str) -> Callable[[], Iterator[Finding]]:
-    def started() -> Iterator[Finding]:
+def _game_process(source: str) -> Callable[[], Iterator[Finding]]:
+    def check() -> Iterator[Finding]:
         from khala.playing.environment import plain  # noqa: PLC0415  # only this check needs them
         from khala.playing.games import find  # noqa: PLC0415
         from khala_bridge.calibrate.survey import survey  # noqa: PLC0415
@@ -127,7 +127,7 @@ def _started(source: str) -> Callable[[], Iterator[Finding]]:
         advice = "" if found.renders else "pictures come from feature layers; a game without a graphics card draws none"
         yield Finding("rendering", "ok" if found.renders else "note", found.rendering, advice)
 
-    return started
+    return check
 
 
 def _some(names: Sequence[str]) -> str:

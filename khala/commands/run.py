@@ -47,7 +47,7 @@ class Wanted:
 def run(wanted: Wanted, *, as_json: bool) -> None:
     """Play a match on this machine, print the results, and end in order on SIGINT and SIGTERM."""
     known: list[MatchConfig] = []
-    results = asyncio.run(cancelled_by_signal(_played(wanted, known)))
+    results = asyncio.run(cancelled_by_signal(_play(wanted, known)))
     if not known:
         assert isinstance(results, signal.Signals)
         say("interrupted before the match began", err=True)
@@ -57,7 +57,7 @@ def run(wanted: Wanted, *, as_json: bool) -> None:
     end(known[0], results, as_json=as_json)
 
 
-async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
+async def _play(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
     """Return the results; `known` gets the match as soon as it is known."""
     async with Spares(1) as stock:
         with _game_for(wanted) as launched:

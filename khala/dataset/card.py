@@ -114,7 +114,7 @@ def _words(contents: Contents, recipe: Recipe, form: Form) -> Iterator[str]:
     yield "# Decisions of StarCraft II agents\n"
     yield (
         f"{contents.rows.total()} decisions of agents that play StarCraft II over a message bus, exported by Khala "
-        f"{__version__} from {_counted(contents.recordings, 'recording')}. One row is one decision: the prompt, the "
+        f"{__version__} from {_plural(contents.recordings, 'recording')}. One row is one decision: the prompt, the "
         "reply, what became of its actions, and what they were worth.\n"
     )
     yield "## Contents\n"
@@ -151,7 +151,7 @@ def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     yield f"* Prompts of {contents.rebuilt} rows were sent to no model: they are made as a model would have got them."
     yield f"* Pictures: {contents.pictures if recipe.images else 'not exported'}."
     if contents.unrewarded:
-        yield f"* The recordings do not say what {_counted(contents.unrewarded, 'decision')} gained: reward is null."
+        yield f"* The recordings do not say what {_plural(contents.unrewarded, 'decision')} gained: reward is null."
     if contents.unread:
         yield f"* Files that are no recordings of a match: {contents.unread}."
     yield ""
@@ -212,5 +212,5 @@ def _cell(value: object) -> str:
     return visible_line(str(value))[:100].translate(_ESCAPES)
 
 
-def _counted(number: int, what: str) -> str:
+def _plural(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")

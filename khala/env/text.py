@@ -83,7 +83,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         check_trusted(code_of(task), source=task.name)
         scenes = None if render_mode else "none"
         self._task = unhurried(change(task, max_steps=max_cycles, scenes=scenes))
-        self._seats = _named(self._task, agents)
+        self._seats = _seats_by_name(self._task, agents)
         sides = [side.side for side in self._task.per_side()]
         trust_named(others)
         self._minds = {} if others is None else minds_of(sides, Minds().named(others), {})
@@ -224,9 +224,9 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
 
     def _next(self, actions: Mapping[str, str]) -> Turn:
         assert self._match is not None and self._thread is not None
-        return self._thread.run(self._answered(self._match, actions))
+        return self._thread.run(self._answer(self._match, actions))
 
-    async def _answered(self, match: SeatedMatch, actions: Mapping[str, str]) -> Turn:
+    async def _answer(self, match: SeatedMatch, actions: Mapping[str, str]) -> Turn:
         for agent, seat in self._seats.items():
             if seat in self._turn.asked:
                 match.act(seat, actions.get(agent, ""))
@@ -262,7 +262,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         return info if result is None else info | {"result": result.but(**_UNTIMED)}
 
 
-def _named(task: TaskConfig, wanted: Sequence[str] | None) -> dict[str, Seat]:
+def _seats_by_name(task: TaskConfig, wanted: Sequence[str] | None) -> dict[str, Seat]:
     """Return the seats that are played, by the agents' names, with their sides where there are two.
 
     Raises:

@@ -45,7 +45,7 @@ def run(file: str, out: Path, options: dict[str, Any]) -> None:
 
 def resume(directory: Path, out: Path, options: dict[str, Any]) -> None:
     """Go on with an experiment, as its directory has it."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     _play(store.experiment(), store, None, **options)
 
 
@@ -72,14 +72,14 @@ def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
 
 def status(directory: Path, *, game: str, out: Path, as_json: bool) -> None:
     """Show how far an experiment is."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     experiment = store.experiment()
     _print_cells(experiment, plan(experiment, game=game), store, as_json=as_json)
 
 
 def index(directory: Path, *, out: Path) -> None:
     """Make the index of an experiment again."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     stderr_console().print(f"{store.rebuild()} matches are in {store.directory / 'index.sqlite'}", soft_wrap=True)
 
 
@@ -101,10 +101,6 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted((CONFIGS / SHIPPED).glob("*.yaml"))}
 
 
-def _opened(directory: Path, out: Path) -> Store:
-    return Store.opened(directory if directory.is_dir() else out / directory)
-
-
 # --- playing -----------------------------------------------------------------------------------------
 
 
@@ -113,7 +109,7 @@ def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any)
     check_playable(matches, _budget(experiment, given["budget_usd"]).usd)
     if file is not None:
         store.begin(file)
-    with store.locked():
+    with store.lock():
         engine = _engine(given, store)
         playing = _until_done(experiment, store, engine, matches, given)
         done = asyncio.run(cancelled_by_signal(playing))
@@ -192,7 +188,7 @@ def _engine(given: dict[str, Any], store: Store) -> Engine:
 
 
 def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner, *, as_json: bool) -> None:
-    played = store.played()
+    played = store.matches()
     states = [played[match.key].state if match.key in played else "missing" for match in matches]
     counts = {state: states.count(state) for state in ("done", "invalid", "crashed", "missing") if state in states}
     screen = stderr_console()
@@ -210,7 +206,7 @@ def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner,
 
 
 def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Store, *, as_json: bool) -> None:
-    played = store.played()
+    played = store.matches()
     rows: dict[tuple[str, ...], dict[str, Any]] = {}
     for match in matches:
         row = rows.setdefault(tuple(match.cell.values()), dict(match.cell) | {"matches": 0, "done": 0, "invalid": 0,

@@ -98,7 +98,7 @@ def compare(a: Selection, b: Selection, *, measures: Sequence[str] = USUAL, allo
     pairs = sum(len(games_a[group].keys() & games_b[group].keys()) for group in shared)
     all_a, all_b = (sum(map(len, games.values())) for games in (games_a, games_b))
     either = sorted({group.task for group in games_a} ^ {group.task for group in games_b})
-    return Findings(a.text, b.text, _corrected(found), (all_a - pairs, all_b - pairs), (a.left_out, b.left_out),
+    return Findings(a.text, b.text, _with_holm(found), (all_a - pairs, all_b - pairs), (a.left_out, b.left_out),
                   tuple(either), tuple(allowed))  # fmt: skip
 
 
@@ -179,9 +179,9 @@ def _one(
     else:
         rows_a, rows_b = ([row for group in groups for row in games[group].values()] for games in (games_a, games_b))
     value = _estimate(measure)
-    tested = _paired(measure) if pairs else _unpaired(measure)
+    tested = _paired_test(measure) if pairs else _unpaired_test(measure)
     test = tested(rows_a, rows_b) if tested else None
-    needed = _needed(rows_a, rows_b, test, paired=bool(pairs)) if measure == WIN else None
+    needed = _games_needed(rows_a, rows_b, test, paired=bool(pairs)) if measure == WIN else None
     games = min(len(rows_a), len(rows_b))
     return Compared(task, measure, bool(pairs), games, value(rows_a), value(rows_b), test, None, needed)
 
@@ -194,7 +194,7 @@ def _estimate(measure: str) -> Callable[[list[Row]], Interval]:
     return lambda rows: statistics.mean(_column(rows, measure))
 
 
-def _paired(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
+def _paired_test(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
     if measure == WIN:
         return lambda a, b: statistics.compare_paired_wins(_won(a), _won(b))
     if measure == KD:
@@ -204,7 +204,7 @@ def _paired(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
     return lambda a, b: statistics.compare_paired_values(_column(a, measure), _column(b, measure))
 
 
-def _unpaired(measure: str) -> Callable[[list[Row], list[Row]], Comparison] | None:
+def _unpaired_test(measure: str) -> Callable[[list[Row], list[Row]], Comparison] | None:
     if measure == WIN:
         return lambda a, b: statistics.compare_wins(sum(_won(a)), len(a), sum(_won(b)), len(b))
     if measure == KD:
@@ -221,7 +221,7 @@ def _column(rows: Iterable[Row], name: str) -> list[float | None]:
     return [row[name] for row in rows]
 
 
-def _needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool) -> int | None:
+def _games_needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool) -> int | None:
     """Return how many games would show such a difference in wins."""
     won_a, won_b = _won(a), _won(b)
     if test is None or test.p < LEVEL or not test.effect.value:
@@ -234,7 +234,7 @@ def _needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool
     return needed if needed <= MOST_GAMES else None
 
 
-def _corrected(found: Sequence[Compared]) -> tuple[Compared, ...]:
+def _with_holm(found: Sequence[Compared]) -> tuple[Compared, ...]:
     p = statistics.holm([one.test.p if one.test else None for one in found])
     return tuple(replace(one, p_holm=value) for one, value in zip(found, p, strict=True))
 

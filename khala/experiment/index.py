@@ -126,10 +126,10 @@ def results_in(index: sqlite3.Connection) -> list[dict[str, Any]]:
     kinds = _annotations()
     columns = ", ".join(f'"{name}"' for name in kinds)
     found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
-    return [_joined(matches[key], _checked(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
+    return [_join(matches[key], _check_types(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
 
 
-def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
+def _check_types(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
     """Return a row; raise `ValueError` if a value is of another type than its column: SQLite takes any."""
     for name, kind in kinds.items():
         types, _, nothing = str(kind).partition(" | ")
@@ -138,7 +138,7 @@ def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _joined(match: Played, row: dict[str, Any]) -> dict[str, Any]:
+def _join(match: Played, row: dict[str, Any]) -> dict[str, Any]:
     cell = {f"{FACTOR}{name}": value for name, value in match.cell.items()}
     about = {"match": match.key, "state": match.state, "cause_of_state": match.cause, "repetition": match.repetition}
     return {**about, **cell, **row}

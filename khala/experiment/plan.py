@@ -75,7 +75,7 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
     if count > MOST_MATCHES:
         raise ConfigError(f"the grid has {count} matches, more than {MOST_MATCHES}: split the experiment")
     name = games.name_of(game)
-    prepared = [_prepared(cell, settings, name) for cell, settings in grid]
+    prepared = [_prepare(cell, settings, name) for cell, settings in grid]
     planned = [
         one.match(experiment.name, seed, repetition)
         for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
@@ -116,12 +116,12 @@ def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
         if not any(excluded.items() <= cell.items() for excluded in experiment.exclude):
             yield from _both_ways(experiment, cell, levels)
     for number, included in enumerate(experiment.include, 1):
-        chosen = [_included(experiment, factor, value, number) for factor, value in included.items()]
+        chosen = [_included_level(experiment, factor, value, number) for factor, value in included.items()]
         names = [level.name for level in chosen]
         yield from _both_ways(experiment, dict(zip(included, names, strict=True)), chosen)
 
 
-def _included(experiment: Experiment, factor: str, value: object, number: int) -> Level:
+def _included_level(experiment: Experiment, factor: str, value: object, number: int) -> Level:
     known = {level.name: level for level in experiment.factors[factor]}
     if isinstance(value, str) and value in known:
         return known[value]
@@ -167,7 +167,7 @@ class _Prepared:
         return PlannedMatch(key, self.cell, seed, repetition, config, self.minds)
 
 
-def _prepared(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
+def _prepare(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
     try:
         task = task_of(settings)
         minds = minds_for(task, settings)

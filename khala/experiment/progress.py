@@ -32,7 +32,7 @@ class Watcher:
         self._counts: Counter[str] = Counter()
         self._now: dict[str, str] = {}
         self._total = len(matches)
-        left = len(list(missing(matches, runner.store.played())))
+        left = len(list(missing(matches, runner.store.matches())))
         self._counts["before"] = self._total - left
         title_of, until, words = (
             TextColumn(text, markup=False) for text in ("{task.description}", "ends in", "{task.fields[words]}")

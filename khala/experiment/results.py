@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala.experiment.compare import Compared, Findings
-    from khala.experiment.store import Store
 
 
 TO_SHOW_IT = (
@@ -53,10 +52,11 @@ def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Pa
     """Write tables and figures of an experiment."""
     from khala.experiment.numbers import plain  # noqa: PLC0415
     from khala.experiment.report import FORMATS, write  # noqa: PLC0415
-    from khala.experiment.report import report as reported  # noqa: PLC0415
+    from khala.experiment.report import report as make_report  # noqa: PLC0415
+    from khala.experiment.store import Store  # noqa: PLC0415
 
-    store = _opened(directory, out)
-    made = reported(store, [name.strip() for name in by.split(",") if name.strip()])
+    store = Store.open(directory, out)
+    made = make_report(store, [name.strip() for name in by.split(",") if name.strip()])
     files = write(made.document, into or store.directory / "report", list(FORMATS) if formats == "all" else [formats])
     for warning in made.document.warnings:
         stderr_console().print(visible_line(warning), style="yellow", soft_wrap=True)
@@ -70,19 +70,14 @@ def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Pa
 def export(directory: Path, *, parquet: Path | None, csv: Path | None, out: Path) -> None:
     """Write a row for each episode and side."""
     from khala.experiment.export import write_csv, write_parquet  # noqa: PLC0415
+    from khala.experiment.store import Store  # noqa: PLC0415
 
     if parquet is None and csv is None:
         raise ConfigError("name a file to write: --parquet FILE or --csv FILE")
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     for path, write in ((parquet, write_parquet), (csv, write_csv)):
         if path is not None:
             stderr_console().print(f"{write(store, path)} rows are in {path}", soft_wrap=True)
-
-
-def _opened(directory: Path, out: Path) -> Store:
-    from khala.experiment.store import Store  # noqa: PLC0415
-
-    return Store.opened(directory if directory.is_dir() else out / directory)
 
 
 # --- the comparison in words --------------------------------------------------------------------------

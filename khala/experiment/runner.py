@@ -102,7 +102,7 @@ class Runner:
     def __post_init__(self) -> None:
         """Count what was spent before, also by a runner that was killed."""
         self.store.adopt()
-        self._played = self.store.played()
+        self._played = self.store.matches()
         self._unread_usd = self.store.booked_usd()
         for played in self._played.values():
             self._count(played)

@@ -59,8 +59,8 @@ def select(text: str, out: Path) -> Selection:
         ConfigError: there is no such experiment, factor or value, or no match of it can be used.
     """
     directory, conditions = _split(text)
-    store = Store.opened(Path(directory) if Path(directory).is_dir() else out / directory)
-    played = store.played()
+    store = Store.open(Path(directory), out)
+    played = store.matches()
     factors = factors_of(played.values())
     where = _where(conditions, factors, text)
     chosen = {key: one for key, one in played.items() if _fits(one.cell, where)}

@@ -30,7 +30,7 @@ MOST_MATCHES = 100_000
 MOST_SEEDS = 10_000
 
 
-def _named(value: str) -> str:
+def _check_name(value: str) -> str:
     try:
         return check_name(value, "experiment")
     except WrongKey as error:
@@ -121,7 +121,7 @@ class Published(Frozen):
 class Experiment(Frozen):
     """One experiment."""
 
-    name: Annotated[str, BeforeValidator(lambda value: _named(value) if isinstance(value, str) else value)]
+    name: Annotated[str, BeforeValidator(lambda value: _check_name(value) if isinstance(value, str) else value)]
     description: str = ""
     fixed: Settings = Settings()
     factors: dict[str, tuple[Level, ...]] = Field(min_length=1)

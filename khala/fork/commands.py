@@ -74,7 +74,7 @@ def fork_at(
     plan: Plan, step: int, times: int, *, jobs: int | None, budget_usd: float | None, game: str, as_json: bool
 ) -> None:
     """Play forks at one step, and print what became of them."""
-    futures = _played(plan, plan.forks(step, times), jobs, budget_usd, game)
+    futures = _play(plan, plan.forks(step, times), jobs, budget_usd, game)
     if are_alike(futures):
         _say(f"all {times} forks ended alike: who decides is deterministic, and --times 1 is enough")
     shown = outcomes(plan.trunk, step, futures, plan.who)
@@ -88,7 +88,7 @@ def scan(
     """Play forks at many steps, and print the steps in the order of how much changes."""
     steps = scans.steps_of(plan.trunk, every, advised=bool(plan.advice))
     forks = [fork for step in steps for fork in plan.forks(step, times)]
-    futures = _played(plan, forks, jobs, budget_usd, game)
+    futures = _play(plan, forks, jobs, budget_usd, game)
     points = scans.ranked(plan.trunk, futures)
     _print(
         {"steps": scans.plain_points(plan.trunk, points)} | _origin(plan.trunk), scans.table(points), as_json=as_json
@@ -97,9 +97,7 @@ def scan(
     _end(futures)
 
 
-def _played(
-    plan: Plan, forks: Sequence[Fork], jobs: int | None, budget_usd: float | None, game: str
-) -> Sequence[Future]:
+def _play(plan: Plan, forks: Sequence[Fork], jobs: int | None, budget_usd: float | None, game: str) -> Sequence[Future]:
     async def work() -> list[Future]:
         slots = min(jobs or slots_of_this_machine(), len(forks))
         async with Local(slots, game=game, logs=plan.out / "logs") as engine:

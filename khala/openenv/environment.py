@@ -116,7 +116,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         self._game_loop = 0
         await self._reset_rubric_async()
         await self._advance()
-        return self._observed()
+        return self._observe()
 
     async def step_async(self, action: KhalaAction, timeout_s: float | None = None, **_: Any) -> KhalaObservation:
         """Send the replies of those who are asked, and play until somebody is asked again, or the episode is over.
@@ -150,7 +150,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
                 match.act(seat, replies.get(name, ""))
         await self._advance()
         self._state.step_count += 1
-        observation = self._observed()
+        observation = self._observe()
         observation.reward = await self._apply_rubric_async(action, observation)
         assert self.rubric is not None
         parts = self.rubric.named_rubrics()
@@ -268,7 +268,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     # what the client gets -----------------------------------------------------------------------------------------
 
-    def _observed(self) -> KhalaObservation:
+    def _observe(self) -> KhalaObservation:
         turn, before = self._turn, self._game_loop
         reports = [one for one in turn.reports if one.side == self._state.side]
         agents = [agent for report in reports for agent in report.agents if agent.agent in self._seats]

@@ -231,7 +231,7 @@ class _Server(HTTPEnvServer):
         known = self._episodes.get(name or "")
         is_new = known is None
         with _said():
-            session = (await self._create_session())[0] if known is None else self._opened(known, client)
+            session = (await self._create_session())[0] if known is None else self._check_session(known, client)
             try:
                 observation = await self._of(session).reset_async(**wanted)
             except BaseException:
@@ -246,7 +246,7 @@ class _Server(HTTPEnvServer):
     async def step(self, http: Request, request: NamedStep) -> StepResponse:
         """Send replies."""
         with _said():
-            session = self._named(request.episode_id, http)
+            session = self._find_session(request.episode_id, http)
             observation = await self._of(session).step_async(request.action)
         self._update_session_activity(session, increment_step=True)
         return StepResponse(**serialize_observation(observation))
@@ -254,12 +254,12 @@ class _Server(HTTPEnvServer):
     async def state(self, http: Request, episode_id: str | None = None) -> KhalaState:
         """Return what is played."""
         with _said():
-            return self._of(self._named(episode_id, http)).state
+            return self._of(self._find_session(episode_id, http)).state
 
     async def close(self, http: Request, request: Named | None = None) -> Named:
         """End a session and its game."""
         with _said():
-            session = self._named(None if request is None else request.episode_id, http)
+            session = self._find_session(None if request is None else request.episode_id, http)
             name = self._of(session).state.episode_id
         await self._destroy_session(session)
         return Named(episode_id=name)
@@ -291,7 +291,7 @@ class _Server(HTTPEnvServer):
         assert isinstance(environment, KhalaEnvironment)
         return environment
 
-    def _opened(self, known: _Episode, client: str) -> str:
+    def _check_session(self, known: _Episode, client: str) -> str:
         """Return the session of an episode.
 
         Raises:
@@ -304,7 +304,7 @@ class _Server(HTTPEnvServer):
             )
         return known.session
 
-    def _named(self, name: str | None, http: Request) -> str:
+    def _find_session(self, name: str | None, http: Request) -> str:
         """Return the session over HTTP of this name, or the only one of the client.
 
         Raises:
@@ -312,7 +312,7 @@ class _Server(HTTPEnvServer):
         """
         client = http.cookies.get(CLIENT, "")
         if name is not None and (known := self._episodes.get(name)) is not None:
-            return self._opened(known, client)
+            return self._check_session(known, client)
         mine = {known.session for known in self._episodes.values() if is_same(client, known.client)}
         if name is None and len(mine) > 1:
             raise NoEpisode("there are several episodes: say which one with episode_id, as reset returned it")

@@ -89,7 +89,7 @@ async def play(
     for _, mind, _ in groups_of(config.task, minds):
         mind.check()
     supplies = supplies or Supplies()
-    config, sc2path = _prepared(config, directory, game)
+    config, sc2path = _prepare(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)
@@ -123,7 +123,7 @@ async def play_hosted(
     past: Unfinished | None = None,
 ) -> list[Result]:
     """Play a match whose agents come over the bus; arguments and errors as in `play`."""
-    config, sc2path = _prepared(config, directory, game)
+    config, sc2path = _prepare(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         session = await open_bus(bus)
         stack.push_async_callback(session.close)
@@ -202,7 +202,7 @@ async def _unless_one_dies(
         await asyncio.wait({playing, keeping})
 
 
-def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
+def _prepare(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
     """Return the match with the name of its game, and the path of the game; create the directory."""
     try:
         make_private(directory)

@@ -42,7 +42,7 @@ class Spares:
     async def __aenter__(self) -> Self:
         """Start the processes; they are of use before they are ready."""
         for _ in range(self._count):
-            self._stock.append(await _started())
+            self._stock.append(await _start())
         return self
 
     async def __aexit__(
@@ -76,7 +76,7 @@ class Spares:
         return await spawn(arguments, environ, log)
 
 
-async def _started() -> asyncio.subprocess.Process:
+async def _start() -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",  # with no module of the current directory on its path

@@ -69,7 +69,7 @@ async def submit(bus: Bus, order: Order, *, within_s: float = PATIENCE_S) -> Mat
         Refused: the service does not take it; the text says why.
         NoService: there is none.
     """
-    card = await _ordered(bus, order, lambda cards: _with_number(cards, order.number), within_s)
+    card = await _send_order(bus, order, lambda cards: _with_number(cards, order.number), within_s)
     if card.state == "refused":
         raise Refused(card.reason)
     return card
@@ -83,7 +83,7 @@ async def stop(bus: Bus, order: Order, *, within_s: float = PATIENCE_S) -> Match
         NoService: there is no service.
     """
     find(await listed(bus, within_s=within_s), order.run)
-    return await _ordered(bus, order, lambda cards: _over(cards, order.run), within_s)
+    return await _send_order(bus, order, lambda cards: _over(cards, order.run), within_s)
 
 
 async def watch(bus: Bus, run: str, show: Callable[[Wire], None], *, within_s: float = PATIENCE_S) -> MatchCard:
@@ -120,7 +120,9 @@ def find(matches: Matches, run: str) -> MatchCard:
     return found[-1]
 
 
-async def _ordered(bus: Bus, order: Order, done: Callable[[Matches], MatchCard | None], within_s: float) -> MatchCard:
+async def _send_order(
+    bus: Bus, order: Order, done: Callable[[Matches], MatchCard | None], within_s: float
+) -> MatchCard:
     lists = await bus.subscribe(MATCHES_KEY, Delivery.STATE, depth=1)
     orders = await bus.publisher(order_key(order.number), Delivery.SPEECH)
     sending = asyncio.create_task(_send(orders.put, encode(order)))

@@ -183,7 +183,7 @@ def ask(
     """
     config = client_config(connect or (), tls=tls, names=names, insecure=insecure)
 
-    async def asked() -> T:
+    async def connect_and_ask() -> T:
         try:
             bus = await open_bus(config)
         except NoRouter as error:
@@ -195,4 +195,4 @@ def ask(
         finally:
             await bus.close()
 
-    return asyncio.run(asked())
+    return asyncio.run(connect_and_ask())

@@ -40,7 +40,7 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     """
     check_name(order.run, "run")
     try:
-        config = _resumed(order.run, out) if order.resume else _new(order)
+        config = _resume(order.run, out) if order.resume else _new(order)
         common = _MINDS.validate_python(order.minds)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
@@ -64,7 +64,7 @@ def _new(order: Submit) -> MatchConfig:
     return MatchConfig.model_validate({**order.match, "run": order.run, "record": None})
 
 
-def _resumed(run: str, out: Path) -> MatchConfig:
+def _resume(run: str, out: Path) -> MatchConfig:
     """Return the match of the newest recording of a run."""
     if not (out / run).is_dir():
         raise ConfigError(f"the service has no run {run!r} to resume: it looks for its recording in {out / run}")

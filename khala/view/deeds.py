@@ -62,7 +62,7 @@ def deeds(
         if why is None and (ok := _was_accepted(call, accepted)) is None and unread and start > unread.start:
             why = unread  # one rejection stands for all calls behind it
         found.append(_deed(reply[start:end], call, start, False if why else ok, why, frames, screens))
-    found += (_rejected(rejection) for rejection in rejections if rejection.text)
+    found += (_refused_deed(rejection) for rejection in rejections if rejection.text)
     return tuple(sorted(found, key=lambda deed: deed.start))
 
 
@@ -117,7 +117,7 @@ def _deed(
     )
 
 
-def _rejected(one: Rejection) -> Deed:
+def _refused_deed(one: Rejection) -> Deed:
     return Deed(
         text=one.text, start=one.start, team=one.team or "", accepted=False, reason=one.reason, message=one.message
     )

@@ -85,15 +85,15 @@ def _with_life(head: Head, changed_s: float) -> Head:
 def _read_head(path: Path, size: int, changed_ns: int) -> Head:  # noqa: ARG001  # a changed file is another one
     summary = Summary.of(path)
     run = next((key.split("/")[1] for key in summary.keys.values() if key.endswith(f"/{Topic.RUN}")), None)
-    card = next(_decoded(Run, summary, run_key(run, Topic.RUN)), None) if run else None
-    results = tuple(_decoded(Result, summary, run_key(run, Topic.RESULT))) if run and summary.complete else ()
+    card = next(_decode(Run, summary, run_key(run, Topic.RUN)), None) if run else None
+    results = tuple(_decode(Result, summary, run_key(run, Topic.RESULT))) if run and summary.complete else ()
     reports = summary.counts.get(run_key(run, Topic.REPORT), 0) if run else 0
     sides = len({agent.side for agent in card.agents}) if card else 1
     began_s = summary.begun_ns / 1e9 or changed_ns / 1e9
     return Head(card, results, summary.complete, False, summary.size, began_s, reports // max(1, sides))
 
 
-def _decoded(kind: type[W], summary: Summary, key: str) -> Iterator[W]:
+def _decode(kind: type[W], summary: Summary, key: str) -> Iterator[W]:
     with contextlib.suppress(KhalaError):
         for payload in summary.payloads(key):
             yield decode_as(kind, payload)

@@ -36,7 +36,7 @@ def line_of(directory: Path) -> ExperimentLine:
         id=run_id(directory),
         name=experiment.name,
         description=experiment.description,
-        played=len(store.played()),
+        played=len(store.matches()),
         matches=planned(experiment),
     )
 
@@ -56,9 +56,9 @@ def _changed_ns(path: Path) -> int:
 
 @lru_cache(maxsize=8)
 def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> ExperimentView:  # noqa: ARG001  # as they were
-    store = Store.opened(directory)
+    store = Store.open(directory)
     made = report(store)
-    played = list(store.played().values())
+    played = list(store.matches().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
     recordings = [directory / one.recording for one in played if one.recording]
     line = line_of(directory)

@@ -28,7 +28,7 @@ def test_a_signal_before_the_match_is_known_ends_it_in_order(
         os.kill(os.getpid(), signal.SIGTERM)
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("khala.commands.run._played", imports)
+    monkeypatch.setattr("khala.commands.run._play", imports)
     with pytest.raises(typer.Exit) as ended:
         run(wanted("2s3z"), as_json=False)
     assert ended.value.exit_code == SIGNALLED + signal.SIGTERM

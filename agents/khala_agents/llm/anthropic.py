@@ -43,17 +43,15 @@ class Anthropic(HttpClient[_Answer]):
     def _body(self, request: Request) -> dict[str, Any]:
         system = "\n\n".join(message.content for message in request.messages if message.role == "system")
         marks = request.stable if CACHE_MARK not in self.quirks.left_out else 0
-        turns = [
-            {
-                "role": message.role,
-                "content": _cached(message.content) if place == marks - 1 else self._content(message, request.pictures),
-            }
-            for place, message in enumerate(request.messages)
-            if message.role != "system"
-        ]
+        turns: list[dict[str, Any]] = []
+        for place, message in enumerate(request.messages):
+            if message.role != "system":
+                is_marked = place == marks - 1
+                content = _cached_content(message.content) if is_marked else self._content(message, request.pictures)
+                turns.append({"role": message.role, "content": content})
         body: dict[str, Any] = {"model": self.model, **self._fields, "messages": turns}
         if system:
-            body["system"] = _cached(system) if marks else system
+            body["system"] = _cached_content(system) if marks else system
         return body
 
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
@@ -88,7 +86,7 @@ class Anthropic(HttpClient[_Answer]):
         )
 
 
-def _cached(text: str) -> list[dict[str, Any]]:
+def _cached_content(text: str) -> list[dict[str, Any]]:
     """Return the content of a message up to whose end a prompt is cached: the same in all requests of an episode."""
     return [{"type": "text", "text": text, CACHE_MARK: {"type": "ephemeral"}}]
 

@@ -160,10 +160,10 @@ class HttpEndpoint:
             self._urls[path] = httpx.URL(self.address + path + self._query)
         extensions = {} if delivery is None else {Delivery.EXTENSION: delivery}
         request = httpx.Request(method, self._urls[path], headers=self._headers, content=body, extensions=extensions)
-        answer = await self._connected().handle_async_request(request)
+        answer = await self._connect().handle_async_request(request)
         return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 
-    def _connected(self) -> httpx.AsyncBaseTransport:
+    def _connect(self) -> httpx.AsyncBaseTransport:
         if self._transport is None:
             from khala_agents.llm.transport import AiohttpTransport, SocksTransport  # noqa: PLC0415  # see above
 

@@ -104,7 +104,7 @@ class OpenAICompatible(HttpClient[_Answer]):
         return self.quirks.system_role or self._system_role
 
     def _body(self, request: Request) -> dict[str, Any]:
-        prompt = _folded(request.messages) if self._role == "fold" else request.messages
+        prompt = _fold(request.messages) if self._role == "fold" else request.messages
         messages = [
             {
                 "role": self._role if message.role == "system" else message.role,
@@ -144,7 +144,7 @@ class OpenAICompatible(HttpClient[_Answer]):
         )
 
 
-def _folded(messages: Sequence[ChatMessage]) -> Sequence[ChatMessage]:
+def _fold(messages: Sequence[ChatMessage]) -> Sequence[ChatMessage]:
     """Return messages with the system message in front of the first one of the user."""
     if not messages or messages[0].role != "system":
         return messages

@@ -159,9 +159,9 @@ def _units(seen: Observation | None) -> Iterator[UnitView]:
 
 def _names_type(text: str, word: str) -> bool:
     """Return True if a word is a type of unit, and the text names it, in one word or several, one or many."""
-    return word in knowledge() and _called(word).search(text) is not None
+    return word in knowledge() and _name_pattern(word).search(text) is not None
 
 
 @cache
-def _called(type_: str) -> re.Pattern[str]:
+def _name_pattern(type_: str) -> re.Pattern[str]:
     return re.compile(rf"\b{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ?', type_)}e?s?\b", re.IGNORECASE)

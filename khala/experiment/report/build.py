@@ -53,7 +53,7 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
         ConfigError: no match was played, or there is no such factor.
     """
     experiment = store.experiment()
-    known = store.played()
+    known = store.matches()
     if not known:
         raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
     played = list(known.values())

@@ -60,7 +60,7 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("maps", _values((card.get("map") for card in cards), _map)),
         ("opponents", _values(card.get("opponent") for card in cards)),
         ("clock", _values((card.get("clock") for card in cards), _clock)),
-        ("rhythm", f"{_values((card.get('task') or {}).get('rhythm') for card in cards)}; {_measured(rows)}"),
+        ("rhythm", f"{_values((card.get('task') or {}).get('rhythm') for card in cards)}; {_measured_rhythm(rows)}"),
         ("executor", _values(card.get("executor") for card in cards)),
         ("models as asked", _values(call.model for call in calls)),
         ("models as answered", _values(name for row in rows for name in row["models"].split("; "))),
@@ -70,11 +70,11 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("actions", _values((card.get("actions") for card in cards), _short)),
         ("tasks", _hashes(card.get("task") for card in cards)),
         ("code", _values((card.get("code") for card in cards), _short)),
-        ("versions", _values((card.get("versions") for card in cards), _listed)),
-        ("hardware", _values((card.get("hardware") for card in cards), _listed)),
+        ("versions", _values((card.get("versions") for card in cards), _pairs)),
+        ("hardware", _values((card.get("hardware") for card in cards), _pairs)),
         ("seeds", _seeds(done)),
-        ("human advice", _counted(rows, ("advice",))),
-        ("decisions not the agents' own", _counted(rows, ("undecided",))),
+        ("human advice", _count(rows, ("advice",))),
+        ("decisions not the agents' own", _count(rows, ("undecided",))),
         ("because of", _values(cause for row in rows for cause in row["undecided_because"].split("; "))),
     )  # fmt: skip
     return Table("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
@@ -131,7 +131,7 @@ def _short(sha256: str) -> str:
     return sha256[:HASH]
 
 
-def _listed(values: dict[str, Any]) -> str:
+def _pairs(values: dict[str, Any]) -> str:
     return ", ".join(f"{name} {value}" for name, value in values.items())
 
 
@@ -140,7 +140,7 @@ def _host(url: str) -> str:
     return urlsplit(url).hostname or url
 
 
-def _measured(rows: Sequence[Row]) -> str:
+def _measured_rhythm(rows: Sequence[Row]) -> str:
     """Return how often agents were asked, as it was."""
     games = [row for row in rows if row["steps"] and row["game_s"]]
     if not games:
@@ -161,6 +161,6 @@ def _seeds(done: Sequence[Played]) -> str:
     return f"{seeds[0]} to {seeds[-1]}" if whole else _values(map(str, seeds))
 
 
-def _counted(rows: Sequence[Row], names: Sequence[str]) -> str:
+def _count(rows: Sequence[Row], names: Sequence[str]) -> str:
     total = sum(row[name] for row in rows for name in names)
     return f"{total:,} in {sum(any(row[name] for name in names) for row in rows)} games" if total else "none"

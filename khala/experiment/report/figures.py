@@ -71,12 +71,12 @@ def figures(summaries: Sequence[Summary]) -> list[Figure]:
     """Return the pictures of cells that have games."""
     played = [summary for summary in summaries if summary.games]
     killed = [one for one in played if one.kd.value is not None]
-    wins = Figure("win_rate", WINS_CAPTION, partial(_drawn, played, _win_rate_axis, lambda one: one.won))
-    kd = Figure("kd", KD_CAPTION, partial(_drawn, killed, _kd_axis, lambda one: one.kd))
+    wins = Figure("win_rate", WINS_CAPTION, partial(_draw_figure, played, _win_rate_axis, lambda one: one.won))
+    kd = Figure("kd", KD_CAPTION, partial(_draw_figure, killed, _kd_axis, lambda one: one.kd))
     return [figure for figure, cells in ((wins, played), (kd, killed)) if cells]
 
 
-def _drawn(
+def _draw_figure(
     summaries: Sequence[Summary],
     axis: Callable[[Axes, Sequence[Interval]], tuple[float, float]],
     value: Callable[[Summary], Interval],

@@ -128,7 +128,7 @@ def _in_order(found: list[Cell], names: Sequence[str]) -> list[Cell]:
     return sorted(found, key=lambda cell: [seen[i].index(cell.where[name]) for i, name in enumerate(names)])
 
 
-def _decided(rows: Sequence[Row]) -> float | None:
+def _decided_share(rows: Sequence[Row]) -> float | None:
     asked = sum(row["decisions"] for row in rows)
     return 1 - sum(row["undecided"] for row in rows) / asked if asked else None
 
@@ -145,7 +145,7 @@ def summary(cell: Cell) -> Summary:
         games=games,
         won=statistics.wilson(wins, games),
         draws=sum(row["outcome"] == "draw" for row in rows),
-        decided=_decided(rows),
+        decided=_decided_share(rows),
         kd=statistics.ratio_of_sums([row["killed_value"] for row in rows], [row["lost_value"] for row in rows]),
         length_s=_median(rows, "game_s"),
         accepted=_mean(rows, "accepted"),

@@ -71,7 +71,7 @@ def contents(directory: Path) -> dict[str, bytes]:
 
 
 def test_other_users_may_read_nothing_that_commands_write(store: Store) -> None:
-    with store.locked():
+    with store.lock():
         pass
     assert run("export", store.directory, "--csv", store.directory / "x.csv") == 0
     assert run("index", store.directory) == 0
