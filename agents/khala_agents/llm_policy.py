@@ -27,7 +27,7 @@ from khala_agents.llm.client import (
     estimated_tokens,
 )
 from khala_agents.llm.limits import Limits
-from khala_agents.llm.retry import RetryRule, retried
+from khala_agents.llm.retry import RetryRule, with_retries
 from khala_agents.memory import Memory, NoMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
@@ -167,7 +167,7 @@ class LLMPolicy(Policy):
             LLMError: the last try failed; its error.
         """
         try:
-            completion = await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+            completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
         except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
             error.hopeless = isinstance(error, Unauthorized) or not self._answered
             raise

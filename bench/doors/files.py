@@ -553,13 +553,13 @@ async def _flood(_: Path) -> str:
         submit(f"flood-{number}", f"owner-{number}")
     if not submit("second", "ann"):
         return "an owner who was here before finds no place"
-    book.ended(book.of("running")[0], "done")
+    book.close_match(book.of("running")[0], "done")
     turns = []
     for _number in range(2):
         if (entry := book.next(0)) is not None:
             book.begin(entry)
             turns.append(entry.card.owner)
-            book.ended(entry, "done")
+            book.close_match(entry, "done")
     return "" if "ann" in turns else f"the turns were those of {turns}"
 
 

@@ -207,7 +207,7 @@ def _keys() -> Iterator[Finding]:
 def _network() -> Iterator[Finding]:
     from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only this check needs them
     from khala_agents.llm.address import checked_address  # noqa: PLC0415
-    from khala_agents.llm.network import proxy_for, trusted  # noqa: PLC0415
+    from khala_agents.llm.network import find_trust, proxy_for  # noqa: PLC0415
     from khala_protocol.errors import ConfigError  # noqa: PLC0415
 
     ways: dict[str, list[str]] = {}
@@ -227,7 +227,7 @@ def _network() -> Iterator[Finding]:
     if direct:
         yield Finding("no proxy", "ok", f"for {', '.join(direct)}")
     try:
-        trust = trusted()
+        trust = find_trust()
     except ConfigError as error:
         yield Finding("trusted certificates", "note", visible_line(str(error)), "name what is there, or unset it")
         return

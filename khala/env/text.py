@@ -19,7 +19,7 @@ from khala.env.onlooker import Onlooker
 from khala.env.rewards import battle
 from khala.playing.loop_thread import LoopThread
 from khala.playing.minds import Minds, minds_of
-from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, without_time_limit
 from khala_bridge.game.processes import IdleGames
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -82,11 +82,11 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         task = load_task(task) if isinstance(task, str) else task
         check_trusted(code_of(task), source=task.name)
         scenes = None if render_mode else "none"
-        self._task = unhurried(change(task, max_steps=max_cycles, scenes=scenes))
+        self._task = without_time_limit(change(task, max_steps=max_cycles, scenes=scenes))
         self._seats = _seats_by_name(self._task, agents)
         sides = [side.side for side in self._task.per_side()]
         trust_named(others)
-        self._minds = {} if others is None else minds_of(sides, Minds().named(others), {})
+        self._minds = {} if others is None else minds_of(sides, Minds().with_name(others), {})
         self._reward, self._game = reward, game
         self.render_mode = render_mode
         self.possible_agents = list(self._seats)

@@ -51,7 +51,7 @@ def resume(directory: Path, out: Path, options: dict[str, Any]) -> None:
 
 def list_shipped(*, as_json: bool) -> None:
     """List the shipped experiments."""
-    found = {name: load(path, Experiment) for name, path in shipped().items()}
+    found = {name: load(path, Experiment) for name, path in shipped_experiments().items()}
     if as_json:
         typer.echo(json.dumps({name: one.description for name, one in found.items()}))
         return
@@ -91,12 +91,12 @@ def path_of(file: str) -> Path:
     """
     if file.endswith((".yaml", ".yml")):
         return Path(file)
-    if file in (found := shipped()):
+    if file in (found := shipped_experiments()):
         return found[file]
     raise ConfigError(f"there is no experiment {file!r}: there are {', '.join(found)}; a .yaml file works too")
 
 
-def shipped() -> dict[str, Path]:
+def shipped_experiments() -> dict[str, Path]:
     """Return the shipped experiments by name."""
     return {path.stem: path for path in sorted((CONFIGS / SHIPPED).glob("*.yaml"))}
 

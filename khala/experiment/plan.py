@@ -210,7 +210,7 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     """
     common = Minds(base_url=settings.base_url, latency_s=settings.latency_s or 0.0, fallback=settings.fallback)
     if settings.model is not None:
-        common = replace(common.named(settings.model), base_url=settings.base_url)
+        common = replace(common.with_name(settings.model), base_url=settings.base_url)
     if settings.agents:
         common = replace(common, agents=settings.agents)
     return minds_of([side.side for side in task.per_side()], common, settings.sides or {})
@@ -219,7 +219,7 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
 def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
     said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
-    named = [mind, *(replace(mind, agents={}).named(text) for text in mind.agents.values())]
+    named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
     return said | {"files": [_model_file(one.model) for one in named if one.policy is None]}
 
 

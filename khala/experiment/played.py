@@ -45,7 +45,7 @@ def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | Non
     )  # fmt: skip
 
 
-def judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
+def judge(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
     """Return what became of a recorded match, without its cost.
 
     Args:

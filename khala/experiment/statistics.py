@@ -61,7 +61,7 @@ class Comparison:
 # data -----------------------------------------------------------------------------------------------------------------
 
 
-def matched(
+def common_values(
     a: Mapping[Key, float | None], b: Mapping[Key, float | None]
 ) -> tuple[list[float | None], list[float | None]]:
     """Return the values of keys, such as seeds, that both have, in the order of `a`."""

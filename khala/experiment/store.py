@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from khala import indexes
 from khala.experiment.index import CALLS, Row, add, connect, create, played_in, results_in, schema, take
 from khala.experiment.measures import measure_with_calls
-from khala.experiment.played import Played, judged
+from khala.experiment.played import Played, judge
 from khala.experiment.spec import Experiment
 from khala.playing.matches import free_recording, tries_in
 from khala.playing.spending import paid_usd
@@ -236,7 +236,7 @@ class Store:
             log.warning("%s has labels that no experiment gives: it is left out", path)
             return None
         rows = measure_with_calls(recording)
-        played = judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
+        played = judge(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
         is_priced = any(row.paid_usd is not None for row, _ in rows)
         cost_usd = sum(map(_paid_usd, tries_in(path.parent)))
         return replace(played, cost_usd=cost_usd if cost_usd or is_priced else None), rows

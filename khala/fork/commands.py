@@ -19,7 +19,7 @@ from khala.fork import scan as scans
 from khala.fork.figures import are_alike, outcomes, plain
 from khala.fork.futures import Plan, play_all
 from khala.fork.players import players_of
-from khala.fork.recorded import repeated
+from khala.fork.recorded import play_recorded
 from khala.playing.matches import newest_recording
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_orchestrator.past.fork import Trunk, trunk_of
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     T = TypeVar("T")
 
 
-def opened(path: Path, episode: int) -> Trunk:
+def open_trunk(path: Path, episode: int) -> Trunk:
     """Return an episode of a recording, or of the newest one in the directory of a run."""
     return trunk_of(newest_recording(path), episode)
 
 
-def planned(
+def make_plan(
     trunk: Trunk,
     out: Path | None,
     common: Minds | None,
@@ -59,7 +59,7 @@ def repeat(trunk: Trunk, step: int, game: str, *, as_json: bool) -> None:
     """Play the recorded future once more, and say whether it was the same."""
     trunk.check(step)
     with tempfile.TemporaryDirectory() as directory:
-        again = _until_interrupted(repeated(trunk, Path(directory), game=game), "nothing is left of it")
+        again = _until_interrupted(play_recorded(trunk, Path(directory), game=game), "nothing is left of it")
     if again.differences:
         raise RecordingError(
             f"the recorded future could not be repeated: {again.differences[0]}; is this the same version of Khala?"
@@ -89,7 +89,7 @@ def scan(
     steps = scans.steps_of(plan.trunk, every, advised=bool(plan.advice))
     forks = [fork for step in steps for fork in plan.forks(step, times)]
     futures = _play(plan, forks, jobs, budget_usd, game)
-    points = scans.ranked(plan.trunk, futures)
+    points = scans.rank(plan.trunk, futures)
     _print(
         {"steps": scans.plain_points(plan.trunk, points)} | _origin(plan.trunk), scans.table(points), as_json=as_json
     )

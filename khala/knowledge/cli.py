@@ -74,7 +74,7 @@ def write(
     if not check:
         for path in (path for one in versions for path in files.write(one)):
             say(f"wrote {path}")
-    elif old := [f"{one}/{name}" for one in versions for name in files.outdated(one)]:
+    elif old := [f"{one}/{name}" for one in versions for name in files.outdated_files(one)]:
         names = ", ".join(old)
         raise OutOfDate(
             f"out of date in bridge/khala_bridge/data/knowledge: {names}; `khala knowledge write` makes them"

@@ -150,7 +150,7 @@ class _SeatServer:
         if self._holder.brief() or briefing:
             text = f"{briefing_page(look.seen.briefing)}\n{text}"
         shown: list[str | Image] = [text]
-        for ref, picture in look.seen.arrived():
+        for ref, picture in look.seen.arrived_pictures():
             self._add(f"pictures/{ref.name}", ref.title, ref.media_type, partial(self._picture, ref.name))
             shown += [ref.title or ref.name, Image(data=picture, format=ref.media_type.removeprefix("image/"))]
         return shown
@@ -174,7 +174,7 @@ class _SeatServer:
         return self._newest().observation.text
 
     async def _picture(self, name: str) -> bytes:
-        for ref, picture in self._newest().arrived():
+        for ref, picture in self._newest().arrived_pictures():
             if ref.name == name:
                 return picture
         raise ResourceNotFoundError(f"the newest observation has no picture {name}")

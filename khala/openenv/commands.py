@@ -76,7 +76,7 @@ def settings_of(wanted: Wanted) -> Settings:
     load_task(wanted.task)
     trust_named(wanted.others, *wanted.allow)
     for name in {wanted.others, *wanted.allow}:
-        Minds().named(name).check()
+        Minds().with_name(name).check()
     rubric = Battle if wanted.rubric is None else rubric_of(wanted.rubric)
     return Settings(wanted.task, wanted.others, wanted.allow, rubric, wanted.game, wanted.out)
 

@@ -38,7 +38,7 @@ MAX_RESTARTS = 3
 """A game that dies more often in one run would die for ever, at the same decision."""
 
 
-async def hosted(
+async def host_match(
     config: MatchConfig,
     sc2path: Path,
     bus: Bus,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from khala.playing import games
 from khala.playing.children import Children, Spawn, spawn
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala.playing.local_bus import local_endpoint
 from khala.playing.minds import groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
@@ -109,7 +109,7 @@ async def play(
                 begun.set()
             watch(message)
 
-        match = hosted(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
+        match = host_match(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
         return await _unless_one_dies(match, children, begun)
 
 
@@ -127,7 +127,7 @@ async def play_hosted(
     async with contextlib.AsyncExitStack() as stack:
         session = await open_bus(bus)
         stack.push_async_callback(session.close)
-        return await hosted(config, sc2path, session, watch=watch, past=past)
+        return await host_match(config, sc2path, session, watch=watch, past=past)
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:

@@ -61,11 +61,11 @@ class Minds:
         said = {name: self.agents.get(name) for name in names}
         alone = replace(self, agents={})
         return [
-            (alone if text is None else alone.named(text), [name for name in names if said[name] == text])
+            (alone if text is None else alone.with_name(text), [name for name in names if said[name] == text])
             for text in dict.fromkeys(said.values())
         ]
 
-    def named(self, text: str) -> Minds:
+    def with_name(self, text: str) -> Minds:
         """Return minds with the model or the policy of this name; budget, latency and fallback stay.
 
         Args:
@@ -192,7 +192,7 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     if unknown := [side for side in named if side not in sides]:
         is_it = f"its sides are {' and '.join(sides)}" if len(sides) > 1 else f"its only side is {sides[0]}"
         raise ConfigError(f"the task has no side {unknown[0]}: {is_it}")
-    made = {side: common.named(named[side]) if side in named else common for side in sides}
+    made = {side: common.with_name(named[side]) if side in named else common for side in sides}
     return made if common.budget_usd is None else share_budget(made, common.budget_usd)
 
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from khala.playing import games
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala.playing.minds import groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
 from khala_agents.llm.limits import own_turns
@@ -78,7 +78,8 @@ async def play(
             for side, policies in by_side.items()
         ]
         try:
-            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, processes=processes, asks=asks)
+            session = broker.session()
+            match = host_match(config, sc2path, session, watch=watch, past=past, processes=processes, asks=asks)
             return await _unless_one_fails(asyncio.create_task(match), agents)
         finally:
             stop.set()

@@ -37,7 +37,17 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Briefing, ImageRef, Observation, Wire
 
-__all__ = ["CallerPolicy", "NotAsked", "Seat", "SeatedMatch", "Seen", "Turn", "seat_named", "seats_of", "unhurried"]
+__all__ = [
+    "CallerPolicy",
+    "NotAsked",
+    "Seat",
+    "SeatedMatch",
+    "Seen",
+    "Turn",
+    "seat_named",
+    "seats_of",
+    "without_time_limit",
+]
 
 
 class NotAsked(KhalaError):
@@ -59,7 +69,7 @@ class Seen:
     observation: Observation
     pictures: Sequence[bytes] = ()
 
-    def arrived(self) -> Iterator[tuple[ImageRef, bytes]]:
+    def arrived_pictures(self) -> Iterator[tuple[ImageRef, bytes]]:
         """Yield the pictures, each with what the observation says of it."""
         files = {hashlib.sha256(picture).hexdigest(): picture for picture in self.pictures}
         return ((ref, files[ref.sha256]) for ref in self.observation.images if ref.sha256 in files)
@@ -261,7 +271,7 @@ def seat_named(name: str, there_are: Sequence[Seat], *, source: str) -> Seat:
     raise ConfigError(f"{what}: give one of {', '.join(map(str, there_are))}", source=source)
 
 
-def unhurried(task: TaskConfig) -> TaskConfig:
+def without_time_limit(task: TaskConfig) -> TaskConfig:
     """Return the task without a limit of time for an answer."""
     return task.model_copy(update={"clock": task.clock.model_copy(update={"max_wait_s": None})})
 

@@ -161,7 +161,7 @@ class Book:
     def _party(self, owner: str) -> str:
         return owner if owner in self._turns else STRANGERS
 
-    def measured(self, entry: Entry, rss_mb: int) -> None:
+    def note_memory(self, entry: Entry, rss_mb: int) -> None:
         """Take what a match takes in memory."""
         self._largest_mb = max(self._largest_mb, rss_mb)
         entry.update(rss_mb=rss_mb)
@@ -187,7 +187,7 @@ class Book:
             entry.results = known
             entry.update(outcomes=tuple(known[place] for place in sorted(known)))
 
-    def ended(self, entry: Entry, state: MatchState, reason: str = "") -> None:
+    def close_match(self, entry: Entry, state: MatchState, reason: str = "") -> None:
         """Close a match; the oldest of those that are over are forgotten."""
         entry.update(state=state, reason=reason[:MAX_WORDS], rss_mb=0)
         refused = state == "refused"  # a flood of these must not push out what was played
@@ -203,12 +203,12 @@ class Book:
         """Return the matches in these states."""
         return [entry for entry in self._entries.values() if entry.card.state in states]
 
-    def listed(self) -> Matches:
+    def matches(self) -> Matches:
         """Return the list for all to read."""
         return Matches(matches=tuple(entry.card for entry in self._entries.values()), draining=self.draining)
 
     def _put(self, entry: Entry) -> Entry:
         self._entries[entry.card.number] = entry
         if entry.card.state not in OPEN:
-            self.ended(entry, entry.card.state, entry.card.reason)
+            self.close_match(entry, entry.card.state, entry.card.reason)
         return entry

@@ -49,7 +49,7 @@ def owner() -> str:
         return socket.gethostname()[:64]
 
 
-async def listed(bus: Bus, *, within_s: float = PATIENCE_S) -> Matches:
+async def list_matches(bus: Bus, *, within_s: float = PATIENCE_S) -> Matches:
     """Return the list of the service's matches.
 
     Raises:
@@ -82,7 +82,7 @@ async def stop(bus: Bus, order: Order, *, within_s: float = PATIENCE_S) -> Match
         ConfigError: there is no such match.
         NoService: there is no service.
     """
-    find(await listed(bus, within_s=within_s), order.run)
+    find(await list_matches(bus, within_s=within_s), order.run)
     return await _send_order(bus, order, lambda cards: _over(cards, order.run), within_s)
 
 

@@ -130,7 +130,7 @@ async def _listeners(
 
 def matches(connect: list[str] | None, *, tls: Path | None, insecure: bool, as_json: bool) -> None:
     """Print the matches of a service."""
-    found = ask(connect, tls, insecure, ("host", "observer"), client.listed)
+    found = ask(connect, tls, insecure, ("host", "observer"), client.list_matches)
     if as_json:
         typer.echo(json.dumps(found.model_dump(mode="json", exclude={"v", "run", "kind"})))
         return

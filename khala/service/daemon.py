@@ -110,7 +110,7 @@ class Service:
                 await asyncio.wait({ending, *tasks}, return_when=asyncio.FIRST_COMPLETED)
                 if ending.done():
                     await self._drain()
-                    await list_.put(encode(self.book.listed()))
+                    await list_.put(encode(self.book.matches()))
             finally:
                 ended = {ending, *tasks, *self._playing}
                 for task in ended:
@@ -210,7 +210,7 @@ class Service:
             await player.close()
 
     def _close(self, entry: Entry, state: MatchState, reason: str) -> None:
-        self.book.ended(entry, state, reason)
+        self.book.close_match(entry, state, reason)
         log.info("match %s%s", state, f": {reason}" if reason else "", extra={"run": entry.card.run})
         self._changed.set()
 
@@ -238,7 +238,7 @@ class Service:
         """Publish the list, some times a second, if it is another one."""
         last = b""
         while True:
-            if (now := encode(self.book.listed())) != last:
+            if (now := encode(self.book.matches())) != last:
                 await list_.put(now)
                 last = now
             await asyncio.sleep(LISTED_EVERY_S)
@@ -248,7 +248,7 @@ class Service:
         while True:
             for entry in self.book.of("running"):
                 if (player := self._players.get(entry.card.number)) is not None:
-                    self.book.measured(entry, self.measure(player.pid))
+                    self.book.note_memory(entry, self.measure(player.pid))
             used_mb = self.used_mb()
             if (large := self.book.too_large(used_mb)) is not None:
                 limit = self.limits.memory_mb

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from khala.playing import environment, games
 from khala.playing.local import Supplies, play
-from khala.playing.matches import resumed
+from khala.playing.matches import resume_match
 from khala.playing.minds import Minds  # noqa: TC001  # pydantic evaluates it
 from khala.playing.spare import Spares
 from khala.service import logs
@@ -63,7 +63,7 @@ class Job(Frozen):
         """Return the match, and what was played of it."""
         if not self.resume:
             return self.config, None
-        return resumed(self.directory, self.directory.parent, assemble_s=self.config.assemble_s)
+        return resume_match(self.directory, self.directory.parent, assemble_s=self.config.assemble_s)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -276,7 +276,7 @@ def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     return found
 
 
-def counted(kinds: Iterable[str]) -> str:
+def count_kinds(kinds: Iterable[str]) -> str:
     """Return what there is of several: `2 Stalkers, 1 Probe`."""
     return ", ".join(
         f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def listed(directories: Sequence[Path]) -> list[ExperimentLine]:
+def list_experiments(directories: Sequence[Path]) -> list[ExperimentLine]:
     """Return the lines of experiments; how many matches each plans is known until its file changes."""
     with contextlib.closing(cache()) as db:
         return [line for path in directories if (line := _experiment(path, db)) is not None]

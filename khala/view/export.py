@@ -132,7 +132,7 @@ def _answers(run: Opened, part: StepSelection, agents: Collection[str]) -> Itera
                 if (decision["side"], decision["agent"]) in wanted:
                     asked.add((decision["step"], decision["side"], decision["agent"]))
         for step, side, agent in sorted(asked):
-            yield f"{begin}/steps/{step}/agents/{side}/{agent}", run.asked(episode, step, side, agent)
+            yield f"{begin}/steps/{step}/agents/{side}/{agent}", run.texts(episode, step, side, agent)
     yield from _pictures(run, pictures)
 
 

@@ -90,7 +90,7 @@ class Moments:
             timings=reports[0].timings if reports else Timings(),
         )  # fmt: skip
 
-    def asked(self, episode: int, step: int, side: str, agent: str) -> Asked | None:
+    def texts(self, episode: int, step: int, side: str, agent: str) -> Asked | None:
         """Return the long texts of an agent's decision at a step, or of the last one before; None if there is none."""
         if (found := self._index.newest(Topic.OBSERVATION, episode, side, agent, step)) is None:
             return None

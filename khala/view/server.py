@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from aiohttp import WSMsgType, web
 from pydantic import ValidationError
 
-from khala.doors.pages import guarded
+from khala.doors.pages import guard
 from khala.view.guard import policy_of, welcoming
 from khala.view.runs import NotThere, Opened
 from khala.view.wire import MOST_SCENES, AdviceNote, Note
@@ -79,7 +79,7 @@ class Server:
 
     def application(self) -> web.Application:
         """Return the application."""
-        middlewares = [guarded(self._door), welcoming(self._door)]
+        middlewares = [guard(self._door), welcoming(self._door)]
         application = web.Application(middlewares=middlewares, client_max_size=self._door.most_body_bytes)
         episode, step = r"/api/runs/{run}/episodes/{episode:\d{1,9}}", r"/steps/{step:\d{1,9}}"
         application.add_routes([
@@ -152,7 +152,7 @@ class Server:
         episode = _number(request, "episode")
         step = _number(request, "step")
         side, agent = request.match_info["side"], request.match_info["agent"]
-        return await self._answer(request, lambda: opened.asked(episode, step, side, agent))
+        return await self._answer(request, lambda: opened.texts(episode, step, side, agent))
 
     async def _image(self, request: web.Request) -> web.Response:
         opened = await self._run(request)

@@ -45,7 +45,7 @@ class Sources:
         return Library(
             title=self.title,
             runs=tuple(library.lines(paths, self._directory or Path())),
-            experiments=tuple(experiments.listed(found.experiments)),
+            experiments=tuple(experiments.list_experiments(found.experiments)),
             opened=tuple(run_id(path) for path in self._first),
         )
 

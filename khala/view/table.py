@@ -9,7 +9,7 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from khala.experiment.report.build import planned, report
+from khala.experiment.report.build import count_planned, report
 from khala.experiment.store import FILE, INDEX, Store
 from khala.view.library import lines, run_id
 from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
@@ -37,7 +37,7 @@ def line_of(directory: Path) -> ExperimentLine:
         name=experiment.name,
         description=experiment.description,
         played=len(store.matches()),
-        matches=planned(experiment),
+        matches=count_planned(experiment),
     )
 
 

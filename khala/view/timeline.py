@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from pydantic_core import from_json
 
-from khala.view.digest import counted
+from khala.view.digest import count_kinds
 from khala.view.wire import Curve, CurveName, Mark, Timeline
 from khala_protocol.keys import Topic
 from khala_protocol.messages import LOOPS_PER_S
@@ -150,7 +150,7 @@ def _deaths(losses: Iterable[tuple[int, str, str, float, Point | None]]) -> Iter
         groups[step, side].append((kind, at))
     for (step, side), those in groups.items():
         at = _round(_middle([place for _, place in those if place is not None]))
-        text = f"{counted(kind for kind, _ in those)} died"
+        text = f"{count_kinds(kind for kind, _ in those)} died"
         yield Mark(step=step, kind="death", side=side, text=text, weight=len(those), at=at)
 
 

@@ -24,7 +24,7 @@ from khala.mcp.server import server_of
 from khala.mcp.table import Look, Table, with_messages
 from khala.mcp.words import page
 from khala.playing.minds import Minds
-from khala.playing.seats import Seat, unhurried
+from khala.playing.seats import Seat, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol import speech
@@ -42,9 +42,9 @@ STALKERS, ZEALOTS = Seat("blue", "Stalkers"), Seat("blue", "Zealots")
 def table(*seats: Seat, record: Path | None = None, episodes: int = 1, hurried: bool = False, **changes: Any) -> Table:
     task = change(load_task("2s3z_pair"), **changes)
     config = MatchConfig(
-        task=task if hurried else unhurried(task), run="mcp", episodes=episodes, record=record, assemble_s=20
+        task=task if hurried else without_time_limit(task), run="mcp", episodes=episodes, record=record, assemble_s=20
     )
-    return Table(config, seats, {"blue": Minds().named("silent")})
+    return Table(config, seats, {"blue": Minds().with_name("silent")})
 
 
 @contextlib.asynccontextmanager

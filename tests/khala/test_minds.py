@@ -40,7 +40,7 @@ COMMON = Minds(model="deepseek", model_name="chat", base_url="http://x/v1", fall
     ],
 )
 def test_a_side_is_given_a_model_its_name_or_a_policy(text: str, model: str, name: str | None, policy: str) -> None:
-    mind = COMMON.named(text)
+    mind = COMMON.with_name(text)
     assert (mind.model, mind.model_name, mind.policy) == (model, name, policy)
     assert mind.base_url is None  # it is that of --model
     assert mind.fallback == "silent"

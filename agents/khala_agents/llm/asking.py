@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import to_json
 
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
-from khala_agents.llm.faults import no_completion, unpacked, verdict_of
+from khala_agents.llm.faults import no_completion, verdict_of, without_byte_order_mark
 from khala_agents.llm.http import OK, HttpEndpoint
 from khala_agents.llm.quirks import LIMITS, REFUSALS, SystemRole, quirks_of
 from khala_agents.llm.verdict import AnswerParts, judge
@@ -171,7 +171,7 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
     def _read(self, answer: HttpAnswer) -> Completion:
         """Return the completion in an answer, or raise an `LLMError`."""
         try:
-            body = self.ANSWER.model_validate_json(unpacked(answer.body))
+            body = self.ANSWER.model_validate_json(without_byte_order_mark(answer.body))
         except ValidationError:
             raise no_completion(answer.url, answer.body, self.CALLED) from None
         parts = self._take_apart(body, answer.url)

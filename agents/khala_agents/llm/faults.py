@@ -81,7 +81,7 @@ class EndpointFault:
     message: str
 
 
-def unpacked(body: bytes) -> bytes:
+def without_byte_order_mark(body: bytes) -> bytes:
     """Return a body without the mark of byte order that some gateways put in front of JSON."""
     return body.removeprefix(_BOM)
 
@@ -89,7 +89,7 @@ def unpacked(body: bytes) -> bytes:
 def fault_in(body: bytes) -> EndpointFault | None:
     """Return what an error body in a known form says; None for any other body."""
     try:
-        said = from_json(unpacked(body))
+        said = from_json(without_byte_order_mark(body))
     except ValueError:
         return None
     if isinstance(said, list) and said:  # Gemini

@@ -23,7 +23,7 @@ from urllib.parse import urlencode
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.client import Delivery, LLMError, MalformedCompletion, RequestRefused, Unreachable
 from khala_agents.llm.faults import error_for
-from khala_agents.llm.network import Trust, proxy_for, trusted
+from khala_agents.llm.network import Trust, find_trust, proxy_for
 from khala_agents.secret import excerpt
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class HttpEndpoint:
     ) -> None:
         self.address = checked_address(base_url)
         self._proxy = proxy_for(self.address)
-        self._trust = trusted() if self.address.startswith("https:") else None
+        self._trust = find_trust() if self.address.startswith("https:") else None
         self._headers = {
             "Content-Type": "application/json",
             "Accept": "application/json",

@@ -104,13 +104,13 @@ def _place(experiment: Experiment, one: Summary) -> list[int]:
     ]
 
 
-def planned(experiment: Experiment) -> int:
+def count_planned(experiment: Experiment) -> int:
     """Return the number of matches of the whole grid."""
     return len(list(planned_cells(experiment))) * len(experiment.seeds) * experiment.repetitions
 
 
 def _missing(experiment: Experiment, played: int) -> list[str]:
-    count = planned(experiment)
+    count = count_planned(experiment)
     return [f"{count - played} of {count} matches were not played yet"] if played < count else []
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from khala_agents.llm.client import LimitExceeded
 from khala_agents.llm.money import Budget, Ledger
-from khala_agents.llm.pricing import Prices, check_priced, listed, price_of
+from khala_agents.llm.pricing import Prices, check_priced, list_prices, price_of
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def test_a_list_price_goes_by_the_models_own_name_at_its_providers_own_address(
 
 
 def test_all_list_prices_are_known_and_say_where_they_come_from() -> None:
-    for provider in listed().values():
+    for provider in list_prices().values():
         assert provider.source.startswith("https://")
         assert all(prices.known for prices in provider.models.values())
 
