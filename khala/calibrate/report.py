@@ -27,9 +27,9 @@ def write(a: Calibration, b: Calibration, found: Compared) -> str:
 def _head(a: Calibration, b: Calibration, found: Compared) -> Iterator[str]:
     yield "# Calibration: two games compared\n"
     yield "| | game | version | build | data | seed | platform | Khala |\n|---|---|---|---|---|---|---|---|"
-    for name, one in (("A", a), ("B", b)):
-        data = one.data_version[:8]
-        cells = (name, one.game, one.version, one.build, data, one.seed, one.platform, one.khala)
+    for name, file in (("A", a), ("B", b)):
+        data = file.data_version[:8]
+        cells = (name, file.game, file.version, file.build, data, file.seed, file.platform, file.khala)
         yield f"| {' | '.join(map(str, cells))} |"
     yield ""
     yield (
@@ -44,7 +44,7 @@ def _head(a: Calibration, b: Calibration, found: Compared) -> Iterator[str]:
 
 def _differences(found: Compared) -> Iterator[str]:
     about = {probe.id: probe for probe in PROBES}
-    for name, group in groupby(found.differences, key=lambda one: one.probe):
+    for name, group in groupby(found.differences, key=lambda difference: difference.probe):
         rows = list(group)
         yield f"\n## `{name}`: {len(rows)}\n"
         if name in about:
@@ -72,7 +72,7 @@ def _random(rows: list[Difference]) -> Iterator[str]:
 def _missing(found: Compared) -> Iterator[str]:
     if found.missing:
         yield "\n## Measured in one game only\n"
-    for probe, group in groupby(found.missing, key=lambda one: one.probe):
+    for probe, group in groupby(found.missing, key=lambda number: number.probe):
         rows = list(group)
         for which, of_a in (("A", True), ("B", False)):
             if names := [row.name for row in rows if row.only_in_a is of_a]:
@@ -86,7 +86,7 @@ def _estimates(found: Compared) -> Iterable[str]:
     concerned = [estimate for estimate in estimates() if estimate.probe in probes]
     if not concerned:
         return []
-    rows = [f"| `{one.probe}` | {one.where} | {one.what} |" for one in concerned]
+    rows = [f"| `{estimate.probe}` | {estimate.where} | {estimate.what} |" for estimate in concerned]
     return [
         "\n## Estimates of the simulator that these probes settle\n",
         "| probe | where | what |\n|---|---|---|",

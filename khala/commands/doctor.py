@@ -182,13 +182,20 @@ def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:
     return certificates
 
 
-def _certificate(one: Certificate) -> Finding:
-    state: State = "wrong" if one.has_expired else "note" if one.warning or one.is_open else "ok"
-    said = f"valid for {one.days_left} days, until {one.ends:%Y-%m-%d}"
-    if one.has_expired:
-        said = f"expired on {one.ends:%Y-%m-%d}"
-    advice = one.remedy if one.warning else f"chmod 600 {one.key}: others can read it" if one.is_open else ""
-    return Finding(f"certificate {one.name}", state, said, advice)
+def _certificate(certificate: Certificate) -> Finding:
+    state: State = "ok"
+    advice = ""
+    if certificate.is_open:
+        state = "note"
+        advice = f"chmod 600 {certificate.key}: others can read it"
+    if certificate.warning:
+        state = "note"
+        advice = certificate.remedy
+    said = f"valid for {certificate.days_left} days, until {certificate.ends:%Y-%m-%d}"
+    if certificate.has_expired:
+        state = "wrong"
+        said = f"expired on {certificate.ends:%Y-%m-%d}"
+    return Finding(f"certificate {certificate.name}", state, said, advice)
 
 
 def _keys() -> Iterator[Finding]:

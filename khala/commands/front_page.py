@@ -37,6 +37,7 @@ def print_page(group: TyperGroup, ctx: Any) -> None:
 
 def _options(group: TyperGroup, ctx: Any) -> Table:
     table = _table()
+    option: Any  # typer does not export its type
     for option in group.get_params(ctx):
         kind = Text(option.display_type_rich(ctx=ctx), style="bold yellow")
         kind.highlight_regex(r"^<|>$", "dim")
@@ -50,7 +51,7 @@ def _commands(group: TyperGroup) -> Table:
     table.add_column(style="bold cyan", no_wrap=True, width=max(map(len, group.commands)))
     table.add_column(ratio=1)
     for name, command in group.commands.items():
-        table.add_row(name, _mark(command.help.partition("\n\n")[0]))
+        table.add_row(name, _mark((command.help or "").partition("\n\n")[0]))
     return table
 
 
@@ -61,8 +62,8 @@ def _names(names: Sequence[str]) -> tuple[Text, Text]:
     return _mark(",".join(long)), _mark(",".join(short))
 
 
-def _mark(words: str) -> Text:
-    text = Text.from_markup(words)
+def _mark(words: str | None) -> Text:
+    text = Text.from_markup(words or "")
     for pattern, style in MARKS:
         text.highlight_regex(pattern, style)
     return text

@@ -254,7 +254,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         heard = (
             agent for report in self._turn.reports for agent in report.agents if Seat(agent.side, agent.agent) == seat
         )
-        reports = [one.but(latency_s=None) for one in heard]
+        reports = [report.but(latency_s=None) for report in heard]
         info: dict[str, Any] = {"asked": seat in self._turn.asked, "reports": reports}
         if seat in self._turn.asked:
             seen = self._turn.asked[seat]

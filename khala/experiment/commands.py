@@ -53,13 +53,13 @@ def list_shipped(*, as_json: bool) -> None:
     """List the shipped experiments."""
     found = {name: load(path, Experiment) for name, path in shipped_experiments().items()}
     if as_json:
-        typer.echo(json.dumps({name: one.description for name, one in found.items()}))
+        typer.echo(json.dumps({name: experiment.description for name, experiment in found.items()}))
         return
     table = Table(box=None, pad_edge=False)
     for column in ("experiment", "about"):
         table.add_column(column)
-    for name, one in found.items():
-        table.add_row(name, one.description)
+    for name, experiment in found.items():
+        table.add_row(name, experiment.description)
     stdout_console().print(table)
 
 
@@ -212,12 +212,12 @@ def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Sto
         row = rows.setdefault(tuple(match.cell.values()), dict(match.cell) | {"matches": 0, "done": 0, "invalid": 0,
                               "crashed": 0, "cost_usd": 0.0, "causes": []})  # fmt: skip
         row["matches"] += 1
-        if (one := played.get(match.key)) is not None:
-            row[one.state] += 1
-            row["cost_usd"] += one.cost_usd or 0.0
-            row["causes"] += [one.cause] if one.cause and one.cause not in row["causes"] else []
+        if (became := played.get(match.key)) is not None:
+            row[became.state] += 1
+            row["cost_usd"] += became.cost_usd or 0.0
+            row["causes"] += [became.cause] if became.cause and became.cause not in row["causes"] else []
     if as_json:
-        plain = [dataclasses.asdict(one) for one in played.values() if one.state != "done"]
+        plain = [dataclasses.asdict(match) for match in played.values() if match.state != "done"]
         typer.echo(json.dumps({"cells": list(rows.values()), "not_done": plain}, default=str))
         return
     table = Table(box=None, pad_edge=False, title=f"{experiment.name}: {len(matches)} matches")

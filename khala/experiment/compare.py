@@ -126,10 +126,10 @@ def _games(selection: Selection, others: tuple[str, ...]) -> dict[Group, dict[Se
     return dict(groups)
 
 
-def _ambiguous(selection: Selection, one: Row, other: Row) -> str:
-    name = next((name for name in selection.factors if factor(one, name) != factor(other, name)), "")
+def _ambiguous(selection: Selection, row: Row, other: Row) -> str:
+    name = next((name for name in selection.factors if factor(row, name) != factor(other, name)), "")
     again = f"name one value, as {_with(selection, name)}" if name else "their models or files differ"
-    return f"{selection.text} has two matches of task {one['task']} with seed {one['seed']}: {again}"
+    return f"{selection.text} has two matches of task {row['task']} with seed {row['seed']}: {again}"
 
 
 def _with(selection: Selection, name: str) -> str:
@@ -155,7 +155,7 @@ def _require_alike(
         matches_b = [b.matches[row["match"]] for row in games_b.values()]
         found |= dict.fromkeys(differences(matches_a, matches_b))
     if unlike := forbidden(found, allow):
-        names = sorted({one.field.partition(".")[0] for one in unlike})
+        names = sorted({difference.field.partition(".")[0] for difference in unlike})
         options = " ".join(f"--allow {name}" for name in names)
         words = "; ".join(map(str, unlike))
         raise ConfigError(f"{a.text} (A) and {b.text} (B) are not alike: {words}. {options} compares them nevertheless")
@@ -235,8 +235,8 @@ def _games_needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired
 
 
 def _with_holm(found: Sequence[Compared]) -> tuple[Compared, ...]:
-    p = statistics.holm([one.test.p if one.test else None for one in found])
-    return tuple(replace(one, p_holm=value) for one, value in zip(found, p, strict=True))
+    p = statistics.holm([comparison.test.p if comparison.test else None for comparison in found])
+    return tuple(replace(comparison, p_holm=value) for comparison, value in zip(found, p, strict=True))
 
 
 def _check(measure: str) -> None:
@@ -247,6 +247,6 @@ def _check(measure: str) -> None:
 
 def measures_that_compare() -> tuple[str, ...]:
     """Return the names that `compare` takes: wins, and every column of numbers."""
-    kinds: dict[str, Any] = {name: str(one.type) for name, one in Measures.__dataclass_fields__.items()}
+    kinds: dict[str, Any] = {name: str(field.type) for name, field in Measures.__dataclass_fields__.items()}
     numbers = [name for name, kind in kinds.items() if kind.startswith(("int", "float"))]
     return (WIN, *(name for name in numbers if name not in ("episode", "seed")))

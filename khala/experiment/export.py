@@ -61,7 +61,7 @@ def table(store: Store) -> tuple[Columns, list[dict[str, Any]]]:
 def _columns(factors: tuple[str, ...]) -> Columns:
     about: Columns = {"match": str, "state": str, "cause_of_state": str, "repetition": int}
     kinds = {kind.__name__: kind for kind in (str, int, float, bool)}
-    measures = {name: kinds[str(one.type).split(" | ")[0]] for name, one in Measures.__dataclass_fields__.items()}
+    measures = {name: kinds[str(field.type).split(" | ")[0]] for name, field in Measures.__dataclass_fields__.items()}
     return {**about, **{f"{FACTOR}{name}": str for name in factors}, **measures, "recording": str}
 
 

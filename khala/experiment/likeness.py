@@ -55,7 +55,9 @@ def forbidden(found: Iterable[Difference], allow: Collection[str]) -> list[Diffe
     for name in allow:
         if name.partition(".")[0] not in FIELDS:
             raise ConfigError(f"there is no field {name!r}: give one of {', '.join(FIELDS)}", source="--allow")
-    return [one for one in found if not any(f"{one.field}.".startswith(f"{name}.") for name in allow)]
+    return [
+        difference for difference in found if not any(f"{difference.field}.".startswith(f"{name}.") for name in allow)
+    ]
 
 
 def _realtime(cards: Iterable[dict[str, Any]]) -> bool:
@@ -70,7 +72,7 @@ def _in_field(name: str, a: list[dict[str, Any]], b: list[dict[str, Any]]) -> li
     flat_a, flat_b = ([_flat(name, value) for value in values] for values in (values_a, values_b))
     places = dict.fromkeys(place for flat in (*flat_a, *flat_b) for place in flat)
     found = [Difference(place, _at(flat_a, place), _at(flat_b, place)) for place in places]
-    return [one for one in found if len({*one.a, *one.b}) > 1]
+    return [difference for difference in found if len({*difference.a, *difference.b}) > 1]
 
 
 def _flat(name: str, value: Any) -> dict[str, str]:

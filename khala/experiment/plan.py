@@ -77,9 +77,9 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
     name = games.name_of(game)
     prepared = [_prepare(cell, settings, name) for cell, settings in grid]
     planned = [
-        one.match(experiment.name, seed, repetition)
+        cell.match(experiment.name, seed, repetition)
         for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
-        for one in prepared
+        for cell in prepared
     ]
     return list({match.key: match for match in planned}.values())
 
@@ -220,7 +220,7 @@ def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
     said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
     named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
-    return said | {"files": [_model_file(one.model) for one in named if one.policy is None]}
+    return said | {"files": [_model_file(mind.model) for mind in named if mind.policy is None]}
 
 
 def _model_file(name: str) -> Mapping[str, Any]:

@@ -260,9 +260,9 @@ def _minds_of(match: PlannedMatch) -> str:
 
 def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> list[float]:
     """Return a number of the matches of a cell, of all if none of them was played."""
-    known = [one for one in played if one.state == "done" and getattr(one, name) is not None]
-    same = [one for one in known if one.cell == cell]
-    return [getattr(one, name) for one in same or known]
+    known = [match for match in played if match.state == "done" and getattr(match, name) is not None]
+    same = [match for match in known if match.cell == cell]
+    return [getattr(match, name) for match in same or known]
 
 
 def missing(matches: Iterable[PlannedMatch], played: dict[str, Played]) -> Iterable[PlannedMatch]:

@@ -63,9 +63,9 @@ def select(text: str, out: Path) -> Selection:
     played = store.matches()
     factors = factors_of(played.values())
     where = _where(conditions, factors, text)
-    chosen = {key: one for key, one in played.items() if _fits(one.cell, where)}
+    chosen = {key: match for key, match in played.items() if _fits(match.cell, where)}
     _check_values(where, played.values(), text)
-    matches = {key: one for key, one in chosen.items() if one.state == "done"}
+    matches = {key: match for key, match in chosen.items() if match.state == "done"}
     rows = [row for row in store.results() if row["match"] in matches and row[SIDE] == where.get(SIDE, row[SIDE])]
     if not rows:
         raise ConfigError(f"{text} has no match that was played to its end and is valid: see `khala experiment status`")

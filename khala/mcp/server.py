@@ -123,7 +123,7 @@ class _SeatServer:
     ) -> str:
         """Read all that is known of a unit type, an upgrade or an ability: numbers, costs, what it is good against."""
         with _clear():
-            return "\n".join(long(one) for one in find(name))
+            return "\n".join(long(entry) for entry in find(name))
 
     @contextlib.contextmanager
     def _playing(self, ctx: Context[None]) -> Iterator[None]:

@@ -270,7 +270,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     def _observe(self) -> KhalaObservation:
         turn, before = self._turn, self._game_loop
-        reports = [one for one in turn.reports if one.side == self._state.side]
+        reports = [report for report in turn.reports if report.side == self._state.side]
         agents = [agent for report in reports for agent in report.agents if agent.agent in self._seats]
         results = [result for result in turn.results if result.side == self._state.side]
         loops = [seen.observation.game_loop for seen in turn.asked.values()] + [result.game_loop for result in results]

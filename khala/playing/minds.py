@@ -91,14 +91,14 @@ class Minds:
             return
         file = load_model(self.model)
         host = urlsplit(self.base_url or file.base_url).hostname or ""
-        shipped = {(one.api_key_env, urlsplit(one.base_url).hostname) for one in map(load_model, model_files())}
+        shipped = {(model.api_key_env, urlsplit(model.base_url).hostname) for model in map(load_model, model_files())}
         if file.api_key_env and (file.api_key_env, host) not in shipped:
             yield f"{file.api_key_env} to {host}"
 
     @property
     def asks_a_model(self) -> bool:
         """Whether any of its agents does, and so may spend money."""
-        return any(mind.policy is None for mind in (self, *map(self.named, self.agents.values())))
+        return any(mind.policy is None for mind in (self, *map(self.with_name, self.agents.values())))
 
     def check(self) -> None:
         """Check that an agent could decide this way, before anything is started.

@@ -106,7 +106,7 @@ def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in t
     models = tuple(dict.fromkeys(labels[name] for name in PLAYERS if name in labels))
     costs = [usage.cost_usd for result in results for usage in result.usage.values() if usage.cost_usd is not None]
     outcomes: dict[str, list[str]] = {}
-    for result in sorted(results, key=lambda one: one.episode):
+    for result in sorted(results, key=lambda result: result.episode):
         outcomes.setdefault(result.side, []).append(result.outcome)
     seconds = {result.episode: result.game_s for result in results}
     return RunLine(

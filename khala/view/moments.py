@@ -167,9 +167,9 @@ class Moments:
         )  # fmt: skip
         for (effect,) in rows:
             for report in self._reports(episode, effect):
-                for one in report.agents:
-                    if (one.side, one.agent) == (side, agent) and step in (one.asked_step, effect):
-                        return effect, one
+                for decided in report.agents:
+                    if (decided.side, decided.agent) == (side, agent) and step in (decided.asked_step, effect):
+                        return effect, decided
         return None, None
 
     def _reply(self, episode: int, step: int, side: str, agent: str) -> Reply | None:
@@ -180,8 +180,8 @@ class Moments:
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:
         samples = self._index.at(Topic.EXCHANGE, episode, step, step)
         mine = [sample for sample in samples if (sample.side, sample.agent) == (side, agent)]
-        for one in mine[:SLOWEST_CALLS]:
-            if (call := self._read(ModelCall, one)) is not None:
+        for found in mine[:SLOWEST_CALLS]:
+            if (call := self._read(ModelCall, found)) is not None:
                 yield call
 
     def _sent(self, episode: int, step: int | None, side: str, agent: str) -> Iterator[Letter]:
@@ -235,5 +235,5 @@ def _why(said: AgentReport | Reply | None) -> str:
     return ": ".join(filter(None, (said.detail, said.reason))) if said else ""
 
 
-def _letter(one: Any, step: int) -> Letter:
-    return Letter(sender=one.sender, recipient=one.recipient, text=one.text, step=step, again=one.again)
+def _letter(letter: Any, step: int) -> Letter:
+    return Letter(sender=letter.sender, recipient=letter.recipient, text=letter.text, step=step, again=letter.again)

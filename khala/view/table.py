@@ -60,7 +60,7 @@ def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> Experime
     made = report(store)
     played = list(store.matches().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
-    recordings = [directory / one.recording for one in played if one.recording]
+    recordings = [directory / match.recording for match in played if match.recording]
     line = line_of(directory)
     said = [words for words in made.document.paragraphs if words != line.description]
     return ExperimentView(
@@ -75,19 +75,19 @@ def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> Experime
 
 def _rows(table: Table, summaries: list[Summary], played: list[Played], directory: Path) -> Iterator[Row]:
     columns = table.columns[table.words :]
-    for texts, one in zip(table.rows, summaries, strict=True):
+    for texts, summary in zip(table.rows, summaries, strict=True):
         cells = zip(columns, texts[table.words :], strict=True)
-        mine = [match for match in played if match.recording and match.cell.items() <= one.where.items()]
+        mine = [match for match in played if match.recording and match.cell.items() <= summary.where.items()]
         yield Row(
             names=texts[: table.words],
-            games=one.games,
-            cells=tuple(_cell(column, text, one) for column, text in cells),
+            games=summary.games,
+            cells=tuple(_cell(column, text, summary) for column, text in cells),
             runs=tuple(run_id(directory / match.recording) for match in mine),
         )
 
 
-def _cell(column: str, text: str, one: Summary) -> Cell:
-    intervals: dict[str, Interval] = {"won": one.won, "K/D": one.kd}
+def _cell(column: str, text: str, summary: Summary) -> Cell:
+    intervals: dict[str, Interval] = {"won": summary.won, "K/D": summary.kd}
     if (interval := intervals.get(column)) is None or interval.value is None:
         return Cell(text=text)
     return Cell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))

@@ -58,9 +58,9 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
         raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
     played = list(known.values())
     rows = store.results()
-    done = {one.key for one in played if one.state == "done"}
+    done = {match.key for match in played if match.state == "done"}
     groups = cells(played, rows, by)
-    summaries = sorted((summary(cell) for cell in groups), key=lambda one: _place(experiment, one))
+    summaries = sorted((summary(cell) for cell in groups), key=lambda cell: _place(experiment, cell))
     compared = beside(experiment.published, summaries)
     sections = [
         Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
@@ -95,12 +95,12 @@ def _some(*tables: Any) -> tuple[Any, ...]:
     return tuple(table for table in tables if table is not None)
 
 
-def _place(experiment: Experiment, one: Summary) -> list[int]:
+def _place(experiment: Experiment, cell: Summary) -> list[int]:
     """Return the place of a cell in the grid: an index that was made again has matches in the order of their keys."""
     names = {factor: [level.name for level in levels] for factor, levels in experiment.factors.items()}
     return [
         names[factor].index(value) if value in names.get(factor, ()) else len(names.get(factor, ()))
-        for factor, value in one.where.items()
+        for factor, value in cell.where.items()
     ]
 
 
@@ -115,7 +115,7 @@ def _missing(experiment: Experiment, played: int) -> list[str]:
 
 
 def _count(experiment: Experiment, summaries: Sequence[Summary], factors: Sequence[str]) -> str:
-    games = sum(one.games for one in summaries)
-    costs = [one.usd * one.games for one in summaries if one.usd is not None]
+    games = sum(cell.games for cell in summaries)
+    costs = [cell.usd * cell.games for cell in summaries if cell.usd is not None]
     money = f" They cost {sum(costs):.2f} USD." if any(costs) else ""
     return f"{games} games in {len(summaries)} cells of {', '.join(factors)}; {len(experiment.seeds)} seeds.{money}"

@@ -70,9 +70,9 @@ class _Row:
 def figures(summaries: Sequence[Summary]) -> list[Figure]:
     """Return the pictures of cells that have games."""
     played = [summary for summary in summaries if summary.games]
-    killed = [one for one in played if one.kd.value is not None]
-    wins = Figure("win_rate", WINS_CAPTION, partial(_draw_figure, played, _win_rate_axis, lambda one: one.won))
-    kd = Figure("kd", KD_CAPTION, partial(_draw_figure, killed, _kd_axis, lambda one: one.kd))
+    killed = [summary for summary in played if summary.kd.value is not None]
+    wins = Figure("win_rate", WINS_CAPTION, partial(_draw_figure, played, _win_rate_axis, lambda summary: summary.won))
+    kd = Figure("kd", KD_CAPTION, partial(_draw_figure, killed, _kd_axis, lambda summary: summary.kd))
     return [figure for figure, cells in ((wins, played), (kd, killed)) if cells]
 
 
@@ -128,8 +128,8 @@ def _rows(summaries: Sequence[Summary], colours: list[str]) -> list[_Row]:
 
 
 def _draw(axes: Axes, row: _Row, value: Callable[[Summary], Interval], low: float, high: float, colours: int) -> None:
-    for number, one in row.dots:
-        interval = value(one)
+    for number, summary in row.dots:
+        interval = value(summary)
         y = row.y + (number - (colours - 1) / 2) * 0.42 if colours else row.y
         left = max(low, interval.low)
         right = min(high, interval.high)

@@ -40,13 +40,13 @@ KINDS = (
     Kind(
         "By cell",
         (
-            Column("games", lambda one: str(one.games), always=True),
-            Column("won", lambda one: share_with(one.won), always=True),
-            Column("draws", lambda one: str(one.draws or NONE)),
-            Column("decided", lambda one: _some_share(one.decided), always=True),
-            Column("K/D", lambda one: ratio_with(one.kd), always=True),
-            Column("length", lambda one: _clock(one.length_s)),
-            Column("not counted", lambda one: str(sum(one.not_counted.values()) or NONE)),
+            Column("games", lambda summary: str(summary.games), always=True),
+            Column("won", lambda summary: share_with(summary.won), always=True),
+            Column("draws", lambda summary: str(summary.draws or NONE)),
+            Column("decided", lambda summary: _some_share(summary.decided), always=True),
+            Column("K/D", lambda summary: ratio_with(summary.kd), always=True),
+            Column("length", lambda summary: _clock(summary.length_s)),
+            Column("not counted", lambda summary: str(sum(summary.not_counted.values()) or NONE)),
         ),
         "Won: share of games with its Wilson interval of 95 %; a draw is not won. Decided: share of decisions that "
         "agents made themselves, without fallbacks, failures, late, empty or refused answers. K/D: value killed in all "
@@ -55,22 +55,22 @@ KINDS = (
     Kind(
         "Actions",
         (
-            Column("accepted", lambda one: number(one.accepted)),
-            Column("refused", lambda one: number(one.refused)),
-            Column("input-conflicting", lambda one: _hundredth(one.hallucinations["input_conflicting"])),
-            Column("fact-conflicting", lambda one: _hundredth(one.hallucinations["fact_conflicting"])),
-            Column("context-conflicting", lambda one: _hundredth(one.hallucinations["context_conflicting"])),
+            Column("accepted", lambda summary: number(summary.accepted)),
+            Column("refused", lambda summary: number(summary.refused)),
+            Column("input-conflicting", lambda summary: _hundredth(summary.hallucinations["input_conflicting"])),
+            Column("fact-conflicting", lambda summary: _hundredth(summary.hallucinations["fact_conflicting"])),
+            Column("context-conflicting", lambda summary: _hundredth(summary.hallucinations["context_conflicting"])),
         ),
         "Accepted and refused: calls per game. The others: hallucinations of the paper's three kinds, per 100 calls.",
     ),
     Kind(
         "Decisions",
         (
-            *(Column(name, lambda one, name=name: _some_share(one.fates[name])) for name in FATES),  # type: ignore[misc]
-            Column("latency p50", lambda one: _seconds(one.latency_p50_s)),
-            Column("p95", lambda one: _seconds(one.latency_p95_s)),
-            Column("age p50", lambda one: _some(one.age_p50_loops)),
-            Column("age p95", lambda one: _some(one.age_p95_loops)),
+            *(Column(name, lambda summary, name=name: _some_share(summary.fates[name])) for name in FATES),  # type: ignore[misc]
+            Column("latency p50", lambda summary: _seconds(summary.latency_p50_s)),
+            Column("p95", lambda summary: _seconds(summary.latency_p95_s)),
+            Column("age p50", lambda summary: _some(summary.age_p50_loops)),
+            Column("age p95", lambda summary: _some(summary.age_p95_loops)),
         ),
         "What became of decisions, in shares. Latency: from observation to reply, in seconds of the wall; age: from "
         "observation to effect, in game loops; both are medians over games.",
@@ -78,21 +78,21 @@ KINDS = (
     Kind(
         "Tokens and money",
         (
-            Column("tokens a game", lambda one: _some(one.tokens)),
-            Column("USD a game", lambda one: _usd(one.usd)),
-            Column("USD a win", lambda one: _usd(one.usd_per_win)),
+            Column("tokens a game", lambda summary: _some(summary.tokens)),
+            Column("USD a game", lambda summary: _usd(summary.usd)),
+            Column("USD a win", lambda summary: _usd(summary.usd_per_win)),
         ),
         "Tokens: read and written. USD: of requests whose price is known; a win costs what all games cost / games won.",
     ),
     Kind(
         "Messages",
         (
-            Column("sent", lambda one: _some(one.messages["messages_sent"])),
-            Column("undeliverable", lambda one: _some(one.messages["messages_undeliverable"])),
-            Column("unfounded", lambda one: _some(one.messages["messages_unfounded"])),
-            Column("read", lambda one: _some(one.messages["messages_read"])),
-            Column("answered", lambda one: _some(one.messages["messages_answered"])),
-            Column("acted on", lambda one: _some(one.messages["messages_acted_on"])),
+            Column("sent", lambda summary: _some(summary.messages["messages_sent"])),
+            Column("undeliverable", lambda summary: _some(summary.messages["messages_undeliverable"])),
+            Column("unfounded", lambda summary: _some(summary.messages["messages_unfounded"])),
+            Column("read", lambda summary: _some(summary.messages["messages_read"])),
+            Column("answered", lambda summary: _some(summary.messages["messages_answered"])),
+            Column("acted on", lambda summary: _some(summary.messages["messages_acted_on"])),
         ),
         "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted "
         "on: the reader gave a new order that names what the message names.",
@@ -100,10 +100,10 @@ KINDS = (
     Kind(
         "Economy",
         (
-            Column("supply blocked", lambda one: _seconds(one.supply_blocked_s)),
-            Column("minerals unspent", lambda one: number(one.minerals)),
-            Column("vespene unspent", lambda one: number(one.vespene)),
-            Column("first expansion", lambda one: _expansion(one.expansion_s, one.expanded, one.games)),
+            Column("supply blocked", lambda summary: _seconds(summary.supply_blocked_s)),
+            Column("minerals unspent", lambda summary: number(summary.minerals)),
+            Column("vespene unspent", lambda summary: number(summary.vespene)),
+            Column("first expansion", lambda summary: _expansion(summary.expansion_s, summary.expanded, summary.games)),
         ),
         "Supply blocked: seconds per game. Unspent: mean over time. First expansion: median of the games that had one, "
         "in minutes of the game.",
@@ -122,7 +122,7 @@ def _table(kind: Kind, summaries: Sequence[Summary]) -> Table | None:
     if not shown or not summaries:
         return None
     factors = tuple(summaries[0].where)
-    rows = [(*one.where.values(), *(texts[column][i] for column in shown)) for i, one in enumerate(summaries)]
+    rows = [(*summary.where.values(), *(texts[column][i] for column in shown)) for i, summary in enumerate(summaries)]
     return Table(kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note)
 
 
@@ -133,8 +133,8 @@ def overview(summaries: Sequence[Summary]) -> Table | None:
     *first, last = summaries[0].where
     values = list(dict.fromkeys(summary.where[last] for summary in summaries))
     rows: dict[tuple[str, ...], dict[str, Summary]] = {}
-    for one in summaries:
-        rows.setdefault(tuple(one.where[name] for name in first), {})[one.where[last]] = one
+    for summary in summaries:
+        rows.setdefault(tuple(summary.where[name] for name in first), {})[summary.where[last]] = summary
     if not 2 <= len(values) <= MOST_COLUMNS:
         return None
     columns = (*first, *(f"{value}: {what}" for value in values for what in ("won", "K/D")))
@@ -163,33 +163,33 @@ def not_counted(summaries: Sequence[Summary]) -> Table | None:
 
 def beside(published: Sequence[Published], summaries: Sequence[Summary]) -> Table | None:
     """Return published numbers beside ours; None if none was published."""
-    rows = [_row(one, ours) for one in published for ours in _matching(one, summaries)]
+    rows = [_row(result, ours) for result in published for ours in _matching(result, summaries)]
     columns = ("published of", "source", "ours", "won there", "won here", "K/D there", "K/D here", "games here")
     return Table("Beside what was published", columns, tuple(rows), 3) if rows else None
 
 
-def _matching(one: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
+def _matching(result: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
     """Return the cells that a published number belongs to; `model` may be one that was not played."""
     ours = [other for other in summaries if all(other.where.get(name, value) == value or name == "model"
-            for name, value in one.where.items()) and _names_a_factor(one, other)]  # fmt: skip
-    exact = [other for other in ours if other.where.get("model") == one.where.get("model")]
+            for name, value in result.where.items()) and _names_a_factor(result, other)]  # fmt: skip
+    exact = [other for other in ours if other.where.get("model") == result.where.get("model")]
     return list(exact or ours) or [None]
 
 
-def _names_a_factor(one: Published, summary: Summary) -> bool:
-    return any(name in summary.where for name in one.where)
+def _names_a_factor(result: Published, summary: Summary) -> bool:
+    return any(name in summary.where for name in result.where)
 
 
-def _row(one: Published, ours: Summary | None) -> tuple[str, ...]:
-    there = (", ".join(one.where.values()), one.source)
+def _row(result: Published, ours: Summary | None) -> tuple[str, ...]:
+    there = (", ".join(result.where.values()), result.source)
     if ours is None:
-        return (*there, "not played", share(one.win_rate), NONE, ratio(one.kd), NONE, NONE)
-    rates = (share(one.win_rate), share_with(ours.won), ratio(one.kd), ratio_with(ours.kd))
+        return (*there, "not played", share(result.win_rate), NONE, ratio(result.kd), NONE, NONE)
+    rates = (share(result.win_rate), share_with(ours.won), ratio(result.kd), ratio_with(ours.kd))
     return (*there, ", ".join(ours.where.values()), *rates, str(ours.games))
 
 
-def _won_and_kd(one: Summary | None) -> tuple[str, str]:
-    return (share_with(one.won), ratio(one.kd.value)) if one is not None else (NONE, NONE)
+def _won_and_kd(summary: Summary | None) -> tuple[str, str]:
+    return (share_with(summary.won), ratio(summary.kd.value)) if summary is not None else (NONE, NONE)
 
 
 def _clock(seconds: float | None) -> str:

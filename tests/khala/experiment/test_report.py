@@ -13,9 +13,6 @@ from typer.testing import CliRunner
 from khala.cli import app
 from khala.experiment.plan import plan
 from khala.experiment.report import FORMATS, report, write
-from khala.experiment.report import html as as_html
-from khala.experiment.report import latex as as_latex
-from khala.experiment.report import markdown as as_markdown
 from khala.experiment.report.calls import calls
 from khala.experiment.report.document import Document, Section, Table
 from khala_protocol.errors import ConfigError
@@ -225,7 +222,7 @@ def hostile(made: HandMade) -> Document:
 
 
 def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
-    text = as_html.text(hostile)
+    text = FORMATS["html"].text(hostile)
     page = Page()
     page.feed(text)
     page.close()
@@ -240,7 +237,7 @@ def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
 
 
 def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
-    text = as_latex.text(hostile)
+    text = FORMATS["latex"].text(hostile)
     bare = re.sub(r"\\[\\{}$&#_%]", "", text)
     assert bare.count("{") == bare.count("}")
     assert bare.count("$") % 2 == 0
@@ -257,7 +254,7 @@ def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
 
 
 def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> None:
-    text = as_markdown.text(hostile)
+    text = FORMATS["markdown"].text(hostile)
     tables = [part for part in text.split("\n\n") if part.startswith("|")]
     widths = [{len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()} for table in tables]
     assert len(widths) > 3
@@ -267,7 +264,7 @@ def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> Non
 
 def test_documents_are_plain_until_a_format_writes_them() -> None:
     document = Document("a_b", (), ("50 % & more",), (Section("c", tables=(Table("t", ("x",), (("<1",),), 1),)),))
-    texts = [one.text(document) for one in FORMATS.values()]
+    texts = [writer.text(document) for writer in FORMATS.values()]
     escaped = (("a\\_b", "50 % \\& more", "\\<1"), (r"a\_b", r"50 \% \& more", r"\textless{}1"),
                ("a_b", "50 % &amp; more", "&lt;1"))  # fmt: skip
     for text, words in zip(texts, escaped, strict=True):
@@ -281,7 +278,7 @@ def test_pictures_stand_beside_markdown_and_latex_and_are_the_same_each_time(mad
         "report.md", "report.tex", "report.html", "win_rate.png", "kd.png", "win_rate.pdf", "kd.pdf",
     ]  # fmt: skip
     assert (tmp_path / "out" / "kd.png").read_bytes().startswith(b"\x89PNG")
-    assert as_html.text(document) == as_html.text(report(made.store).document)
+    assert FORMATS["html"].text(document) == FORMATS["html"].text(report(made.store).document)
 
 
 def test_the_command_writes_the_formats_and_prints_numbers(made: HandMade, tmp_path: Path) -> None:
