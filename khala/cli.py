@@ -101,10 +101,10 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.commands.run import Wanted  # noqa: PLC0415  # see there
+    from khala.commands.run import WantedRun  # noqa: PLC0415  # see there
     from khala.commands.run import run as play  # noqa: PLC0415
 
-    play(Wanted(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
+    play(WantedRun(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
 
 
 @with_options

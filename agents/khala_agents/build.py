@@ -18,8 +18,8 @@ from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
-from khala_agents.llm.limits import LONGEST_ANSWER, Limits, own_turns
-from khala_agents.llm.money import Budget
+from khala_agents.llm.limits import LONGEST_ANSWER, RequestLimits, own_turns
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices, check_priced, price_of
 from khala_agents.llm.profiles import PROFILES
@@ -29,7 +29,7 @@ from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Policy, as_policy
 from khala_agents.scripted.players import PLAYERS
-from khala_agents.scripted.policies import Player, Silent
+from khala_agents.scripted.policies import ScriptedPlayer, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import import_trusted
@@ -103,14 +103,14 @@ class Workshop:
     def __init__(
         self,
         *,
-        budget: Budget | None = None,
+        budget: SharedBudget | None = None,
         overrides: Mapping[str, str | float | None] | None = None,
         gates: Gates = own_turns,
     ) -> None:
-        self._budget = budget or Budget(None)
+        self._budget = budget or SharedBudget(None)
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._gates = gates
-        self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+        self._models: dict[str, tuple[ModelConfig, RequestLimits]] = {}
         self._breakers: dict[str, Breaker] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
@@ -135,7 +135,7 @@ class Workshop:
         )
         return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model
 
-    def _model(self, name: str) -> tuple[ModelConfig, Limits]:
+    def _model(self, name: str) -> tuple[ModelConfig, RequestLimits]:
         if name not in self._models:
             file = load_model(name)
             config = _change(_with_address(file), self._overrides, source="command line")
@@ -143,7 +143,7 @@ class Workshop:
             if self._budget.limit_usd is not None:
                 check_priced(config.prices, config.model, config.base_url)
                 config = config.model_copy(update={"max_tokens": config.max_tokens or LONGEST_ANSWER})
-            limits = Limits(
+            limits = RequestLimits(
                 gate=self._gates(f"{config.model} at {config.base_url}", config.limits, f"model file {name}"),
                 prices=config.prices,
                 budget=self._budget,
@@ -208,7 +208,7 @@ def load_policy(name: str) -> Policy:
     if name == "silent":
         return Silent()
     if name in PLAYERS:
-        return Player(name)
+        return ScriptedPlayer(name)
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
         raise ConfigError(f"'{name}' is not a policy: write {', '.join(PLAYERS)} or module:name, as my_agent:decide")

@@ -26,14 +26,14 @@ from khala_agents.llm.client import (
     estimated_image_tokens,
     estimated_tokens,
 )
-from khala_agents.llm.limits import Limits
+from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule, with_retries
-from khala_agents.memory import Memory, NoMemory, memory_of
+from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
 from khala_agents.prompt import Prompt
 from khala_agents.secret import excerpt
-from khala_agents.summary import Summary
+from khala_agents.summary import GameSummary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
 
 if TYPE_CHECKING:
@@ -71,9 +71,9 @@ class LLMPolicy(Policy):
         self,
         client: LLMClient,
         *,
-        memory: Memory | MemoryRule | None = None,
+        memory: PromptMemory | MemoryRule | None = None,
         retry: RetryRule | None = None,
-        limits: Limits | None = None,
+        limits: RequestLimits | None = None,
         breaker: Breaker | None = None,
         try_timeout_s: float = 45.0,
         vision: Vision | None = None,
@@ -81,7 +81,7 @@ class LLMPolicy(Policy):
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
-        self.limits = limits or Limits()
+        self.limits = limits or RequestLimits()
         self.breaker = breaker or Breaker(client.endpoint)
         self.try_timeout_s = try_timeout_s
         self.vision = vision
@@ -91,8 +91,8 @@ class LLMPolicy(Policy):
         self._answered = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
-        self._memory: Memory = self._own_memory or NoMemory()
-        self._summary = Summary(0)
+        self._memory: PromptMemory = self._own_memory or NoMemory()
+        self._summary = GameSummary(0)
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
         self._prompt: tuple[Briefing, Prompt] | None = None
@@ -207,7 +207,7 @@ class LLMPolicy(Policy):
         rule = self._rule or briefing.memory
         self._memory = self._own_memory or memory_of(rule)
         self._memory.clear()
-        self._summary = Summary(0 if self._own_memory else rule.summary)
+        self._summary = GameSummary(0 if self._own_memory else rule.summary)
         for observation, reply in self._before:
             if observation.episode == briefing.episode:
                 self._summary.begin_decision(observation)

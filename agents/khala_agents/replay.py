@@ -152,11 +152,11 @@ class _Stage:
             await self._observations.put(encode(part.observation))
             async with asyncio.timeout(PATIENCE_S):
                 reply = decode_as(Reply, (await anext(self._replies)).payload)
-            recorded, sent = _words(part.reply), _words(reply)
+            recorded, sent = _content(part.reply), _content(reply)
             if recorded != sent:
                 yield Difference(reply.agent, reply.episode, reply.step, "reply", recorded, sent)
 
 
-def _words(reply: Reply) -> str:
+def _content(reply: Reply) -> str:
     """Return the words of a reply, without its times."""
     return reply.model_dump_json(exclude={"latency_s", "usage"})

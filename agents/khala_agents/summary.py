@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala_agents.memory import Step, end_step, minutes
+from khala_agents.memory import StepInShort, end_step, minutes
 
 if TYPE_CHECKING:
     from khala_protocol.messages import ModelCall, Observation
@@ -42,7 +42,7 @@ class _Request:
     answer: str | None = None
 
 
-class Summary:
+class GameSummary:
     """The summary of one agent's episode.
 
     Args:
@@ -55,7 +55,7 @@ class Summary:
         self._until_s = 0.0
         self._decided = 0
         self._asked = 0
-        self._steps: deque[Step] = deque(maxlen=MOST_AT_ONCE * every)
+        self._steps: deque[StepInShort] = deque(maxlen=MOST_AT_ONCE * every)
         self._request: _Request | None = None
 
     @property
@@ -84,7 +84,7 @@ class Summary:
         """Take in a step that was answered."""
         if self._every:
             self._decided += 1
-            self._steps.append(Step.of(observation, reply))
+            self._steps.append(StepInShort.of(observation, reply))
 
     @property
     def is_due(self) -> bool:

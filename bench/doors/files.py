@@ -19,9 +19,9 @@ from unittest import mock
 
 from bench.doors.rows import Row, Skipped
 from khala.dataset.card import Recipe
-from khala.dataset.choose import Choice, Split
+from khala.dataset.choose import RowChoice, Split
 from khala.dataset.export import export
-from khala.dataset.files import Form
+from khala.dataset.files import RowForm
 from khala.experiment import commands, results
 from khala.experiment.store import INDEX, MATCHES, Store
 from khala.playing.matches import new, newest_recording
@@ -317,7 +317,7 @@ async def _half_data_set(directory: Path) -> str:
 
 
 def _data_set(directory: Path) -> None:
-    recipe = Recipe((Form.OPENAI,), Choice(), Split.of("1", "seed"), 1.0, False)
+    recipe = Recipe((RowForm.OPENAI,), RowChoice(), Split.of("1", "seed"), 1.0, False)
     export([directory / "a.mcap"], directory / "set", recipe)
 
 

@@ -25,7 +25,7 @@ MOST_COMPARISONS: Final = int(LEVEL * (RESAMPLES + 1) / 2)
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class NumberDifference:
     """One measurement in which two games differ."""
 
     probe: str
@@ -49,7 +49,7 @@ class Missing:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class CalibrationComparison:
     """What a comparison found."""
 
     exact: int
@@ -58,16 +58,16 @@ class Compared:
     """Measurements of which the means were compared."""
     unused: int
     """Random ones with too few samples on a side."""
-    differences: tuple[Difference, ...]
+    differences: tuple[NumberDifference, ...]
     missing: tuple[Missing, ...]
     not_compared: dict[str, str]
     """Probes that failed, or that a file does not have, with the reason."""
 
 
-def compare(a: Calibration, b: Calibration) -> Compared:
+def compare(a: Calibration, b: Calibration) -> CalibrationComparison:
     """Compare two calibrations; differences are in the order of the probes of `a`."""
-    found: list[Difference] = []
-    random: list[Difference] = []
+    found: list[NumberDifference] = []
+    random: list[NumberDifference] = []
     missing: list[Missing] = []
     exact = unused = 0
     both = {name: (probe, b.probes[name]) for name, probe in a.probes.items() if name in b.probes}
@@ -75,7 +75,7 @@ def compare(a: Calibration, b: Calibration) -> Compared:
     for probe, (first, other) in fit.items():
         missing += _missing(probe, first, other)
         for name in first.values.keys() & other.values.keys():
-            difference = Difference(probe, name, first.unit, first.values[name], other.values[name])
+            difference = NumberDifference(probe, name, first.unit, first.values[name], other.values[name])
             if first.exact:
                 exact += 1
                 if abs(difference.a.mean - difference.b.mean) > max(first.resolution, 1e-6):
@@ -86,7 +86,7 @@ def compare(a: Calibration, b: Calibration) -> Compared:
                 random.append(difference)
     found += _beyond_chance(random)
     order = {name: rank for rank, name in enumerate(a.probes)}
-    return Compared(
+    return CalibrationComparison(
         exact=exact,
         random=len(random),
         unused=unused,
@@ -96,7 +96,7 @@ def compare(a: Calibration, b: Calibration) -> Compared:
     )
 
 
-def _beyond_chance(random: list[Difference]) -> Iterator[Difference]:
+def _beyond_chance(random: list[NumberDifference]) -> Iterator[NumberDifference]:
     p_values = holm([p_of_values(difference.b.samples, difference.a.samples) for difference in random])
     for difference, p in zip(random, p_values, strict=True):
         if p is not None and p <= LEVEL:

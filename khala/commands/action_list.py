@@ -64,7 +64,7 @@ def print_actions(
         console.print(_groups(known))
         console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them")
     else:
-        for line in _lines(found, console.width) if found else [_none(wanted)]:
+        for line in _lines(found, console.width) if found else [_why_none(wanted)]:
             console.print(line, soft_wrap=True)
 
 
@@ -90,7 +90,7 @@ def _function(given: str | None) -> str | None:
     return given
 
 
-def _none(function: str | None) -> str:
+def _why_none(function: str | None) -> str:
     reasons = {each.function.name: each.reason for each in coverage()}
     return f"no action ends in {function}: {reasons[function]}" if function and reasons[function] else "no action fits"
 
@@ -130,14 +130,14 @@ def _block(action: Action, width: int) -> Iterator[Text]:
         yield Text(INDENT + example(action))
     yield from map(Text, _wrap(action.about, width))
     aliases = f"; also {', '.join(action.aliases)}" if action.aliases else ""
-    yield from (Text(line, style="dim") for line in _wrap(_who(action) + aliases, width))
+    yield from (Text(line, style="dim") for line in _wrap(_users(action) + aliases, width))
 
 
 def _wrap(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=INDENT, subsequent_indent=INDENT, break_long_words=False)
 
 
-def _who(action: Action) -> str:
+def _users(action: Action) -> str:
     shown = ", ".join(action.units[:MANY]) + (f" and {more} more" if (more := len(action.units) - MANY) > 0 else "")
     subject = {
         "team": "a whole team",

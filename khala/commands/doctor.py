@@ -117,12 +117,15 @@ def _game_process(source: str) -> Callable[[], Iterator[Finding]]:
             yield Finding("game process", "wrong", str(error), "docs/how-to/real-game.md says what it needs")
             return
         yield Finding("game process", "ok", f"{name} {found.version}, build {found.build}, answers")
-        yield Finding("maps that load", "ok" if found.loaded else "wrong", _some(found.loaded), "")
+        yield Finding("maps that load", "ok" if found.loaded else "wrong", _first_names(found.loaded), "")
         for map_name, why in found.refused.items():
             yield Finding(f"map {map_name}", "note", why, "tasks on this map cannot be played with this game")
         if found.absent:
             yield Finding(
-                "maps not there", "note", _some(found.absent), "put them below Maps; docs/reference/maps.md lists all"
+                "maps not there",
+                "note",
+                _first_names(found.absent),
+                "put them below Maps; docs/reference/maps.md lists all",
             )
         advice = "" if found.renders else "pictures come from feature layers; a game without a graphics card draws none"
         yield Finding("rendering", "ok" if found.renders else "note", found.rendering, advice)
@@ -130,7 +133,7 @@ def _game_process(source: str) -> Callable[[], Iterator[Finding]]:
     return check
 
 
-def _some(names: Sequence[str]) -> str:
+def _first_names(names: Sequence[str]) -> str:
     more = f" and {len(names) - 8} more" if len(names) > 8 else ""
     return f"{len(names)}: {', '.join(names[:8])}{more}" if names else "none"
 

@@ -19,7 +19,7 @@ from khala.env.onlooker import Onlooker
 from khala.env.rewards import battle
 from khala.playing.loop_thread import LoopThread
 from khala.playing.minds import Minds, minds_of
-from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, without_time_limit
+from khala.playing.seats import Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 from khala_bridge.game.processes import IdleGames
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -102,7 +102,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         self._games = IdleGames()
         self._match: SeatedMatch | None = None
         self._onlooker: Onlooker | None = None
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._texts: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
             self._enter(secrets.randbelow(_MOST_SEED) if seed is None else seed)
         self.agents = list(self.possible_agents)
         self._texts = dict.fromkeys(self.possible_agents, "")
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._turn = self._next({})
         return self._seen(), self._infos({})
 
@@ -222,11 +222,11 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
                 self._thread.run(self._onlooker.close())
         self._match = None
 
-    def _next(self, actions: Mapping[str, str]) -> Turn:
+    def _next(self, actions: Mapping[str, str]) -> SeatsTurn:
         assert self._match is not None and self._thread is not None
         return self._thread.run(self._answer(self._match, actions))
 
-    async def _answer(self, match: SeatedMatch, actions: Mapping[str, str]) -> Turn:
+    async def _answer(self, match: SeatedMatch, actions: Mapping[str, str]) -> SeatsTurn:
         for agent, seat in self._seats.items():
             if seat in self._turn.asked:
                 match.act(seat, actions.get(agent, ""))

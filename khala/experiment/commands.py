@@ -30,8 +30,8 @@ from khala_protocol.signals import cancelled_by_signal
 if TYPE_CHECKING:
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
-    from khala.experiment.runner import Estimate, Runner
-    from khala.experiment.spec import Budget
+    from khala.experiment.runner import CostEstimate, Runner
+    from khala.experiment.spec import ExperimentBudget
 
 SHIPPED = "experiments"
 
@@ -141,7 +141,7 @@ async def _until_done(
     return runner
 
 
-def _budget(experiment: Experiment, usd: float | None) -> Budget:
+def _budget(experiment: Experiment, usd: float | None) -> ExperimentBudget:
     return experiment.budget if usd is None else experiment.budget.model_copy(update={"usd": usd})
 
 
@@ -166,7 +166,7 @@ def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
     return False
 
 
-def words_of(estimate: Estimate) -> str:
+def words_of(estimate: CostEstimate) -> str:
     """Return an estimate as a sentence."""
     money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
     return (

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from khala.experiment import power, statistics
-from khala.experiment.likeness import Difference, differences, forbidden
+from khala.experiment.likeness import CardDifference, differences, forbidden
 from khala.experiment.measures import Measures
 from khala.experiment.selection import SIDE, Row, Selection, factor
 from khala_protocol.errors import ConfigError
@@ -72,7 +72,7 @@ class Findings:
     """Matches that say nothing, by state."""
     not_shared: tuple[str, ...]
     """Tasks that only one of the two has."""
-    allowed: tuple[Difference, ...]
+    allowed: tuple[CardDifference, ...]
     """In what the matches differ, and it was allowed."""
 
 
@@ -91,7 +91,7 @@ def compare(a: Selection, b: Selection, *, measures: Sequence[str] = USUAL, allo
         raise ConfigError(f"{a.text} and {b.text} have no match in common: {_tasks(games_a)} and {_tasks(games_b)}")
     allowed = _require_alike(a, b, [(games_a[group], games_b[group]) for group in shared], allow)
     found = [
-        _one(task, name, [group for group in shared if group.task == task], games_a, games_b)
+        _compare(task, name, [group for group in shared if group.task == task], games_a, games_b)
         for task in dict.fromkeys(group.task for group in shared)
         for name in measures
     ]
@@ -143,13 +143,13 @@ def _tasks(games: Iterable[Group]) -> str:
 
 def _require_alike(
     a: Selection, b: Selection, groups: Iterable[tuple[dict[Seat, Row], dict[Seat, Row]]], allow: Collection[str]
-) -> list[Difference]:
+) -> list[CardDifference]:
     """Return the differences that are allowed.
 
     Raises:
         ConfigError: there are others.
     """
-    found: dict[Difference, None] = {}
+    found: dict[CardDifference, None] = {}
     for games_a, games_b in groups:
         matches_a = [a.matches[row["match"]] for row in games_a.values()]
         matches_b = [b.matches[row["match"]] for row in games_b.values()]
@@ -165,7 +165,7 @@ def _require_alike(
 # --- what they say ------------------------------------------------------------------------------------
 
 
-def _one(
+def _compare(
     task: str,
     measure: str,
     groups: list[Group],

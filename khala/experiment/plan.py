@@ -106,7 +106,7 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
                     check_keys(mind.keys_sent())
                     replace(mind, budget_usd=budget_usd).check()
         except ConfigError as error:
-            raise ConfigError(f"{_words(match.cell)}: {error}") from None
+            raise ConfigError(f"{_title(match.cell)}: {error}") from None
 
 
 def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
@@ -141,7 +141,7 @@ def _both_ways(
         yield cell, settings
         return
     if not settings.sides or len(settings.sides) != 2:
-        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_words(cell)} has none")
+        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_title(cell)} has none")
     (blue, red), (first, second) = settings.sides, settings.sides.values()
     yield cell | {SWAPPED: "no"}, settings
     yield cell | {SWAPPED: "yes"}, settings.model_copy(update={"sides": {blue: second, red: first}})
@@ -179,7 +179,7 @@ def _prepare(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
             "minds": {side: _identity(mind) for side, mind in minds.items()},
         }
     except ConfigError as error:
-        raise ConfigError(f"{_words(cell)}: {error}") from None
+        raise ConfigError(f"{_title(cell)}: {error}") from None
     return _Prepared(cell, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
 
 
@@ -229,5 +229,5 @@ def _model_file(name: str) -> Mapping[str, Any]:
     return load_model(name).model_dump(mode="json", include=fields)
 
 
-def _words(cell: Mapping[str, str]) -> str:
+def _title(cell: Mapping[str, str]) -> str:
     return ", ".join(f"{factor} {value}" for factor, value in cell.items())

@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from khala import indexes
 from khala.experiment.index import CALLS, Row, add, connect, create, played_in, results_in, schema, take
 from khala.experiment.measures import measure_with_calls
-from khala.experiment.played import Played, judge
+from khala.experiment.played import PlayedMatch, judge
 from khala.experiment.spec import Experiment
 from khala.playing.matches import free_recording, tries_in
 from khala.playing.spending import paid_usd
-from khala_agents.llm.money import SUFFIX, Ledger
+from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.files import make_private, open_private, write_private
@@ -175,7 +175,7 @@ class Store:
             index.close()
             return read(self._keep(self._rebuild(error)))
 
-    def add(self, played: Played, rows: Sequence[Row]) -> None:
+    def add(self, played: PlayedMatch, rows: Sequence[Row]) -> None:
         """Note what became of a match; it replaces what was known of it.
 
         Raises:
@@ -183,7 +183,7 @@ class Store:
         """
         self._ask(lambda index: add(index, played, rows))
 
-    def matches(self) -> dict[str, Played]:
+    def matches(self) -> dict[str, PlayedMatch]:
         """Return what is known of each match, by its key."""
         if not (self.directory / INDEX).exists() and not any(self._tries()):
             return {}
@@ -218,7 +218,7 @@ class Store:
         if (found := self.read(path, attempts=attempts)) is not None:
             self._ask(lambda index: take(index, path, *found))
 
-    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
+    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[PlayedMatch, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
 
         Args:
@@ -245,7 +245,7 @@ class Store:
         """Return by match the most that its tries have cost as far as they have ledgers, also if they were not read."""
         sums = defaultdict[str, float](float)
         for path in (self.directory / MATCHES).glob(f"*/recording*{SUFFIX}"):
-            with Ledger(path) as ledger:
+            with MoneyLedger(path) as ledger:
                 sums[path.parent.name] += ledger.booked_usd()
         return sums
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from inspect_ai.solver import Generate, Solver, TaskState
     from pydantic import JsonValue
 
-    from khala.playing.seats import Seen, Turn
+    from khala.playing.seats import SeatsTurn, Seen
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report
 
@@ -122,7 +122,7 @@ class _Player:
         self._state.messages += [observed, ChatMessageAssistant(content=text, source="generate")]
 
 
-def _note(turn: Turn) -> None:
+def _note(turn: SeatsTurn) -> None:
     """Note in the transcript what became of the decisions."""
     for report in turn.reports:
         transcript().info(_fates(report), source="khala")

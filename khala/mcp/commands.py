@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedSeats:
     """What the command line says; names are those of its options."""
 
     task: str | None
@@ -34,7 +34,7 @@ class Wanted:
     """How it is played, as `khala.playing.matches.new` takes it."""
 
 
-def run_mcp(wanted: Wanted) -> None:
+def run_mcp(wanted: WantedSeats) -> None:
     """Serve the seats of a match until the client leaves, or a signal comes.
 
     Raises:
@@ -48,7 +48,7 @@ def run_mcp(wanted: Wanted) -> None:
     asyncio.run(over_stdio(table) if wanted.port is None else over_http(table, wanted.port))
 
 
-def table_of(wanted: Wanted) -> Table:
+def table_of(wanted: WantedSeats) -> Table:
     """Return the match, with places for those who connect.
 
     Raises:

@@ -26,7 +26,7 @@ from khala_protocol.errors import KhalaError
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator, Mapping
 
-    from khala.mcp.table import Look, Table
+    from khala.mcp.table import Table, TableLook
     from khala.playing.seats import Seat, Seen
     from khala_protocol.messages import Report
 
@@ -137,13 +137,13 @@ class _SeatServer:
         yield
         self._holder.take(client)
 
-    async def _look(self, ctx: Context[None]) -> Look:
+    async def _look(self, ctx: Context[None]) -> TableLook:
         async def on_step(report: Report) -> None:
             await ctx.report_progress(report.game_loop, message=step_line(report))
 
         return await self._table.look(self._seat, within_s=WITHIN_S, on_step=on_step)
 
-    def _shown(self, look: Look, *, briefing: bool = False) -> list[str | Image]:
+    def _shown(self, look: TableLook, *, briefing: bool = False) -> list[str | Image]:
         text = page(look, self._table.config)
         if look.seen is None:
             return [text]

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.playing.minds import Minds
-    from khala_agents.llm.money import Ledger
+    from khala_agents.llm.money import MoneyLedger
     from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.past.resume import Unfinished
@@ -154,7 +154,7 @@ class _Share:
         return ["agent", *self.names, "--side", self.side, *self.options, *budget]
 
 
-def spent_before(ledger: Ledger, minds: Mapping[str, Minds]) -> str:
+def spent_before(ledger: MoneyLedger, minds: Mapping[str, Minds]) -> str:
     """Return a sentence on what a match that is resumed has spent, and may still spend; "" if it has spent nothing."""
     if not (before_usd := ledger.booked_usd()):
         return ""

@@ -15,7 +15,7 @@ from khala.playing import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model, model_files
 from khala_agents.llm.limits import own_turns
-from khala_agents.llm.money import Budget
+from khala_agents.llm.money import SharedBudget
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
@@ -106,10 +106,10 @@ class Minds:
         Raises:
             ConfigError: a model file, a key or a policy is missing or wrong.
         """
-        self.policies([""], self.base_url, Budget(self.budget_usd))
+        self.policies([""], self.base_url, SharedBudget(self.budget_usd))
 
     def policies(
-        self, names: Sequence[str], base_url: str | None, budget: Budget, gates: Gates = own_turns
+        self, names: Sequence[str], base_url: str | None, budget: SharedBudget, gates: Gates = own_turns
     ) -> dict[str, Policy]:
         """Return a policy for each agent, for agents in this process.
 

@@ -42,8 +42,8 @@ __all__ = [
     "NotAsked",
     "Seat",
     "SeatedMatch",
+    "SeatsTurn",
     "Seen",
-    "Turn",
     "seat_named",
     "seats_of",
     "without_time_limit",
@@ -76,7 +76,7 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class SeatsTurn:
     """What the caller has to answer, and what has happened since its turn before.
 
     Attributes:
@@ -149,7 +149,7 @@ class SeatedMatch:
         self._questions = _OpenQuestions()
         self._reports: list[Report] = []
         self._results: list[Result] = []
-        self._ended: deque[Turn] = deque()
+        self._ended: deque[SeatsTurn] = deque()
         self._over = False
         self._playing: asyncio.Task[list[Result]] | None = None
 
@@ -168,7 +168,7 @@ class SeatedMatch:
         if error is None and not self._playing.cancelled():
             self._playing.result()
 
-    async def turn(self) -> Turn:
+    async def turn(self) -> SeatsTurn:
         """Wait until all agents of the caller that are asked now have their observations, or an episode is over.
 
         Called again before all of them are answered, it returns those that still wait.
@@ -180,14 +180,14 @@ class SeatedMatch:
         while not (self._ended or self._questions.are_complete):
             if self._playing.done():
                 self._playing.result()
-                return Turn(over=True)
+                return SeatsTurn(over=True)
             self._questions.changed.clear()
             await self._questions.changed.wait()
         if self._ended:
             return self._ended.popleft()
-        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+        return SeatsTurn(asked=self._questions.seen(), reports=self._take_reports())
 
-    async def news(self) -> Turn:
+    async def news(self) -> SeatsTurn:
         """Wait until something is new, and return all that there is: for agents of the caller with paces of their own.
 
         An agent is asked, its time for an answer is over, a step is reported, or an episode has ended. `asked` has
@@ -204,8 +204,8 @@ class SeatedMatch:
             return self._ended.popleft()
         if self._playing.done():
             self._playing.result()
-            return Turn(over=True)
-        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+            return SeatsTurn(over=True)
+        return SeatsTurn(asked=self._questions.seen(), reports=self._take_reports())
 
     def act(self, seat: Seat, said: Said) -> None:
         """Answer for an agent: with a reply, or a reply with its usage.
@@ -245,7 +245,7 @@ class SeatedMatch:
         aborted = any(result.outcome == "aborted" for result in results)
         self._over = aborted or results[0].episode == self._config.episodes - 1
         theirs = tuple(result for result in results if result.side in self._sides)
-        self._ended.append(Turn(reports=self._take_reports(), results=theirs, over=self._over))
+        self._ended.append(SeatsTurn(reports=self._take_reports(), results=theirs, over=self._over))
         self._questions.changed.set()
 
     def _take_reports(self) -> tuple[Report, ...]:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
     from pathlib import Path
 
-    from khala.service.daemon import Listener
+    from khala.service.daemon import MatchListener
     from khala_protocol.bus import Bus
     from khala_protocol.service import MatchCard
 
@@ -110,8 +110,8 @@ async def _serve(
 
 async def _listeners(
     stack: contextlib.AsyncExitStack, metrics: int | None, otlp: str | None, *, traced: bool
-) -> tuple[list[Listener], int | None]:
-    listeners: list[Listener] = []
+) -> tuple[list[MatchListener], int | None]:
+    listeners: list[MatchListener] = []
     port = None
     if metrics is not None:
         from khala.service.metrics import Metrics  # noqa: PLC0415

@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from khala.playing.matches import free_recording
-from khala.service.book import Book, Entry, Limits
+from khala.service.book import Book, BookEntry, Limits
 from khala.service.memory import rss_mb
 from khala.service.orders import match_of
 from khala.service.pool import Ending
@@ -47,7 +47,7 @@ LOOKED_EVERY_S = 1.0
 MEASURED_EVERY_S = 2.0
 
 
-class Listener(Protocol):
+class MatchListener(Protocol):
     """What else hears the matches: metrics, traces."""
 
     def hear(self, message: Wire) -> None:
@@ -69,7 +69,7 @@ class Service:
     out: Path
     limits: Limits
     drain_s: float = 600.0
-    listeners: Sequence[Listener] = ()
+    listeners: Sequence[MatchListener] = ()
     exchanges: bool = False
     """Whether a listener wants what agents asked their models."""
     used_mb: Callable[[], int] = lambda: 0
@@ -157,7 +157,7 @@ class Service:
         read = partial(match_of, order, self.out, trusts=self.limits.trusts)
         return await asyncio.to_thread(read) if order.resume else read()  # a long recording takes seconds to read
 
-    def _stop(self, entry: Entry, because: str) -> None:
+    def _stop(self, entry: BookEntry, because: str) -> None:
         if entry.card.state == "queued":
             self._close(entry, "stopped", because)
         elif entry.card.state == "running" and not entry.stop_because:
@@ -180,7 +180,7 @@ class Service:
                     await self._changed.wait()
             self._changed.clear()
 
-    async def _play(self, entry: Entry) -> None:
+    async def _play(self, entry: BookEntry) -> None:
         """Play a match in a worker, and in another one if that is lost."""
         ending = Ending("lost")
         try:
@@ -194,7 +194,7 @@ class Service:
             ending = Ending("error", f"{type(error).__name__}: {error}")
         self._close(entry, *_outcome(entry, ending))
 
-    async def _once(self, entry: Entry) -> Ending:
+    async def _once(self, entry: BookEntry) -> Ending:
         assert entry.config is not None
         resume = entry.resume or (entry.card.starts > 1 and entry.card.step + len(entry.card.outcomes) > 0)
         record = free_recording(self.out / entry.card.run)
@@ -209,7 +209,7 @@ class Service:
             del self._players[entry.card.number]
             await player.close()
 
-    def _close(self, entry: Entry, state: MatchState, reason: str) -> None:
+    def _close(self, entry: BookEntry, state: MatchState, reason: str) -> None:
         self.book.close_match(entry, state, reason)
         log.info("match %s%s", state, f": {reason}" if reason else "", extra={"run": entry.card.run})
         self._changed.set()
@@ -272,7 +272,7 @@ class Service:
             await asyncio.wait(set(self._playing))
 
 
-def _outcome(entry: Entry, ending: Ending) -> tuple[MatchState, str]:
+def _outcome(entry: BookEntry, ending: Ending) -> tuple[MatchState, str]:
     """Return what became of a match."""
     how = f"; `khala submit --resume {entry.card.run}` goes on" if entry.card.step else ""
     state = "stopped" if entry.stop_because and ending.state != "done" else ending.state

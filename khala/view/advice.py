@@ -69,10 +69,10 @@ class Advisers:
         *others, last = places(adviser, self._connect, self._tls, insecure=self._insecure)
         for config in others:
             with contextlib.suppress(NoMatch):
-                return await self._at(config, adviser, FIND_NEAR_S)
-        return await self._at(last, adviser, FIND_S)
+                return await self._connect_to(config, adviser, FIND_NEAR_S)
+        return await self._connect_to(last, adviser, FIND_S)
 
-    async def _at(self, config: BusConfig, adviser: Adviser, find_s: float) -> _Line:
+    async def _connect_to(self, config: BusConfig, adviser: Adviser, find_s: float) -> _Line:
         try:
             bus = await open_bus(config)
         except NoRouter as error:

@@ -53,7 +53,9 @@ def deeds(
     rejections = list(report.rejections) if report else []
     accepted = list(report.accepted) if report else []
     unread = max(
-        (rejection for rejection in rejections if rejection.reason == "too_many_actions"), key=lambda rejection: rejection.start, default=None
+        (rejection for rejection in rejections if rejection.reason == "too_many_actions"),
+        key=lambda rejection: rejection.start,
+        default=None,
     )
     found: list[Deed] = []
     for call, start, end in calls:

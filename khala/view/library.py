@@ -133,7 +133,7 @@ def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in t
     )
 
 
-class Found(NamedTuple):
+class FoundRecordings(NamedTuple):
     """What a directory holds."""
 
     recordings: list[Path]
@@ -142,13 +142,13 @@ class Found(NamedTuple):
     """Directories of experiments."""
 
 
-def found_in(directory: Path) -> Found:
+def found_in(directory: Path) -> FoundRecordings:
     """Return the recordings and experiments of a directory and of those below it.
 
     Raises:
         ConfigError: it cannot be read.
     """
-    found = Found([], [])
+    found = FoundRecordings([], [])
     try:
         times = sorted(islice(_walk(directory, 0, found.experiments), MOST_FILES), reverse=True)
     except OSError as error:

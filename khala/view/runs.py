@@ -15,7 +15,7 @@ from khala.view.library import PLAYERS, line_of, read_head
 from khala.view.moments import Moments
 from khala.view.scan import Scanning
 from khala.view.timeline import timeline
-from khala.view.wire import MOST_SCENES, AgentLine, EpisodeLine, Progress, RunView, Scenes
+from khala.view.wire import MOST_SCENES, AgentLine, EpisodeLine, RecordingProgress, RunView, Scenes
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
@@ -143,13 +143,13 @@ class Opened:
             raise NotThere("there is no such picture in this recording")
         return kind, data
 
-    def progress(self) -> Progress:
+    def progress(self) -> RecordingProgress:
         """Return how far the match, and the index, are."""
         newest = self.index.rows("select episode, count(*) from step group by episode order by episode desc limit 1")
         episode, steps = newest[0] if newest else (0, 0)
         live = read_head(self.path).live
         lag_s = self.index.meta("lag_s") if live else None
-        return Progress(episode=episode, steps=steps, indexed=self.indexed_share(), live=live, lag_s=lag_s)
+        return RecordingProgress(episode=episode, steps=steps, indexed=self.indexed_share(), live=live, lag_s=lag_s)
 
     @property
     def may_advise(self) -> bool:

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from khala.doors.pages import guard
 from khala.view.guard import policy_of, welcoming
 from khala.view.runs import NotThere, Opened
-from khala.view.wire import MOST_SCENES, AdviceNote, Note
+from khala.view.wire import MOST_SCENES, AdviceNote, PageNote
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
@@ -253,17 +253,17 @@ class Server:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), 1.0)
 
-    async def _pass_advice_on(self, opened: Opened, text: str) -> Note:
+    async def _pass_advice_on(self, opened: Opened, text: str) -> PageNote:
         if self._advise is None or not opened.may_advise:
             what = "start it with --adviser NAME, an adviser that the task names"
-            return Note(ok=False, text=f"this view may not write to agents: {what}")
+            return PageNote(ok=False, text=f"this view may not write to agents: {what}")
         try:
             await self._advise(opened.run, AdviceNote.model_validate_json(text))
         except ValidationError:
-            return Note(ok=False, text="this is no advice: it has a side, a recipient and a text")
+            return PageNote(ok=False, text="this is no advice: it has a side, a recipient and a text")
         except KhalaError as error:
-            return Note(ok=False, text=str(error))
-        return Note(ok=True, text="sent: the host says in a message what became of it")
+            return PageNote(ok=False, text=str(error))
+        return PageNote(ok=True, text="sent: the host says in a message what became of it")
 
 
 def _number(request: web.Request, name: str) -> int:

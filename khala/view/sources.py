@@ -38,7 +38,7 @@ class Sources:
 
     def library(self) -> Library:
         """Return what can be opened."""
-        found = library.found_in(self._directory) if self._directory else library.Found([], [])
+        found = library.found_in(self._directory) if self._directory else library.FoundRecordings([], [])
         paths = list(dict.fromkeys((*self._first, *found.recordings)))
         self._recordings |= {run_id(path): path for path in paths}
         self._experiments |= {run_id(path): path for path in found.experiments}

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 from khala.experiment.report.build import count_planned, report
 from khala.experiment.store import FILE, INDEX, Store
 from khala.view.library import lines, run_id
-from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
+from khala.view.wire import ExperimentLine, ExperimentView, TableCell, TableRow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from khala.experiment.played import Played
-    from khala.experiment.report.document import Table
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.played import PlayedMatch
+    from khala.experiment.report.document import ReportTable
+    from khala.experiment.report.summary import CellSummary
     from khala.experiment.statistics import Interval
 
 
@@ -73,12 +73,14 @@ def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> Experime
     )
 
 
-def _rows(table: Table, summaries: list[Summary], played: list[Played], directory: Path) -> Iterator[Row]:
+def _rows(
+    table: ReportTable, summaries: list[CellSummary], played: list[PlayedMatch], directory: Path
+) -> Iterator[TableRow]:
     columns = table.columns[table.words :]
     for texts, summary in zip(table.rows, summaries, strict=True):
         cells = zip(columns, texts[table.words :], strict=True)
         mine = [match for match in played if match.recording and match.cell.items() <= summary.where.items()]
-        yield Row(
+        yield TableRow(
             names=texts[: table.words],
             games=summary.games,
             cells=tuple(_cell(column, text, summary) for column, text in cells),
@@ -86,11 +88,11 @@ def _rows(table: Table, summaries: list[Summary], played: list[Played], director
         )
 
 
-def _cell(column: str, text: str, summary: Summary) -> Cell:
+def _cell(column: str, text: str, summary: CellSummary) -> TableCell:
     intervals: dict[str, Interval] = {"won": summary.won, "K/D": summary.kd}
     if (interval := intervals.get(column)) is None or interval.value is None:
-        return Cell(text=text)
-    return Cell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
+        return TableCell(text=text)
+    return TableCell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
 
 
 def _finite(value: float) -> float | None:

@@ -21,7 +21,7 @@ from mcp.types import BlobResourceContents, CallToolResult, ImageContent, TextCo
 
 from khala.mcp.serve import over_http
 from khala.mcp.server import server_of
-from khala.mcp.table import Look, Table, with_messages
+from khala.mcp.table import Table, TableLook, with_messages
 from khala.mcp.words import page
 from khala.playing.minds import Minds
 from khala.playing.seats import Seat, without_time_limit
@@ -315,4 +315,4 @@ def test_messages_stand_behind_a_reply_and_are_read_as_written() -> None:
 )
 def test_a_player_without_a_question_reads_why(others: list[Seat], over: bool, says: str) -> None:
     config = MatchConfig(task=load_task("2s3z_pair"), run="mcp")
-    assert page(Look(None, None, [], [], over, others), config) == says
+    assert page(TableLook(None, None, [], [], over, others), config) == says

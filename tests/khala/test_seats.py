@@ -9,7 +9,7 @@ import pytest
 
 from khala.playing import one_process
 from khala.playing.minds import Minds
-from khala.playing.seats import NotAsked, Seat, SeatedMatch, Turn, seats_of, without_time_limit
+from khala.playing.seats import NotAsked, Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
@@ -32,9 +32,9 @@ def skilled(text: str) -> str:
     return PLAYERS["skilled"](text, random.Random(f"0 {text}"))
 
 
-async def played(match: SeatedMatch) -> list[Turn]:
+async def played(match: SeatedMatch) -> list[SeatsTurn]:
     """Play all seats of a match as the scripted player does."""
-    turns: list[Turn] = []
+    turns: list[SeatsTurn] = []
     while not turns or not turns[-1].over:
         turns.append(turn := await match.turn())
         for seat, seen in turn.asked.items():
@@ -100,7 +100,7 @@ async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
 @game
 async def test_news_are_each_agent_that_is_asked_or_no_longer_waited_for_and_each_step() -> None:
     hasty = change(load_task("2s3z_pair"), max_steps=1, max_wait_s=0.5)
-    told: list[Turn] = []
+    told: list[SeatsTurn] = []
     async with SeatedMatch(MatchConfig(task=hasty, run="seats"), [STALKERS, ZEALOTS]) as match:
         while not told or not told[-1].over:
             told.append(await match.news())

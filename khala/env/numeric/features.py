@@ -65,7 +65,7 @@ class Board(NamedTuple):
         return cls(ground.size, (x1 - x0, y1 - y0), margin, np.pad(walkable, margin), around, heights)
 
 
-class Scene:
+class BattleScene:
     """A battle at one moment: what all agents may do and see, and the state."""
 
     def __init__(self, spec: SmacMap, options: Options, board: Board, own: OwnForce, enemy: Force) -> None:

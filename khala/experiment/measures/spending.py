@@ -11,7 +11,7 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala.experiment.measures.evidence import CallGlance, Step
+    from khala.experiment.measures.evidence import CallGlance, SideStep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class SpendingTally:
         if (most_usd := _most_usd(call.usage)) is not None:
             self._paid_usd[call.agent] += most_usd
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         for agent in step.report.agents:
             self._reported[agent.agent] += agent.usage

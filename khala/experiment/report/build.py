@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from khala.experiment.plan import cells as planned_cells
 from khala.experiment.report.calls import calls
 from khala.experiment.report.conditions import conditions, warnings
-from khala.experiment.report.document import Document, Section
+from khala.experiment.report.document import ReportDocument, ReportSection
 from khala.experiment.report.figures import figures
 from khala.experiment.report.html import Html
 from khala.experiment.report.latex import Latex
@@ -22,27 +22,27 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from khala.experiment.report.summary import Summary
-    from khala.experiment.report.writer import Writer
+    from khala.experiment.report.summary import CellSummary
+    from khala.experiment.report.writer import DocumentWriter
     from khala.experiment.spec import Experiment
     from khala.experiment.store import Store
 
 
-FORMATS: dict[str, Writer] = {"markdown": Markdown(), "latex": Latex(), "html": Html()}
+FORMATS: dict[str, DocumentWriter] = {"markdown": Markdown(), "latex": Latex(), "html": Html()}
 
 
-class Report(NamedTuple):
+class ExperimentReport(NamedTuple):
     """The report as a document, and the numbers in it."""
 
-    document: Document
-    summaries: list[Summary]
+    document: ReportDocument
+    summaries: list[CellSummary]
 
     def data(self) -> dict[str, Any]:
         """Return the numbers, for JSON."""
         return {"experiment": self.document.title, "warnings": self.document.warnings, "cells": self.summaries}
 
 
-def report(store: Store, by: Sequence[str] = ()) -> Report:
+def report(store: Store, by: Sequence[str] = ()) -> ExperimentReport:
     """Return the report of an experiment.
 
     Args:
@@ -62,20 +62,27 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
     groups = cells(played, rows, by)
     summaries = sorted((summary(cell) for cell in groups), key=lambda cell: _place(experiment, cell))
     compared = beside(experiment.published, summaries)
+    of_cells = tables(summaries)
     sections = [
-        Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
-        Section("Beside what was published", (experiment.differs,) if experiment.differs else (), _some(compared)),
-        Section("More", tables=_some(*tables(summaries)[1:], calls(store.calls(), done))),
-        Section("Not counted", tables=_some(not_counted(summaries))),
-        Section("How it was played", tables=(conditions(store, played, rows),)),
+        ReportSection(
+            "Results",
+            tables=_existing(overview(summaries), of_cells[0]),
+            figures=tuple(figures(summaries)),
+        ),
+        ReportSection(
+            "Beside what was published", (experiment.differs,) if experiment.differs else (), _existing(compared)
+        ),
+        ReportSection("More", tables=_existing(*of_cells[1:], calls(store.calls(), done))),
+        ReportSection("Not counted", tables=_existing(not_counted(summaries))),
+        ReportSection("How it was played", tables=(conditions(store, played, rows),)),
     ]
     sections = [section for section in sections if section.tables or section.figures]
     found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
     paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
-    return Report(Document(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
+    return ExperimentReport(ReportDocument(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
 
 
-def write(document: Document, directory: Path, formats: Sequence[str]) -> list[Path]:
+def write(document: ReportDocument, directory: Path, formats: Sequence[str]) -> list[Path]:
     """Write a document, and its pictures beside it; return the files, the documents first."""
     make_private(directory)
     texts: dict[Path, bytes] = {}
@@ -91,11 +98,11 @@ def write(document: Document, directory: Path, formats: Sequence[str]) -> list[P
     return [*texts, *pictures]
 
 
-def _some(*tables: Any) -> tuple[Any, ...]:
+def _existing(*tables: Any) -> tuple[Any, ...]:
     return tuple(table for table in tables if table is not None)
 
 
-def _place(experiment: Experiment, cell: Summary) -> list[int]:
+def _place(experiment: Experiment, cell: CellSummary) -> list[int]:
     """Return the place of a cell in the grid: an index that was made again has matches in the order of their keys."""
     names = {factor: [level.name for level in levels] for factor, levels in experiment.factors.items()}
     return [
@@ -114,7 +121,7 @@ def _missing(experiment: Experiment, played: int) -> list[str]:
     return [f"{count - played} of {count} matches were not played yet"] if played < count else []
 
 
-def _count(experiment: Experiment, summaries: Sequence[Summary], factors: Sequence[str]) -> str:
+def _count(experiment: Experiment, summaries: Sequence[CellSummary], factors: Sequence[str]) -> str:
     games = sum(cell.games for cell in summaries)
     costs = [cell.usd * cell.games for cell in summaries if cell.usd is not None]
     money = f" They cost {sum(costs):.2f} USD." if any(costs) else ""

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from khala.experiment.likeness import differences
 from khala.experiment.numbers import NONE, number
-from khala.experiment.report.document import Table
+from khala.experiment.report.document import ReportTable
 from khala_orchestrator.console import rule
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import LOOPS_PER_S, Clock, ModelCall
@@ -19,7 +19,7 @@ from khala_protocol.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from khala.experiment.played import Played
+    from khala.experiment.played import PlayedMatch
     from khala.experiment.report.summary import Cell
     from khala.experiment.selection import Row
     from khala.experiment.store import Store
@@ -36,7 +36,7 @@ NAMED = 4
 """Values that are named; of more, the number is given."""
 
 
-def warnings(cells: Iterable[Cell], played: Sequence[Played]) -> list[str]:
+def warnings(cells: Iterable[Cell], played: Sequence[PlayedMatch]) -> list[str]:
     """Return in what matches differ that should be alike."""
     done = [match for match in played if match.state == "done"]
     found = [str(difference) for difference in differences(done, done, EVERYWHERE)]
@@ -48,7 +48,7 @@ def warnings(cells: Iterable[Cell], played: Sequence[Played]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> Table:
+def conditions(store: Store, played: Sequence[PlayedMatch], rows: Sequence[Row]) -> ReportTable:
     """Return how the matches that count were played; a field with several values has all of them."""
     done = [match for match in played if match.state == "done"]
     keys = {match.key for match in done}
@@ -77,16 +77,16 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("decisions not the agents' own", _count(rows, ("undecided",))),
         ("because of", _values(cause for row in rows for cause in row["undecided_because"].split("; "))),
     )  # fmt: skip
-    return Table("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
+    return ReportTable("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
 
 
-def _first_calls(store: Store, done: Iterable[Played]) -> list[ModelCall]:
+def _first_calls(store: Store, done: Iterable[PlayedMatch]) -> list[ModelCall]:
     """Return the first requests of one match of each cell: all others of a cell have the same prompts."""
     firsts = {tuple(match.cell.values()): match for match in reversed(list(done)) if match.recording}
     return [call for match in firsts.values() for call in _calls(store, match)]
 
 
-def _calls(store: Store, match: Played) -> list[ModelCall]:
+def _calls(store: Store, match: PlayedMatch) -> list[ModelCall]:
     try:
         recording = Recording.open(store.directory / match.recording)
     except RecordingError:
@@ -155,7 +155,7 @@ def _measured_rhythm(rows: Sequence[Row]) -> str:
     )
 
 
-def _seeds(done: Sequence[Played]) -> str:
+def _seeds(done: Sequence[PlayedMatch]) -> str:
     seeds = sorted({match.seed for match in done})
     whole = len(seeds) > 2 and seeds == list(range(seeds[0], seeds[-1] + 1))
     return f"{seeds[0]} to {seeds[-1]}" if whole else _values(map(str, seeds))

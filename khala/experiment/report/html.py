@@ -7,13 +7,13 @@ import re
 from typing import TYPE_CHECKING
 
 from khala.experiment.report.figures import FAINT, INK
-from khala.experiment.report.writer import Writer
+from khala.experiment.report.writer import DocumentWriter
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Figure, Table
+    from khala.experiment.report.document import Figure, ReportTable
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2430; --faint: #66707f; --line: #e3e6eb; --back: #ffffff; --band: #f6f7f9;
@@ -47,7 +47,7 @@ figure svg { display: block; width: 100%; max-width: 50rem; height: auto; }
 """
 
 
-class Html(Writer):
+class Html(DocumentWriter):
     """HTML with its style and its pictures inside."""
 
     suffix = "html"
@@ -82,7 +82,7 @@ class Html(Writer):
     def _heading(self, title: str) -> str:
         return f"<h3>{self._escape(title)}</h3>"
 
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: ReportTable) -> Iterator[str]:
         if any(table.columns):
             yield '<div class="scroll"><table>'
             yield f"<thead><tr>{self._cells('th', table.columns, table.words)}</tr></thead>"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala.experiment.report.writer import Writer
+from khala.experiment.report.writer import DocumentWriter
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Figure, Table
+    from khala.experiment.report.document import Figure, ReportTable
 
 HEAD = r"""\documentclass[10pt,a4paper]{article}
 \usepackage[T1]{fontenc}
@@ -36,7 +36,7 @@ LONG_TEXT = 40
 """Characters; a column with longer words breaks lines."""
 
 
-class Latex(Writer):
+class Latex(DocumentWriter):
     """LaTeX for pdflatex. What its fonts do not have is named by its number."""
 
     suffix = "tex"
@@ -65,7 +65,7 @@ class Latex(Writer):
     def _heading(self, title: str) -> str:
         return rf"\subsubsection*{{{self._escape(title)}}}"
 
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: ReportTable) -> Iterator[str]:
         wide = len(table.columns) > WIDE
         yield r"\begin{landscape}" if wide else r"\begingroup"
         yield rf"\small\begin{{longtable}}{{@{{}}{''.join(_columns(table))}@{{}}}}"
@@ -94,7 +94,7 @@ def _character(character: str) -> str:
     return character if ord(character) < 0x180 else rf"\texttt{{U+{ord(character):04X}}}"
 
 
-def _columns(table: Table) -> Iterator[str]:
+def _columns(table: ReportTable) -> Iterator[str]:
     for i in range(len(table.columns)):
         long = any(len(row[i]) > LONG_TEXT for row in table.rows)
         yield r"p{0.6\textwidth}" if long else "l" if i < table.words else "r"

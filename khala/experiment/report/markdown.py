@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from khala.experiment.report.writer import Writer
+from khala.experiment.report.writer import DocumentWriter
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Figure, Table
+    from khala.experiment.report.document import Figure, ReportTable
 
 MEANS_SOMETHING = re.compile(r"([\\`*_\[\]<>#|~&$])")
 
 
-class Markdown(Writer):
+class Markdown(DocumentWriter):
     """Markdown with the tables of GitHub."""
 
     suffix = "md"
@@ -43,7 +43,7 @@ class Markdown(Writer):
     def _heading(self, title: str) -> str:
         return f"### {self._escape(title)}\n"
 
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: ReportTable) -> Iterator[str]:
         yield _row(map(self._escape, table.columns))
         yield _row("---" if i < table.words else "---:" for i in range(len(table.columns)))
         for row in table.rows:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala.experiment.numbers import NONE, number, ratio, ratio_with, share, share_with
-from khala.experiment.report.document import Table
+from khala.experiment.report.document import ReportTable
 from khala.experiment.report.summary import FATES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.report.summary import CellSummary
     from khala.experiment.spec import Published
 
 
@@ -23,7 +23,7 @@ class Column(NamedTuple):
     """One column."""
 
     title: str
-    value: Callable[[Summary], str]
+    value: Callable[[CellSummary], str]
     always: bool = False
     """Whether it is there without any value."""
 
@@ -69,8 +69,8 @@ KINDS = (
             *(Column(name, lambda summary, name=name: _some_share(summary.fates[name])) for name in FATES),  # type: ignore[misc]
             Column("latency p50", lambda summary: _seconds(summary.latency_p50_s)),
             Column("p95", lambda summary: _seconds(summary.latency_p95_s)),
-            Column("age p50", lambda summary: _some(summary.age_p50_loops)),
-            Column("age p95", lambda summary: _some(summary.age_p95_loops)),
+            Column("age p50", lambda summary: _some_number(summary.age_p50_loops)),
+            Column("age p95", lambda summary: _some_number(summary.age_p95_loops)),
         ),
         "What became of decisions, in shares. Latency: from observation to reply, in seconds of the wall; age: from "
         "observation to effect, in game loops; both are medians over games.",
@@ -78,7 +78,7 @@ KINDS = (
     Kind(
         "Tokens and money",
         (
-            Column("tokens a game", lambda summary: _some(summary.tokens)),
+            Column("tokens a game", lambda summary: _some_number(summary.tokens)),
             Column("USD a game", lambda summary: _usd(summary.usd)),
             Column("USD a win", lambda summary: _usd(summary.usd_per_win)),
         ),
@@ -87,12 +87,12 @@ KINDS = (
     Kind(
         "Messages",
         (
-            Column("sent", lambda summary: _some(summary.messages["messages_sent"])),
-            Column("undeliverable", lambda summary: _some(summary.messages["messages_undeliverable"])),
-            Column("unfounded", lambda summary: _some(summary.messages["messages_unfounded"])),
-            Column("read", lambda summary: _some(summary.messages["messages_read"])),
-            Column("answered", lambda summary: _some(summary.messages["messages_answered"])),
-            Column("acted on", lambda summary: _some(summary.messages["messages_acted_on"])),
+            Column("sent", lambda summary: _some_number(summary.messages["messages_sent"])),
+            Column("undeliverable", lambda summary: _some_number(summary.messages["messages_undeliverable"])),
+            Column("unfounded", lambda summary: _some_number(summary.messages["messages_unfounded"])),
+            Column("read", lambda summary: _some_number(summary.messages["messages_read"])),
+            Column("answered", lambda summary: _some_number(summary.messages["messages_answered"])),
+            Column("acted on", lambda summary: _some_number(summary.messages["messages_acted_on"])),
         ),
         "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted "
         "on: the reader gave a new order that names what the message names.",
@@ -111,28 +111,30 @@ KINDS = (
 )  # fmt: skip
 
 
-def tables(summaries: Sequence[Summary]) -> list[Table]:
+def tables(summaries: Sequence[CellSummary]) -> list[ReportTable]:
     """Return the tables of cells, without those that would be empty."""
     return [table for kind in KINDS if (table := _table(kind, summaries)) is not None]
 
 
-def _table(kind: Kind, summaries: Sequence[Summary]) -> Table | None:
+def _table(kind: Kind, summaries: Sequence[CellSummary]) -> ReportTable | None:
     texts = {column: [column.value(summary) for summary in summaries] for column in kind.columns}
     shown = [column for column in kind.columns if column.always or any(text != NONE for text in texts[column])]
     if not shown or not summaries:
         return None
     factors = tuple(summaries[0].where)
     rows = [(*summary.where.values(), *(texts[column][i] for column in shown)) for i, summary in enumerate(summaries)]
-    return Table(kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note)
+    return ReportTable(
+        kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note
+    )
 
 
-def overview(summaries: Sequence[Summary]) -> Table | None:
+def overview(summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return wins and K/D with columns for each value of the last factor, as papers print them."""
     if not summaries or len(summaries[0].where) < 2:
         return None
     *first, last = summaries[0].where
     values = list(dict.fromkeys(summary.where[last] for summary in summaries))
-    rows: dict[tuple[str, ...], dict[str, Summary]] = {}
+    rows: dict[tuple[str, ...], dict[str, CellSummary]] = {}
     for summary in summaries:
         rows.setdefault(tuple(summary.where[name] for name in first), {})[summary.where[last]] = summary
     if not 2 <= len(values) <= MOST_COLUMNS:
@@ -141,10 +143,10 @@ def overview(summaries: Sequence[Summary]) -> Table | None:
     texts = [
         (*where, *(text for value in values for text in _won_and_kd(found.get(value)))) for where, found in rows.items()
     ]
-    return Table("Overview", columns, tuple(texts), len(first))
+    return ReportTable("Overview", columns, tuple(texts), len(first))
 
 
-def not_counted(summaries: Sequence[Summary]) -> Table | None:
+def not_counted(summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return which matches are in no number, and why; None if there are none."""
     causes = list(dict.fromkeys(cause for summary in summaries for cause in summary.not_counted))
     if not causes:
@@ -158,17 +160,17 @@ def not_counted(summaries: Sequence[Summary]) -> Table | None:
     note = (
         "Invalid: played, and says nothing about its agents. Crashed: not played to its end. `resume` plays them again."
     )
-    return Table("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
+    return ReportTable("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
 
 
-def beside(published: Sequence[Published], summaries: Sequence[Summary]) -> Table | None:
+def beside(published: Sequence[Published], summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return published numbers beside ours; None if none was published."""
     rows = [_row(result, ours) for result in published for ours in _matching(result, summaries)]
     columns = ("published of", "source", "ours", "won there", "won here", "K/D there", "K/D here", "games here")
-    return Table("Beside what was published", columns, tuple(rows), 3) if rows else None
+    return ReportTable("Beside what was published", columns, tuple(rows), 3) if rows else None
 
 
-def _matching(result: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
+def _matching(result: Published, summaries: Sequence[CellSummary]) -> list[CellSummary | None]:
     """Return the cells that a published number belongs to; `model` may be one that was not played."""
     ours = [other for other in summaries if all(other.where.get(name, value) == value or name == "model"
             for name, value in result.where.items()) and _names_a_factor(result, other)]  # fmt: skip
@@ -176,11 +178,11 @@ def _matching(result: Published, summaries: Sequence[Summary]) -> list[Summary |
     return list(exact or ours) or [None]
 
 
-def _names_a_factor(result: Published, summary: Summary) -> bool:
+def _names_a_factor(result: Published, summary: CellSummary) -> bool:
     return any(name in summary.where for name in result.where)
 
 
-def _row(result: Published, ours: Summary | None) -> tuple[str, ...]:
+def _row(result: Published, ours: CellSummary | None) -> tuple[str, ...]:
     there = (", ".join(result.where.values()), result.source)
     if ours is None:
         return (*there, "not played", share(result.win_rate), NONE, ratio(result.kd), NONE, NONE)
@@ -188,7 +190,7 @@ def _row(result: Published, ours: Summary | None) -> tuple[str, ...]:
     return (*there, ", ".join(ours.where.values()), *rates, str(ours.games))
 
 
-def _won_and_kd(summary: Summary | None) -> tuple[str, str]:
+def _won_and_kd(summary: CellSummary | None) -> tuple[str, str]:
     return (share_with(summary.won), ratio(summary.kd.value)) if summary is not None else (NONE, NONE)
 
 
@@ -204,7 +206,7 @@ def _seconds(value: float | None) -> str:
     return NONE if value is None else f"{value:.2f} s"
 
 
-def _some(value: float | None) -> str:
+def _some_number(value: float | None) -> str:
     """Return a number that is worth a column only if it is not 0 everywhere."""
     return number(value) if value else NONE
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Document, Figure, Section, Table
+    from khala.experiment.report.document import Figure, ReportDocument, ReportSection, ReportTable
 
 
-class Writer(ABC):
+class DocumentWriter(ABC):
     """A format. Each method returns lines in its markup, in which no given text is markup.
 
     Attributes:
@@ -24,7 +24,7 @@ class Writer(ABC):
     picture: ClassVar[str]
     end: ClassVar[str] = ""
 
-    def text(self, document: Document) -> str:
+    def text(self, document: ReportDocument) -> str:
         """Return the file of a document."""
         return "\n".join(self._lines(document)).rstrip() + "\n"
 
@@ -53,14 +53,14 @@ class Writer(ABC):
         """Return the heading of a table."""
 
     @abstractmethod
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: ReportTable) -> Iterator[str]:
         """Yield a table without its heading."""
 
     @abstractmethod
     def _figure(self, figure: Figure) -> str:
         """Return a picture with its caption."""
 
-    def _lines(self, document: Document) -> Iterator[str]:
+    def _lines(self, document: ReportDocument) -> Iterator[str]:
         yield self._begin(document.title)
         yield from map(self._paragraph, document.paragraphs)
         if document.warnings:
@@ -69,7 +69,7 @@ class Writer(ABC):
             yield from self._section(section.title, self._content(section))
         yield self.end
 
-    def _content(self, section: Section) -> Iterator[str]:
+    def _content(self, section: ReportSection) -> Iterator[str]:
         yield from map(self._paragraph, section.paragraphs)
         for table in section.tables:
             if table.title not in ("", section.title):

@@ -16,7 +16,7 @@ from khala import indexes
 from khala.experiment import index as rows
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import INDEX, MATCHES, Store
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.made import MadeEngine, record
@@ -194,7 +194,7 @@ async def test_the_runner_goes_on_with_one_that_is_broken(directory: Path, caplo
     DAMAGES["torn"](directory / INDEX)
     engine, store = MadeEngine(), Store(directory)
     with store.lock():
-        runner = Runner(FOUND, store, engine, Budget())
+        runner = Runner(FOUND, store, engine, ExperimentBudget())
         await runner.play(matches())
     assert engine.jobs == []
     assert len(caplog.records) == 1

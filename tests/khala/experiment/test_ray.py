@@ -14,8 +14,8 @@ import yaml
 
 from khala.experiment.engine import MATCH_MB, Local
 from khala.experiment.plan import plan
-from khala.experiment.runner import Event, Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.runner import Runner, RunnerEvent
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_protocol.errors import ConfigError
@@ -77,11 +77,11 @@ def ray(cluster: Any, **options: Any) -> Any:
 
 
 async def run(
-    directory: Path, engine: Engine, found: Experiment, see: Callable[[Event], None] = lambda _: None
+    directory: Path, engine: Engine, found: Experiment, see: Callable[[RunnerEvent], None] = lambda _: None
 ) -> Store:
     store = Store(directory / found.name)
     async with engine:
-        runner = Runner(found, store, engine, Budget(), see=see)
+        runner = Runner(found, store, engine, ExperimentBudget(), see=see)
         await runner.play(plan(found))
     return store
 
@@ -140,9 +140,9 @@ async def test_when_a_node_is_killed_every_match_is_played_once_with_the_results
 ) -> None:
     found = experiment(seeds=6)
     doomed = [node(cluster, cores=2)]
-    seen: list[Event] = []
+    seen: list[RunnerEvent] = []
 
-    def see(event: Event) -> None:
+    def see(event: RunnerEvent) -> None:
         seen.append(event)
         if event.what == "ends" and doomed:  # three of four are being played, so that one at least is on this node
             cluster.remove_node(doomed.pop(), allow_graceful=False)

@@ -14,7 +14,7 @@ from khala.cli import app
 from khala.experiment.plan import plan
 from khala.experiment.report import FORMATS, report, write
 from khala.experiment.report.calls import calls
-from khala.experiment.report.document import Document, Section, Table
+from khala.experiment.report.document import ReportDocument, ReportSection, ReportTable
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.handmade import CARD, HandMade
 from tests.khala.experiment.made import record
@@ -33,13 +33,13 @@ def made(tmp_path: Path) -> HandMade:
     return made
 
 
-def table(made: HandMade, title: str, **given: Any) -> Table:
+def table(made: HandMade, title: str, **given: Any) -> ReportTable:
     tables = (table for section in report(made.store, **given).document.sections for table in section.tables)
     found = {table.title: table for table in tables}
     return found[title]
 
 
-def row(table: Table, *where: str) -> dict[str, str]:
+def row(table: ReportTable, *where: str) -> dict[str, str]:
     texts = next(row for row in table.rows if row[: len(where)] == where)
     return dict(zip(table.columns, texts, strict=True))
 
@@ -215,13 +215,13 @@ class Page(HTMLParser):
 
 
 @pytest.fixture
-def hostile(made: HandMade) -> Document:
+def hostile(made: HandMade) -> ReportDocument:
     made.add({"task": HOSTILE, "player": "skilled"}, 1, card={"game": HOSTILE})
     made.add({"task": HOSTILE, "player": "focus"}, 2, state="crashed", cause=HOSTILE)
     return report(made.store).document
 
 
-def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
+def test_html_is_one_page_that_loads_nothing(hostile: ReportDocument) -> None:
     text = FORMATS["html"].text(hostile)
     page = Page()
     page.feed(text)
@@ -236,7 +236,7 @@ def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
     assert "\u202e" not in text
 
 
-def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
+def test_latex_is_balanced_and_escaped(hostile: ReportDocument) -> None:
     text = FORMATS["latex"].text(hostile)
     bare = re.sub(r"\\[\\{}$&#_%]", "", text)
     assert bare.count("{") == bare.count("}")
@@ -253,7 +253,7 @@ def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
     assert rows
 
 
-def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> None:
+def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: ReportDocument) -> None:
     text = FORMATS["markdown"].text(hostile)
     tables = [part for part in text.split("\n\n") if part.startswith("|")]
     widths = [{len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()} for table in tables]
@@ -263,7 +263,9 @@ def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> Non
 
 
 def test_documents_are_plain_until_a_format_writes_them() -> None:
-    document = Document("a_b", (), ("50 % & more",), (Section("c", tables=(Table("t", ("x",), (("<1",),), 1),)),))
+    document = ReportDocument(
+        "a_b", (), ("50 % & more",), (ReportSection("c", tables=(ReportTable("t", ("x",), (("<1",),), 1),)),)
+    )
     texts = [writer.text(document) for writer in FORMATS.values()]
     escaped = (("a\\_b", "50 % \\& more", "\\<1"), (r"a\_b", r"50 \% \& more", r"\textless{}1"),
                ("a_b", "50 % &amp; more", "&lt;1"))  # fmt: skip

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.experiment.plan import plan
-from khala.experiment.runner import Event, Runner, pilot_of
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.runner import Runner, RunnerEvent, pilot_of
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
-from khala_agents.llm.money import Ledger
+from khala_agents.llm.money import MoneyLedger
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.made import MadeEngine, record
 
@@ -34,7 +34,7 @@ def store(tmp_path: Path) -> Store:
 
 async def run(store: Store, engine: MadeEngine, found: Experiment | None = None, **budget: Any) -> Runner:
     found = found or experiment()
-    runner = Runner(found, store, engine, Budget(**budget))
+    runner = Runner(found, store, engine, ExperimentBudget(**budget))
     await runner.play(plan(found))
     return runner
 
@@ -60,7 +60,7 @@ async def test_a_grown_grid_plays_only_what_is_new(store: Store) -> None:
 
 
 async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(store: Store) -> None:
-    seen: list[Event] = []
+    seen: list[RunnerEvent] = []
     always, once = (match.key for match in plan(experiment())[:2])
 
     def ends(job: Job, attempt: int) -> str:
@@ -68,7 +68,7 @@ async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(stor
         return "lost" if key == always or (key == once and attempt == 1) else "done"
 
     found = experiment()
-    runner = Runner(found, store, MadeEngine(ends=ends), Budget(), see=seen.append)
+    runner = Runner(found, store, MadeEngine(ends=ends), ExperimentBudget(), see=seen.append)
     await runner.play(plan(found))
     played = store.matches()
     assert (played[always].state, played[always].cause, played[always].attempts) == ("crashed", "crash", 3)
@@ -90,14 +90,14 @@ async def test_matches_of_a_model_that_is_refused_for_good_are_not_begun_any_mor
 async def test_a_match_whose_recording_is_lost_has_cost_what_its_ledger_says(store: Store) -> None:
     def ends(job: Job, _: int) -> str:
         assert job.config.record is not None
-        with Ledger(job.config.record.with_suffix(".ledger")) as ledger:
+        with MoneyLedger(job.config.record.with_suffix(".ledger")) as ledger:
             ledger.pay("blue", 0.25)
             ledger.hold("blue", 0.125, None)
         return "nothing"
 
     runner = await run(store, MadeEngine(ends=ends), experiment(seeds=1, retries=0), usd=9.0)
     assert runner.spent.usd == pytest.approx(2 * 0.375)
-    assert Runner(experiment(), store, MadeEngine(), Budget(usd=9.0)).spent.usd == pytest.approx(2 * 0.375)
+    assert Runner(experiment(), store, MadeEngine(), ExperimentBudget(usd=9.0)).spent.usd == pytest.approx(2 * 0.375)
 
 
 async def test_a_match_without_any_recording_is_known_as_crashed(store: Store) -> None:
@@ -181,14 +181,14 @@ async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
 
     runner = await run(store, MadeEngine(ends=ends, cost_usd=lambda _: 0.25), experiment(seeds=1))
     assert runner.spent.usd == pytest.approx(2 * 3 * 0.25)
-    assert Runner(experiment(), store, MadeEngine(), Budget()).spent.usd == pytest.approx(1.5)
+    assert Runner(experiment(), store, MadeEngine(), ExperimentBudget()).spent.usd == pytest.approx(1.5)
 
 
 async def test_the_money_of_a_runner_that_was_killed_counts(store: Store) -> None:
     match = plan(experiment())[0]
     path = store.recording_for(match.key)
     record(path, match.config, cost_usd=0.5, result=False)
-    runner = Runner(experiment(), store, MadeEngine(), Budget())
+    runner = Runner(experiment(), store, MadeEngine(), ExperimentBudget())
     assert runner.spent.usd == 0.5
     assert [(one.state, one.cause) for one in store.matches().values()] == [("crashed", "interrupted")]
 
@@ -202,7 +202,10 @@ async def test_the_pilot_estimates_the_rest(store: Store) -> None:
     found = experiment(seeds=20)
     matches = plan(found)
     runner = Runner(
-        found, store, MadeEngine(cost_usd=lambda job: 0.1 if job.config.task.name == "3s5z" else 0.3), Budget()
+        found,
+        store,
+        MadeEngine(cost_usd=lambda job: 0.1 if job.config.task.name == "3s5z" else 0.3),
+        ExperimentBudget(),
     )
     await runner.play(pilot_of(matches, 2))
     estimate = runner.estimate(matches)
@@ -238,8 +241,8 @@ def test_the_pilot_has_some_of_each_cell() -> None:
 
 
 async def test_who_is_cancelled_leaves_what_was_played(store: Store) -> None:
-    found, seen = experiment(), asyncio.Queue[Event]()
-    runner = Runner(found, store, MadeEngine(slots=1), Budget(), see=seen.put_nowait)
+    found, seen = experiment(), asyncio.Queue[RunnerEvent]()
+    runner = Runner(found, store, MadeEngine(slots=1), ExperimentBudget(), see=seen.put_nowait)
     playing = asyncio.create_task(runner.play(plan(found)))
     while len(store.matches()) < 2:
         await seen.get()

@@ -16,7 +16,7 @@ from khala_agents.scripted.writing import point
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_agents.scripted.reading import ArmyPart, Point, Situation
+    from khala_agents.scripted.reading import ArmyGroup, Point, Situation
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 40.0
@@ -105,7 +105,7 @@ def _is_due(situation: Situation, agent: str, goal: Point) -> bool:
     return (astray > 0 or not obey) and situation.time_s % often < 2
 
 
-def _obeys(part: ArmyPart, goal: Point) -> bool:
+def _obeys(part: ArmyGroup, goal: Point) -> bool:
     """Return whether a part of the army is at a place, on its way there, or fights what is in its way."""
     if math.dist(part.at, goal) <= AROUND:
         return True
