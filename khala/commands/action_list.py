@@ -59,7 +59,7 @@ def print_actions(
     ]
     console = stdout_console()
     if as_json:
-        typer.echo(json.dumps({"actions": [_plain(action) for action in found]}))
+        typer.echo(json.dumps({"actions": [dict(_fields(action)) for action in found]}))
     elif not (everything or race or unit or group or name or function):
         console.print(_groups(known))
         console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them")
@@ -146,10 +146,6 @@ def _users(action: Action) -> str:
         "side": "the side, by",
     }
     return f"{subject[action.subject]}: {shown}" if shown else subject[action.subject]
-
-
-def _plain(action: Action) -> dict[str, Any]:
-    return dict(_fields(action))
 
 
 def _fields(action: Action) -> Iterator[tuple[str, Any]]:
