@@ -21,7 +21,7 @@ from khala import __version__
 from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
 from khala.commands.actions import EPILOG as ACTIONS_EPILOG
 from khala.commands.actions import actions
-from khala.commands.help import Group
+from khala.commands.help import Commands
 from khala.commands.keys import app as keys
 from khala.commands.options import (
     Game,
@@ -49,7 +49,7 @@ from khala_protocol.visible import VisibleFormatter
 
 app = typer.Typer(
     name="khala",
-    cls=Group,
+    cls=Commands,
     help="Teams of LLM agents play StarCraft II together over a message bus.",
     epilog="Begin with: khala run 2s3z_pair",
     no_args_is_help=True,
@@ -101,10 +101,10 @@ def run(
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
     messages go into a recording, see `khala replay`.
     """
-    from khala.commands.run import Wanted  # noqa: PLC0415  # see there
+    from khala.commands.run import WantedRun  # noqa: PLC0415  # see there
     from khala.commands.run import run as play  # noqa: PLC0415
 
-    play(Wanted(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
+    play(WantedRun(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
 
 
 @with_options

@@ -18,8 +18,8 @@ from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
-from khala_agents.llm.limits import LONGEST_ANSWER, Limits, own_turns
-from khala_agents.llm.money import Budget
+from khala_agents.llm.limits import LONGEST_ANSWER, RequestLimits, own_turns
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices, check_priced, price_of
 from khala_agents.llm.profiles import PROFILES
@@ -29,7 +29,7 @@ from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Policy, as_policy
 from khala_agents.scripted.players import PLAYERS
-from khala_agents.scripted.policies import Player, Silent
+from khala_agents.scripted.policies import ScriptedPlayer, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import import_trusted
@@ -103,14 +103,14 @@ class Workshop:
     def __init__(
         self,
         *,
-        budget: Budget | None = None,
+        budget: SharedBudget | None = None,
         overrides: Mapping[str, str | float | None] | None = None,
         gates: Gates = own_turns,
     ) -> None:
-        self._budget = budget or Budget(None)
+        self._budget = budget or SharedBudget(None)
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._gates = gates
-        self._models: dict[str, tuple[ModelConfig, Limits]] = {}
+        self._models: dict[str, tuple[ModelConfig, RequestLimits]] = {}
         self._breakers: dict[str, Breaker] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
@@ -135,15 +135,15 @@ class Workshop:
         )
         return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model
 
-    def _model(self, name: str) -> tuple[ModelConfig, Limits]:
+    def _model(self, name: str) -> tuple[ModelConfig, RequestLimits]:
         if name not in self._models:
             file = load_model(name)
-            config = _changed(_located(file), self._overrides, source="command line")
+            config = _change(_with_address(file), self._overrides, source="command line")
             config = config.model_copy(update={"prices": _prices(config, file)})
             if self._budget.limit_usd is not None:
                 check_priced(config.prices, config.model, config.base_url)
                 config = config.model_copy(update={"max_tokens": config.max_tokens or LONGEST_ANSWER})
-            limits = Limits(
+            limits = RequestLimits(
                 gate=self._gates(f"{config.model} at {config.base_url}", config.limits, f"model file {name}"),
                 prices=config.prices,
                 budget=self._budget,
@@ -152,11 +152,11 @@ class Workshop:
         return self._models[name]
 
 
-def _located(config: ModelConfig) -> ModelConfig:
+def _with_address(config: ModelConfig) -> ModelConfig:
     """Return the model, at the address from the environment if there is one."""
     variable = config.base_url_env
     address = os.environ.get(variable) if variable else None
-    return _changed(config, {"base_url": address}, source=variable) if address else config
+    return _change(config, {"base_url": address}, source=variable) if address else config
 
 
 def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
@@ -165,7 +165,7 @@ def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
     return config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
 
 
-def _changed(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
+def _change(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:
     try:
         return ModelConfig.model_validate({**config.model_dump(), **changes})
     except ValidationError as error:
@@ -208,7 +208,7 @@ def load_policy(name: str) -> Policy:
     if name == "silent":
         return Silent()
     if name in PLAYERS:
-        return Player(name)
+        return ScriptedPlayer(name)
     module_name, _, attribute = name.partition(":")
     if not module_name or not attribute:
         raise ConfigError(f"'{name}' is not a policy: write {', '.join(PLAYERS)} or module:name, as my_agent:decide")

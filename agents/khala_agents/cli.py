@@ -126,7 +126,7 @@ def agent(
         commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents, fallback=fallback),
         run,
         side,
-        commands.Place(connect or [], tls, insecure=insecure),
+        commands.BusPlace(connect or [], tls, insecure=insecure),
         budget_usd=budget_usd,
         ledger=ledger,
         overrides={"base_url": base_url, "model": model_name},

@@ -18,9 +18,9 @@ from pydantic import ValidationError
 
 from khala_agents.build import Workshop
 from khala_agents.config import AgentsFile, WorkerSpec, load_agents
-from khala_agents.llm.money import Budget, Ledger
+from khala_agents.llm.money import MoneyLedger, SharedBudget
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
-from khala_agents.scripted.faults import Faults, parse_faults
+from khala_agents.scripted.faults import InjectedFaults, parse_faults
 from khala_agents.scripted.players import PLAYERS
 from khala_agents.worker import run_workers
 from khala_protocol.bus import Delivery
@@ -59,7 +59,7 @@ class Link(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class BusPlace:
     """Where the bus is, and with which certificates agents join it."""
 
     connect: Sequence[str] = ()
@@ -87,7 +87,7 @@ def play(
     file: AgentsFile,
     run: str,
     side: str,
-    place: Place,
+    place: BusPlace,
     *,
     budget_usd: float | None,
     ledger: Path | None,
@@ -98,7 +98,7 @@ def play(
     check_name(run, "run")
     check_name(side, "side")
     limit_usd = budget_usd if budget_usd is not None else file.budget_usd
-    budget = Budget(limit_usd, ledger=Ledger(ledger), account=side, source=f"the budget of side {side}")
+    budget = SharedBudget(limit_usd, ledger=MoneyLedger(ledger), account=side, source=f"the budget of side {side}")
     workshop = Workshop(budget=budget, overrides=overrides)
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     links = place.links(side, policies)
@@ -122,7 +122,7 @@ def serve(
     as_json: bool,
 ) -> None:
     """Serve the scripted model until a signal arrives."""
-    dice = Faults(parse_faults(faults), seed=seed)
+    dice = InjectedFaults(parse_faults(faults), seed=seed)
     behaviour = Behaviour(latency_s=latency_s, faults=dice, retry_after_s=retry_after_s, seed=seed)
     _until_signal(lambda stop: _serve(Endpoint(behaviour, host=host, port=port), stop, ready_file, as_json=as_json))
 
@@ -175,7 +175,7 @@ async def _play(
     await _check(policies.values())
     where = ", ".join(links[0].config.connect_to)
     async with AsyncExitStack() as stack:
-        buses = [await _opened(link, stack) for link in links]
+        buses = [await _open(link, stack) for link in links]
         of = {name: bus for bus, link in zip(buses, links, strict=True) for name in link.names}
         _say(f"{', '.join(policies)} on side {side} of run {run}: waiting for the host at {where}")
         tidy_memory()
@@ -190,7 +190,7 @@ async def _play(
     return {name: tally for task in playing for name, tally in task.result().items()}
 
 
-async def _opened(link: Link, stack: AsyncExitStack) -> Bus:
+async def _open(link: Link, stack: AsyncExitStack) -> Bus:
     bus = await open_bus(link.config)
     stack.push_async_callback(bus.close)
     return bus

@@ -79,13 +79,13 @@ class Guard:
         error = task.exception()
         if isinstance(error, LLMError):
             self._complain_of_model(error)
-            return self._checked(without_model(error))
+            return self._check(without_model(error))
         if isinstance(error, Exception):
             self._complain("the policy failed", error)
-            return self._checked(Decision("", "failed", type(error).__name__, scrub(str(error))))
-        return self._checked(task.result())
+            return self._check(Decision("", "failed", type(error).__name__, scrub(str(error))))
+        return self._check(task.result())
 
-    def _checked(self, answer: object) -> Decision:
+    def _check(self, answer: object) -> Decision:
         if isinstance(answer, str):
             answer = Decision(answer)
         if not isinstance(answer, Decision):

@@ -26,14 +26,14 @@ from khala_agents.llm.client import (
     estimated_image_tokens,
     estimated_tokens,
 )
-from khala_agents.llm.limits import Limits
-from khala_agents.llm.retry import RetryRule, retried
-from khala_agents.memory import Memory, NoMemory, memory_of
+from khala_agents.llm.limits import RequestLimits
+from khala_agents.llm.retry import RetryRule, with_retries
+from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
 from khala_agents.prompt import Prompt
 from khala_agents.secret import excerpt
-from khala_agents.summary import Summary
+from khala_agents.summary import GameSummary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
 
 if TYPE_CHECKING:
@@ -71,9 +71,9 @@ class LLMPolicy(Policy):
         self,
         client: LLMClient,
         *,
-        memory: Memory | MemoryRule | None = None,
+        memory: PromptMemory | MemoryRule | None = None,
         retry: RetryRule | None = None,
-        limits: Limits | None = None,
+        limits: RequestLimits | None = None,
         breaker: Breaker | None = None,
         try_timeout_s: float = 45.0,
         vision: Vision | None = None,
@@ -81,7 +81,7 @@ class LLMPolicy(Policy):
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
-        self.limits = limits or Limits()
+        self.limits = limits or RequestLimits()
         self.breaker = breaker or Breaker(client.endpoint)
         self.try_timeout_s = try_timeout_s
         self.vision = vision
@@ -91,8 +91,8 @@ class LLMPolicy(Policy):
         self._answered = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
-        self._memory: Memory = self._own_memory or NoMemory()
-        self._summary = Summary(0)
+        self._memory: PromptMemory = self._own_memory or NoMemory()
+        self._summary = GameSummary(0)
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
         self._prompt: tuple[Briefing, Prompt] | None = None
@@ -129,7 +129,7 @@ class LLMPolicy(Policy):
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        completion = await self._completed(_Tries(self, context, messages, pictures))
+        completion = await self._complete(_Tries(self, context, messages, pictures))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
@@ -156,18 +156,18 @@ class LLMPolicy(Policy):
         prompt = self._prompt_for(context.briefing).messages(summary.ask(context.observation))
         asking = _Tries(self, dataclasses.replace(context, trace=trace), prompt, {}, purpose="summary")
         try:
-            await self._completed(asking)
+            await self._complete(asking)
         except LLMError as error:
             log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
 
-    async def _completed(self, tries: _Tries) -> Completion:
+    async def _complete(self, tries: _Tries) -> Completion:
         """Return the model's answer.
 
         Raises:
             LLMError: the last try failed; its error.
         """
         try:
-            completion = await retried(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+            completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
         except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
             error.hopeless = isinstance(error, Unauthorized) or not self._answered
             raise
@@ -207,7 +207,7 @@ class LLMPolicy(Policy):
         rule = self._rule or briefing.memory
         self._memory = self._own_memory or memory_of(rule)
         self._memory.clear()
-        self._summary = Summary(0 if self._own_memory else rule.summary)
+        self._summary = GameSummary(0 if self._own_memory else rule.summary)
         for observation, reply in self._before:
             if observation.episode == briefing.episode:
                 self._summary.begin_decision(observation)
@@ -265,7 +265,7 @@ class _Tries:
             request = self._request(began)
             outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
             try:
-                completion = await self._completed(request)
+                completion = await self._complete(request)
                 outcome = _Outcome(
                     completion.verdict, completion, completion.reason, self._with_images(completion.usage)
                 )
@@ -284,7 +284,7 @@ class _Tries:
                 self._trace(began, ticket, outcome)
             return completion
 
-    async def _completed(self, request: Request) -> Completion:
+    async def _complete(self, request: Request) -> Completion:
         """Return the completion; tell the breaker how the call ended."""
         breaker, deadline = self._policy.breaker, self._context.deadline
         try:

@@ -35,7 +35,7 @@ class Recalled(NamedTuple):
     """Above the observation, in its message."""
 
 
-class Memory(Protocol):
+class PromptMemory(Protocol):
     """The memory of one agent."""
 
     def remember(self, observation: Observation, reply: str) -> None:
@@ -91,7 +91,7 @@ class WholeSteps:
 
 
 @dataclass(slots=True)
-class Step:
+class StepInShort:
     """One step in short: what was thought, said and heard, and what became of the orders."""
 
     time_s: float
@@ -103,7 +103,7 @@ class Step:
     """The next observation, which says what was accepted and refused."""
 
     @classmethod
-    def of(cls, observation: Observation, reply: str) -> Step:
+    def of(cls, observation: Observation, reply: str) -> StepInShort:
         """Return what is kept of a step."""
         from khala_protocol.speech import parse  # noqa: PLC0415  # its patterns take 0.15 s, for agents with a memory
 
@@ -125,11 +125,11 @@ class ShortSteps:
     """A memory of the last `count` steps in short form, one block of text above the observation."""
 
     def __init__(self, count: int) -> None:
-        self._steps: deque[Step] = deque(maxlen=count)
+        self._steps: deque[StepInShort] = deque(maxlen=count)
 
     def remember(self, observation: Observation, reply: str) -> None:
         """Note a step, and forget the oldest if there are too many."""
-        self._steps.append(Step.of(observation, reply))
+        self._steps.append(StepInShort.of(observation, reply))
 
     def recall(self, observation: Observation) -> Recalled:
         """Return the steps, the oldest first; the new observation itself says what became of the last one."""
@@ -144,14 +144,14 @@ class ShortSteps:
         self._steps.clear()
 
 
-def memory_of(rule: MemoryRule) -> Memory:
+def memory_of(rule: MemoryRule) -> PromptMemory:
     """Return the memory that a rule asks for."""
     if not rule.steps:
         return NoMemory()
     return WholeSteps(rule.steps) if rule.whole else ShortSteps(rule.steps)
 
 
-def end_step(step: Step, observation: Observation) -> None:
+def end_step(step: StepInShort, observation: Observation) -> None:
     """Note the observation that follows a step; only the first one says what became of it."""
     if step.after is None:
         step.after = observation

@@ -60,7 +60,7 @@ Said: TypeAlias = str | Decision
 """What `decide` returns: a reply, or a reply with information about it."""
 
 
-def _untraced(exchange: ModelCall) -> None:
+def _drop(exchange: ModelCall) -> None:
     """Drop an exchange that is not traced."""
 
 
@@ -85,7 +85,7 @@ class Context:
     briefing: Briefing
     observation: Observation
     pictures: PictureStore = field(default_factory=PictureStore)
-    trace: Callable[[ModelCall], None] = _untraced
+    trace: Callable[[ModelCall], None] = _drop
     arrived: float = field(default_factory=_now)
     reserve_s: float = 0.0
 

@@ -261,7 +261,7 @@ def _example_reply(briefing: Briefing) -> str:
     ]
     for team, actions in _example_teams(briefing).items():
         lines.append(f"    Team {team}:")
-        lines += [f"        {_filled(action)}" for action in actions]
+        lines += [f"        {_example_call(action)}" for action in actions]
     if briefing.correspondents:
         first = briefing.correspondents[0].name
         lines += ["Communications:", f"    <MessageTo({first}, '''We fire on {EXAMPLE_TAGS[0]} first.''')>"]
@@ -279,7 +279,7 @@ def _example_teams(briefing: Briefing) -> dict[str, list[ActionSpec]]:
     return {team: shown[index : index + count] or shown[:count] for index, team in enumerate(teams)}
 
 
-def _filled(action: ActionSpec) -> str:
+def _example_call(action: ActionSpec) -> str:
     tags = iter(EXAMPLE_TAGS)
     values = [next(tags) if kind == "tag" else _EXAMPLE_VALUES[kind] for kind in action.args]
     return f"<{action.name}({', '.join(values)})>"

@@ -47,7 +47,8 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
         RecordingError: the recording has no such agent, or none of its requests and no policy is given.
     """
     run = recording.run
-    card = next((one for one in run.agents if agent in {one.name, f"{one.side}/{one.name}"}), None) if run else None
+    cards = run.agents if run else ()
+    card = next((card for card in cards if agent in {card.name, f"{card.side}/{card.name}"}), None)
     if run is None or card is None:
         raise RecordingError(f"{recording.path} has no agent {agent}")
     if policy is None:
@@ -151,11 +152,11 @@ class _Stage:
             await self._observations.put(encode(part.observation))
             async with asyncio.timeout(PATIENCE_S):
                 reply = decode_as(Reply, (await anext(self._replies)).payload)
-            recorded, sent = _words(part.reply), _words(reply)
+            recorded, sent = _content(part.reply), _content(reply)
             if recorded != sent:
                 yield Difference(reply.agent, reply.episode, reply.step, "reply", recorded, sent)
 
 
-def _words(reply: Reply) -> str:
+def _content(reply: Reply) -> str:
     """Return the words of a reply, without its times."""
     return reply.model_dump_json(exclude={"latency_s", "usage"})

@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from khala_agents.memory import Step, end_step, minutes
+from khala_agents.memory import StepInShort, end_step, minutes
 
 if TYPE_CHECKING:
     from khala_protocol.messages import ModelCall, Observation
@@ -42,7 +42,7 @@ class _Request:
     answer: str | None = None
 
 
-class Summary:
+class GameSummary:
     """The summary of one agent's episode.
 
     Args:
@@ -55,7 +55,7 @@ class Summary:
         self._until_s = 0.0
         self._decided = 0
         self._asked = 0
-        self._steps: deque[Step] = deque(maxlen=MOST_AT_ONCE * every)
+        self._steps: deque[StepInShort] = deque(maxlen=MOST_AT_ONCE * every)
         self._request: _Request | None = None
 
     @property
@@ -63,7 +63,7 @@ class Summary:
         """What stands above the last steps in a prompt; "" without a summary."""
         if not self.text:
             return ""
-        return f"Your summary of the game until {minutes(self._until_s)}\n{_indented(self.text)}"
+        return f"Your summary of the game until {minutes(self._until_s)}\n{_indent(self.text)}"
 
     def begin_decision(self, observation: Observation) -> None:
         """Take in an observation before it is decided on, and the summary that is due by now."""
@@ -84,7 +84,7 @@ class Summary:
         """Take in a step that was answered."""
         if self._every:
             self._decided += 1
-            self._steps.append(Step.of(observation, reply))
+            self._steps.append(StepInShort.of(observation, reply))
 
     @property
     def is_due(self) -> bool:
@@ -98,7 +98,7 @@ class Summary:
         self._asked = self._decided
         due = self._decided + AFTER - 1
         self._request = _Request(due, observation.view.time_s, asyncio.current_task())
-        before = f"\nYour summary until now\n{_indented(self.text)}" if self.text else ""
+        before = f"\nYour summary until now\n{_indent(self.text)}" if self.text else ""
         lines = "\n".join(line for step in self._steps for line in step.lines())
         return f"{_ASK}\n{before}\nYour steps\n{lines}\n"
 
@@ -108,5 +108,5 @@ class Summary:
             self._request.answer = exchange.completion.strip()[:MAX_CHARACTERS]
 
 
-def _indented(text: str) -> str:
+def _indent(text: str) -> str:
     return "".join(f"    {line}\n" for line in text.splitlines())

@@ -201,7 +201,7 @@ class Worker:
         newest = self._newest
         if newest is None:
             return True
-        here, before = ((one.episode, one.step) for one in (observation, newest))
+        here, before = ((observed.episode, observed.step) for observed in (observation, newest))
         if not self._began_again:
             return here > before
         try:

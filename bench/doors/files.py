@@ -19,9 +19,9 @@ from unittest import mock
 
 from bench.doors.rows import Row, Skipped
 from khala.dataset.card import Recipe
-from khala.dataset.choose import Choice, Split
+from khala.dataset.choose import RowChoice, Split
 from khala.dataset.export import export
-from khala.dataset.files import Form
+from khala.dataset.files import RowForm
 from khala.experiment import commands, results
 from khala.experiment.store import INDEX, MATCHES, Store
 from khala.playing.matches import new, newest_recording
@@ -198,7 +198,7 @@ async def _late_copy(directory: Path) -> str:
     _write_recording(path, {"match": "m1"}, finished=False)
     os.utime(path.with_name("recording.mcap"), (0, 0))
     store.rebuild()
-    return "" if store.played()["m1"].state == "done" else "a crashed try hides a done match"
+    return "" if store.matches()["m1"].state == "done" else "a crashed try hides a done match"
 
 
 async def _old_time(directory: Path) -> str:
@@ -317,7 +317,7 @@ async def _half_data_set(directory: Path) -> str:
 
 
 def _data_set(directory: Path) -> None:
-    recipe = Recipe((Form.OPENAI,), Choice(), Split.of("1", "seed"), 1.0, False)
+    recipe = Recipe((RowForm.OPENAI,), RowChoice(), Split.of("1", "seed"), 1.0, False)
     export([directory / "a.mcap"], directory / "set", recipe)
 
 
@@ -553,13 +553,13 @@ async def _flood(_: Path) -> str:
         submit(f"flood-{number}", f"owner-{number}")
     if not submit("second", "ann"):
         return "an owner who was here before finds no place"
-    book.ended(book.of("running")[0], "done")
+    book.close_match(book.of("running")[0], "done")
     turns = []
     for _number in range(2):
         if (entry := book.next(0)) is not None:
             book.begin(entry)
             turns.append(entry.card.owner)
-            book.ended(entry, "done")
+            book.close_match(entry, "done")
     return "" if "ann" in turns else f"the turns were those of {turns}"
 
 

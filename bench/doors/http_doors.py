@@ -37,7 +37,7 @@ from khala.mcp.table import Table
 from khala.openenv.client import KhalaAction, KhalaEnv
 from khala.openenv.server import MOST_WAITING, app_of, openenv_door, server_config
 from khala.playing.minds import Minds
-from khala.playing.seats import seats_of, unhurried
+from khala.playing.seats import seats_of, without_time_limit
 from khala.service.metrics import Metrics
 from khala.view.guard import view_door
 from khala.view.server import Server
@@ -132,9 +132,9 @@ async def openenv(directory: Path, *, sessions: int = 2, door: Door | None = Non
 @asynccontextmanager
 async def mcp(directory: Path) -> AsyncIterator[Target]:
     """Serve `khala mcp`: the target is its first seat."""
-    task = unhurried(load_task("2s3z_pair"))
+    task = without_time_limit(load_task("2s3z_pair"))
     config = MatchConfig(task=task, run="doors", record=directory / "recording.mcap", assemble_s=20)
-    table = Table(config, seats_of(config.task)[:1], {"blue": Minds().named("silent")})
+    table = Table(config, seats_of(config.task)[:1], {"blue": Minds().with_name("silent")})
     seat = SeatAddress(table, table.seats[0])
     app: Application = Starlette(routes=routes_of([seat]), lifespan=partial(_running, table, seat))
     async with _serve(uvicorn_config(app, timeout_graceful_shutdown=1)) as port:

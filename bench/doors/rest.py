@@ -27,7 +27,7 @@ from bench.doors.files import EVIL, GAME, FullFile, capture
 from bench.doors.rows import Row
 from bench.paths import GOLDEN
 from khala.calibrate import commands as calibrating
-from khala.commands.advise import Adviser, Advising, told
+from khala.commands.advise import Adviser, Advising, lines_about
 from khala.knowledge import cli as knowledge
 from khala.knowledge import files as facts
 from khala_agents.scripted.endpoint import Endpoint
@@ -171,7 +171,7 @@ async def _malformed_result(_: Path) -> str:
 
 async def _evil_words(_: Path) -> str:
     shown, _complaints = await _advise({Topic.REPORT: [encode(_report(EVIL))], Topic.RESULT: [encode(_result(EVIL))]})
-    text = "\n".join(line for message in shown for line in told(message))
+    text = "\n".join(line for message in shown for line in lines_about(message))
     if "owned" not in text:
         return "the words are not shown at all"
     return "an escape sequence reached the terminal" if visible(text) != text else ""

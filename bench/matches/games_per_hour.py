@@ -30,7 +30,7 @@ from bench.tables import print_table
 from khala.experiment.engine import Local, slots_of_this_machine
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
 from khala_orchestrator.config import load_task
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
-    from khala.experiment.runner import Event
+    from khala.experiment.runner import RunnerEvent
     from khala_bridge.task.config import TaskConfig
 
 LOOPS_PER_MINUTE: Final = 22.4 * 60
@@ -127,10 +127,10 @@ async def _play(matches: Sequence[PlannedMatch], engine: Engine, out: Path) -> N
     store = Store(out)
     store.directory.mkdir(parents=True)
     experiment = Experiment.model_validate({"name": "games", "factors": {"task": ["2s3z_pair"]}, "retries": 1})
-    await Runner(experiment, store, engine, Budget(), see=_check).play(matches)
+    await Runner(experiment, store, engine, ExperimentBudget(), see=_check).play(matches)
 
 
-def _check(event: Event) -> None:
+def _check(event: RunnerEvent) -> None:
     """Say which game is played again, and stop at one that is not played to its end."""
     if event.what == "begins":
         return

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, get_args
 from bench.command_line import make_parser
 from khala.experiment.statistics import wilson
 from khala.playing import games
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala_agents.scripted.players import PLAYERS, PlayerName
 from khala_bridge.task.maps import Difficulty, Race
 from khala_bridge.task.opponent import Opponent
@@ -100,7 +100,7 @@ async def _play(pairing: Pairing, hear: Hear, steps: int | None) -> Result:
         for agent in task.agents
     ]
     try:
-        (result,) = await hosted(config, sc2path, broker.session())
+        (result,) = await host_match(config, sc2path, broker.session())
     finally:
         for agent in agents:
             agent.cancel()

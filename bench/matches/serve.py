@@ -104,7 +104,7 @@ async def _first_observation(bus: Bus, run: str) -> float:
 async def _over(bus: Bus, cards: list[MatchCard]) -> list[MatchCard]:
     """Return the cards of these matches once all are over."""
     while True:
-        found = [client.find(await client.listed(bus), card.run) for card in cards]
+        found = [client.find(await client.list_matches(bus), card.run) for card in cards]
         if not any(card.state in OPEN for card in found):
             return found
         await asyncio.sleep(0.2)

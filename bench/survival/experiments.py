@@ -29,10 +29,10 @@ from khala.experiment.commands import words_of
 from khala.experiment.engine import Local
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner, pilot_of
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
-from khala_agents.scripted.faults import Faults, parse_faults
+from khala_agents.scripted.faults import InjectedFaults, parse_faults
 from khala_protocol.configfile import load
 
 MOST_OFF = 0.2
@@ -116,7 +116,7 @@ async def kills(
         differ = [key for key in {**ours, **theirs} if ours.get(key) != theirs.get(key)]
         tries = [found.read(path, attempts=1) for path in found.directory.glob("matches/*/*.mcap")]
         whole = [read for read in tries if read is not None and read[0].state == "done"]
-        return Killed(killed, len(ours), differ, len(whole) - len(found.played()))
+        return Killed(killed, len(ours), differ, len(whole) - len(found.matches()))
 
 
 class Charging(Endpoint):
@@ -161,7 +161,7 @@ class Money:
 
 async def money(cap_usd: float, *, seeds: int = 6, steps: int = 8, pilot: int = 2, slots: int = 2) -> Money:
     """Play a capped experiment and a whole one, with an endpoint that refuses a third of the requests."""
-    faults = Faults(parse_faults(["429=0.33"]), seed=3)
+    faults = InjectedFaults(parse_faults(["429=0.33"]), seed=3)
     with tempfile.TemporaryDirectory() as place:
         here = Path(place)
         async with Charging(Behaviour(faults=faults, retry_after_s=0.05)) as endpoint:
@@ -187,14 +187,14 @@ async def _account(file: Path, out: Path, cap_usd: float | None, pilot: int, slo
     estimated = 0.0
     store.begin(file)
     async with Local(slots, game="simulator", logs=store.logs) as engine:
-        runner = Runner(experiment, store, engine, Budget(usd=cap_usd))
+        runner = Runner(experiment, store, engine, ExperimentBudget(usd=cap_usd))
         if pilot:
             await runner.play(pilot_of(matches, pilot))
             rest = runner.estimate(matches)
             print(words_of(rest), file=sys.stderr)
             estimated = runner.spent.usd + (rest.usd or 0.0)
         await runner.play(matches)
-    print(f"{len(store.played())} matches; {runner.stopped}", file=sys.stderr)
+    print(f"{len(store.matches())} matches; {runner.stopped}", file=sys.stderr)
     return runner.spent.usd, estimated
 
 

@@ -40,7 +40,7 @@ from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.policy import Policy
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
-from khala_agents.scripted.faults import Faults
+from khala_agents.scripted.faults import InjectedFaults
 from khala_orchestrator.config import task_files
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
@@ -130,7 +130,7 @@ class Marked(Policy):
         await self._inner.close()
 
 
-class CountedFaults(Faults):
+class CountedFaults(InjectedFaults):
     """Faults of the endpoint, counted."""
 
     def __init__(self, rates: Mapping[str, float], seed: int) -> None:

@@ -33,7 +33,7 @@ from bench.tables import print_table
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.llm.client import LLMError
-from khala_agents.llm.money import Budget, Ledger
+from khala_agents.llm.money import MoneyLedger, SharedBudget
 from khala_agents.llm.pricing import Prices
 from khala_agents.policy import Context
 from khala_protocol.messages import Briefing, Observation
@@ -272,14 +272,14 @@ async def spend(kind: str, cap_usd: float, jobs: int, directory: Path) -> Spent:
         model.write_text(MODEL.replace("BASE_URL", endpoint.base_url))
         await asyncio.gather(*(_ask(endpoint, model, cap_usd, ledger, job) for job in range(jobs)))
         await asyncio.sleep(0)
-        booked_usd = Ledger(ledger).booked_usd()
+        booked_usd = MoneyLedger(ledger).booked_usd()
         return Spent(kind, cap_usd, jobs, endpoint.requests, endpoint.billed_usd, booked_usd)
 
 
 async def _ask(endpoint: BillingEndpoint, model: Path, cap_usd: float, path: Path, job: int) -> None:
     """Decide again and again, as one agent, until its budget refuses."""
-    with Ledger(path) as ledger:
-        policy = Workshop(budget=Budget(cap_usd, ledger=ledger)).policy(WorkerSpec(model=str(model)))
+    with MoneyLedger(path) as ledger:
+        policy = Workshop(budget=SharedBudget(cap_usd, ledger=ledger)).policy(WorkerSpec(model=str(model)))
         briefing, seen = _scene()
         try:
             while endpoint.requests < MOST_REQUESTS:

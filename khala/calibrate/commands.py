@@ -56,19 +56,19 @@ def show_probes(patterns: Sequence[str], *, as_json: bool) -> None:
         typer.echo(json.dumps(rows))
         return
     table = Table("probe", "measures", "settles", "estimates", box=None, pad_edge=False)
-    for one in probes:
-        table.add_row(one.id, one.measures, one.settles, str(len(waiting.get(one.id, [])) or ""))
+    for probe in probes:
+        table.add_row(probe.id, probe.measures, probe.settles, str(len(waiting.get(probe.id, [])) or ""))
     stdout_console().print(table)
 
 
 def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:
     """Print where two files differ."""
-    one, other = load(a), load(b)
-    found = compare.compare(one, other)
+    first, other = load(a), load(b)
+    found = compare.compare(first, other)
     if as_json:
         typer.echo(json.dumps(plain_value(found), default=Values.model_dump))
     else:
-        say(report.write(one, other, found).removesuffix("\n"))
+        say(report.write(first, other, found).removesuffix("\n"))
 
 
 def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume: bool, as_json: bool) -> None:
@@ -94,7 +94,7 @@ def measure(game: str, out: Path, seed: int, patterns: Sequence[str], *, resume:
         with _progress(screen) as progress:
             watch = _Watch(progress, probes, earlier)
             try:
-                done = play(connection, probes, earlier or begun, save=lambda one: one.save(out), watch=watch)
+                done = play(connection, probes, earlier or begun, save=lambda measured: measured.save(out), watch=watch)
             except KeyboardInterrupt:
                 screen.print(f"interrupted; what was measured is in {out}, and --resume goes on", soft_wrap=True)
                 raise typer.Exit(SIGNALLED + _SIGINT) from None
@@ -136,7 +136,7 @@ class _Watch:
 
 
 def _end(screen: Console, out: Path, done: Calibration, *, as_json: bool) -> None:
-    failed = [name for name, one in done.probes.items() if one.failed]
+    failed = [name for name, probe in done.probes.items() if probe.failed]
     seconds = sum(probe.run_s for probe in done.probes.values())
     screen.print(f"{len(done.probes)} probes in {seconds:.0f} s: {out}", soft_wrap=True)
     if as_json:

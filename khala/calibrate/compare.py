@@ -6,7 +6,7 @@ Of a random measurement, the means are compared by a permutation test, and p is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from khala.experiment.statistics import RESAMPLES, Comparison, compare_values, holm, p_of_values
@@ -25,7 +25,7 @@ MOST_COMPARISONS: Final = int(LEVEL * (RESAMPLES + 1) / 2)
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class NumberDifference:
     """One measurement in which two games differ."""
 
     probe: str
@@ -49,7 +49,7 @@ class Missing:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class CalibrationComparison:
     """What a comparison found."""
 
     exact: int
@@ -58,27 +58,27 @@ class Compared:
     """Measurements of which the means were compared."""
     unused: int
     """Random ones with too few samples on a side."""
-    differences: tuple[Difference, ...]
+    differences: tuple[NumberDifference, ...]
     missing: tuple[Missing, ...]
     not_compared: dict[str, str]
     """Probes that failed, or that a file does not have, with the reason."""
 
 
-def compare(a: Calibration, b: Calibration) -> Compared:
+def compare(a: Calibration, b: Calibration) -> CalibrationComparison:
     """Compare two calibrations; differences are in the order of the probes of `a`."""
-    found: list[Difference] = []
-    random: list[Difference] = []
+    found: list[NumberDifference] = []
+    random: list[NumberDifference] = []
     missing: list[Missing] = []
     exact = unused = 0
-    both = {name: (one, b.probes[name]) for name, one in a.probes.items() if name in b.probes}
+    both = {name: (probe, b.probes[name]) for name, probe in a.probes.items() if name in b.probes}
     fit = {name: pair for name, pair in both.items() if not (pair[0].failed or pair[1].failed)}
-    for probe, (one, other) in fit.items():
-        missing += _missing(probe, one, other)
-        for name in one.values.keys() & other.values.keys():
-            difference = Difference(probe, name, one.unit, one.values[name], other.values[name])
-            if one.exact:
+    for probe, (first, other) in fit.items():
+        missing += _missing(probe, first, other)
+        for name in first.values.keys() & other.values.keys():
+            difference = NumberDifference(probe, name, first.unit, first.values[name], other.values[name])
+            if first.exact:
                 exact += 1
-                if abs(difference.a.mean - difference.b.mean) > max(one.resolution, 1e-6):
+                if abs(difference.a.mean - difference.b.mean) > max(first.resolution, 1e-6):
                     found.append(difference)
             elif min(difference.a.n, difference.b.n) < FEWEST:
                 unused += 1
@@ -86,26 +86,27 @@ def compare(a: Calibration, b: Calibration) -> Compared:
                 random.append(difference)
     found += _beyond_chance(random)
     order = {name: rank for rank, name in enumerate(a.probes)}
-    return Compared(
+    return CalibrationComparison(
         exact=exact,
         random=len(random),
         unused=unused,
-        differences=tuple(sorted(found, key=lambda one: (order[one.probe], one.name))),
+        differences=tuple(sorted(found, key=lambda difference: (order[difference.probe], difference.name))),
         missing=tuple(missing),
         not_compared=dict(_not_compared(a, b)),
     )
 
 
-def _beyond_chance(random: list[Difference]) -> Iterator[Difference]:
-    for one, p in zip(random, holm([p_of_values(one.b.samples, one.a.samples) for one in random]), strict=True):
+def _beyond_chance(random: list[NumberDifference]) -> Iterator[NumberDifference]:
+    p_values = holm([p_of_values(difference.b.samples, difference.a.samples) for difference in random])
+    for difference, p in zip(random, p_values, strict=True):
         if p is not None and p <= LEVEL:
-            test = compare_values(one.b.samples, one.a.samples)
-            yield Difference(one.probe, one.name, one.unit, one.a, one.b, test, p)
+            test = compare_values(difference.b.samples, difference.a.samples)
+            yield replace(difference, test=test, p=p)
 
 
-def _missing(probe: str, one: Measured, other: Measured) -> Iterator[Missing]:
-    for name in sorted(one.values.keys() ^ other.values.keys()):
-        yield Missing(probe, name, name in one.values)
+def _missing(probe: str, first: Measured, other: Measured) -> Iterator[Missing]:
+    for name in sorted(first.values.keys() ^ other.values.keys()):
+        yield Missing(probe, name, name in first.values)
 
 
 def _not_compared(a: Calibration, b: Calibration) -> Iterator[tuple[str, str]]:

@@ -12,24 +12,24 @@ from khala_bridge.calibrate.catalogue import PROBES
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from khala.calibrate.compare import Compared, Difference
+    from khala.calibrate.compare import CalibrationComparison, NumberDifference
     from khala_bridge.calibrate.record import Calibration
 
 MOST_ROWS = 40
 """Of one probe in the report; the files have all."""
 
 
-def write(a: Calibration, b: Calibration, found: Compared) -> str:
+def write(a: Calibration, b: Calibration, found: CalibrationComparison) -> str:
     """Return the report."""
     return "\n".join([*_head(a, b, found), *_differences(found), *_missing(found), *_estimates(found)]) + "\n"
 
 
-def _head(a: Calibration, b: Calibration, found: Compared) -> Iterator[str]:
+def _head(a: Calibration, b: Calibration, found: CalibrationComparison) -> Iterator[str]:
     yield "# Calibration: two games compared\n"
     yield "| | game | version | build | data | seed | platform | Khala |\n|---|---|---|---|---|---|---|---|"
-    for name, one in (("A", a), ("B", b)):
-        data = one.data_version[:8]
-        cells = (name, one.game, one.version, one.build, data, one.seed, one.platform, one.khala)
+    for name, file in (("A", a), ("B", b)):
+        data = file.data_version[:8]
+        cells = (name, file.game, file.version, file.build, data, file.seed, file.platform, file.khala)
         yield f"| {' | '.join(map(str, cells))} |"
     yield ""
     yield (
@@ -42,9 +42,9 @@ def _head(a: Calibration, b: Calibration, found: Compared) -> Iterator[str]:
     yield from (f"* `{name}` was not compared: {why}" for name, why in found.not_compared.items())
 
 
-def _differences(found: Compared) -> Iterator[str]:
+def _differences(found: CalibrationComparison) -> Iterator[str]:
     about = {probe.id: probe for probe in PROBES}
-    for name, group in groupby(found.differences, key=lambda one: one.probe):
+    for name, group in groupby(found.differences, key=lambda difference: difference.probe):
         rows = list(group)
         yield f"\n## `{name}`: {len(rows)}\n"
         if name in about:
@@ -54,13 +54,14 @@ def _differences(found: Compared) -> Iterator[str]:
             yield f"\n… and {len(rows) - MOST_ROWS} more."
 
 
-def _exact(rows: list[Difference]) -> Iterator[str]:
+def _exact(rows: list[NumberDifference]) -> Iterator[str]:
     yield f"| | A | B | B - A ({rows[0].unit}) |\n|---|---:|---:|---:|"
     for row in rows[:MOST_ROWS]:
-        yield f"| {row.name} | {number(row.a.mean)} | {number(row.b.mean)} | {_signed(row.b.mean - row.a.mean)} |"
+        difference = row.b.mean - row.a.mean
+        yield f"| {row.name} | {number(row.a.mean)} | {number(row.b.mean)} | {number(difference, signed=True)} |"
 
 
-def _random(rows: list[Difference]) -> Iterator[str]:
+def _random(rows: list[NumberDifference]) -> Iterator[str]:
     yield f"| | A | B | B - A ({rows[0].unit}), 95 % | p, corrected |\n|---|---:|---:|---:|---:|"
     for row in rows[:MOST_ROWS]:
         assert row.test is not None
@@ -68,14 +69,10 @@ def _random(rows: list[Difference]) -> Iterator[str]:
         yield f"| {row.name} | {' | '.join(sides)} | {difference_with(row.test.effect)} | {p_value(row.p)} |"
 
 
-def _signed(value: float) -> str:
-    return number(value, signed=True)
-
-
-def _missing(found: Compared) -> Iterator[str]:
+def _missing(found: CalibrationComparison) -> Iterator[str]:
     if found.missing:
         yield "\n## Measured in one game only\n"
-    for probe, group in groupby(found.missing, key=lambda one: one.probe):
+    for probe, group in groupby(found.missing, key=lambda number: number.probe):
         rows = list(group)
         for which, of_a in (("A", True), ("B", False)):
             if names := [row.name for row in rows if row.only_in_a is of_a]:
@@ -83,13 +80,13 @@ def _missing(found: Compared) -> Iterator[str]:
                 yield f"* `{probe}`, only {which}: {', '.join(names[:MOST_ROWS])}{more}"
 
 
-def _estimates(found: Compared) -> Iterable[str]:
+def _estimates(found: CalibrationComparison) -> Iterable[str]:
     """Name what of the simulator is a guess that these differences could settle."""
     probes = {difference.probe for difference in found.differences}
     concerned = [estimate for estimate in estimates() if estimate.probe in probes]
     if not concerned:
         return []
-    rows = [f"| `{one.probe}` | {one.where} | {one.what} |" for one in concerned]
+    rows = [f"| `{estimate.probe}` | {estimate.where} | {estimate.what} |" for estimate in concerned]
     return [
         "\n## Estimates of the simulator that these probes settle\n",
         "| probe | where | what |\n|---|---|---|",

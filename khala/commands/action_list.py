@@ -59,12 +59,12 @@ def print_actions(
     ]
     console = stdout_console()
     if as_json:
-        typer.echo(json.dumps({"actions": [_plain(action) for action in found]}))
+        typer.echo(json.dumps({"actions": [dict(_fields(action)) for action in found]}))
     elif not (everything or race or unit or group or name or function):
         console.print(_groups(known))
         console.print(f"\n{len(found)} actions; `khala actions --help` tells how to choose among them")
     else:
-        for line in _listed(found, console.width) if found else [_none(wanted)]:
+        for line in _lines(found, console.width) if found else [_why_none(wanted)]:
             console.print(line, soft_wrap=True)
 
 
@@ -90,7 +90,7 @@ def _function(given: str | None) -> str | None:
     return given
 
 
-def _none(function: str | None) -> str:
+def _why_none(function: str | None) -> str:
     reasons = {each.function.name: each.reason for each in coverage()}
     return f"no action ends in {function}: {reasons[function]}" if function and reasons[function] else "no action fits"
 
@@ -112,7 +112,7 @@ def _is_for(action: Action, unit: str) -> bool:
     return action.fits(unit) and (action.subject != "side" or bool(action.units))
 
 
-def _listed(found: list[Action], width: int) -> Iterator[Text]:
+def _lines(found: list[Action], width: int) -> Iterator[Text]:
     """Yield lines for each action, under headings of group and race; names and calls are never broken."""
     for (group, race), members in itertools.groupby(found, key=lambda action: (action.group, action.race)):
         yield Text(f"\n{group}, {race or 'every race'}", style="bold underline")
@@ -128,16 +128,16 @@ def _block(action: Action, width: int) -> Iterator[Text]:
         yield Text(INDENT + function, style="cyan")
     if action.args:
         yield Text(INDENT + example(action))
-    yield from map(Text, _folded(action.about, width))
+    yield from map(Text, _wrap(action.about, width))
     aliases = f"; also {', '.join(action.aliases)}" if action.aliases else ""
-    yield from (Text(line, style="dim") for line in _folded(_who(action) + aliases, width))
+    yield from (Text(line, style="dim") for line in _wrap(_users(action) + aliases, width))
 
 
-def _folded(text: str, width: int) -> list[str]:
+def _wrap(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=INDENT, subsequent_indent=INDENT, break_long_words=False)
 
 
-def _who(action: Action) -> str:
+def _users(action: Action) -> str:
     shown = ", ".join(action.units[:MANY]) + (f" and {more} more" if (more := len(action.units) - MANY) > 0 else "")
     subject = {
         "team": "a whole team",
@@ -146,10 +146,6 @@ def _who(action: Action) -> str:
         "side": "the side, by",
     }
     return f"{subject[action.subject]}: {shown}" if shown else subject[action.subject]
-
-
-def _plain(action: Action) -> dict[str, Any]:
-    return dict(_fields(action))
 
 
 def _fields(action: Action) -> Iterator[tuple[str, Any]]:

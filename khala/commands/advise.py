@@ -231,7 +231,7 @@ async def lines_of(stream: TextIO) -> AsyncIterator[str]:
             yield line
 
 
-def told(message: Run | Report | Result) -> Iterator[str]:
+def lines_about(message: Run | Report | Result) -> Iterator[str]:
     """Yield the lines that tell a person of a message."""
     message = visible_message(message)
     match message:
@@ -250,7 +250,7 @@ def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, in
     """Advise from stdin, on stdout, until the match is over."""
 
     def show(message: Run | Report | Result) -> None:
-        for line in [json.dumps(message.model_dump(mode="json"))] if as_json else told(message):
+        for line in [json.dumps(message.model_dump(mode="json"))] if as_json else lines_about(message):
             say(line)
 
     async def advise_at(config: BusConfig, find_s: float) -> None:

@@ -48,7 +48,7 @@ class Finding:
 
 def examine(tls: Path | None = None, game: str | None = None) -> Iterator[Finding]:
     """Run every check, in the order in which a newcomer would ask; of certificates and of a game if they are named."""
-    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_started(game)] if game else [])):
+    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
@@ -103,8 +103,8 @@ def _game() -> Iterator[Finding]:
     yield Finding("maps", "ok" if maps else "wrong", f"{maps} below {root / 'Maps'}", advice)
 
 
-def _started(source: str) -> Callable[[], Iterator[Finding]]:
-    def started() -> Iterator[Finding]:
+def _game_process(source: str) -> Callable[[], Iterator[Finding]]:
+    def check() -> Iterator[Finding]:
         from khala.playing.environment import plain  # noqa: PLC0415  # only this check needs them
         from khala.playing.games import find  # noqa: PLC0415
         from khala_bridge.calibrate.survey import survey  # noqa: PLC0415
@@ -117,20 +117,23 @@ def _started(source: str) -> Callable[[], Iterator[Finding]]:
             yield Finding("game process", "wrong", str(error), "docs/how-to/real-game.md says what it needs")
             return
         yield Finding("game process", "ok", f"{name} {found.version}, build {found.build}, answers")
-        yield Finding("maps that load", "ok" if found.loaded else "wrong", _some(found.loaded), "")
+        yield Finding("maps that load", "ok" if found.loaded else "wrong", _first_names(found.loaded), "")
         for map_name, why in found.refused.items():
             yield Finding(f"map {map_name}", "note", why, "tasks on this map cannot be played with this game")
         if found.absent:
             yield Finding(
-                "maps not there", "note", _some(found.absent), "put them below Maps; docs/reference/maps.md lists all"
+                "maps not there",
+                "note",
+                _first_names(found.absent),
+                "put them below Maps; docs/reference/maps.md lists all",
             )
         advice = "" if found.renders else "pictures come from feature layers; a game without a graphics card draws none"
         yield Finding("rendering", "ok" if found.renders else "note", found.rendering, advice)
 
-    return started
+    return check
 
 
-def _some(names: Sequence[str]) -> str:
+def _first_names(names: Sequence[str]) -> str:
     more = f" and {len(names) - 8} more" if len(names) > 8 else ""
     return f"{len(names)}: {', '.join(names[:8])}{more}" if names else "none"
 
@@ -182,13 +185,20 @@ def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:
     return certificates
 
 
-def _certificate(one: Certificate) -> Finding:
-    state: State = "wrong" if one.has_expired else "note" if one.warning or one.is_open else "ok"
-    said = f"valid for {one.days_left} days, until {one.ends:%Y-%m-%d}"
-    if one.has_expired:
-        said = f"expired on {one.ends:%Y-%m-%d}"
-    advice = one.remedy if one.warning else f"chmod 600 {one.key}: others can read it" if one.is_open else ""
-    return Finding(f"certificate {one.name}", state, said, advice)
+def _certificate(certificate: Certificate) -> Finding:
+    state: State = "ok"
+    advice = ""
+    if certificate.is_open:
+        state = "note"
+        advice = f"chmod 600 {certificate.key}: others can read it"
+    if certificate.warning:
+        state = "note"
+        advice = certificate.remedy
+    said = f"valid for {certificate.days_left} days, until {certificate.ends:%Y-%m-%d}"
+    if certificate.has_expired:
+        state = "wrong"
+        said = f"expired on {certificate.ends:%Y-%m-%d}"
+    return Finding(f"certificate {certificate.name}", state, said, advice)
 
 
 def _keys() -> Iterator[Finding]:
@@ -207,7 +217,7 @@ def _keys() -> Iterator[Finding]:
 def _network() -> Iterator[Finding]:
     from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only this check needs them
     from khala_agents.llm.address import checked_address  # noqa: PLC0415
-    from khala_agents.llm.network import proxy_for, trusted  # noqa: PLC0415
+    from khala_agents.llm.network import find_trust, proxy_for  # noqa: PLC0415
     from khala_protocol.errors import ConfigError  # noqa: PLC0415
 
     ways: dict[str, list[str]] = {}
@@ -227,7 +237,7 @@ def _network() -> Iterator[Finding]:
     if direct:
         yield Finding("no proxy", "ok", f"for {', '.join(direct)}")
     try:
-        trust = trusted()
+        trust = find_trust()
     except ConfigError as error:
         yield Finding("trusted certificates", "note", visible_line(str(error)), "name what is there, or unset it")
         return

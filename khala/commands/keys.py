@@ -109,23 +109,29 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
         raise ConfigError("holds no certificates: `khala keys init DIR` makes them", source=str(directory))
     if as_json:
         rows = [
-            {"name": one.name, "ends": one.ends.isoformat(), "days_left": one.days_left, "hosts": one.hosts}
-            for one in found
+            {
+                "name": certificate.name,
+                "ends": certificate.ends.isoformat(),
+                "days_left": certificate.days_left,
+                "hosts": certificate.hosts,
+            }
+            for certificate in found
         ]
         typer.echo(json.dumps({"certificates": rows}))
         return
     table = Table(box=None, pad_edge=False)
     for column in ("name", "folder", "valid until", "days", "listens at"):
         table.add_column(column, overflow="fold")
-    for one in found:
-        days = Text(str(one.days_left), "red" if one.warning else "")
-        table.add_row(one.name, one.path.parent.name, f"{one.ends:%Y-%m-%d}", days, ", ".join(one.hosts))
+    for certificate in found:
+        days = Text(str(certificate.days_left), "red" if certificate.warning else "")
+        ends = f"{certificate.ends:%Y-%m-%d}"
+        table.add_row(certificate.name, certificate.path.parent.name, ends, days, ", ".join(certificate.hosts))
     stdout_console().print(table)
-    for one in found:
-        if one.warning:
-            say(one.warning, err=True)
-        if one.is_open:
-            say(f"others can read {one.key}: chmod 600 {one.key}", err=True)
+    for certificate in found:
+        if certificate.warning:
+            say(certificate.warning, err=True)
+        if certificate.is_open:
+            say(f"others can read {certificate.key}: chmod 600 {certificate.key}", err=True)
 
 
 def _make(directory: Path, make: Callable[[], list[Path]]) -> None:

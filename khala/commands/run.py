@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedRun:
     """What the command line says of a match on this machine; names are those of its options."""
 
     task: str | None
@@ -44,10 +44,10 @@ class Wanted:
     minds: MindOptions
 
 
-def run(wanted: Wanted, *, as_json: bool) -> None:
+def run(wanted: WantedRun, *, as_json: bool) -> None:
     """Play a match on this machine, print the results, and end in order on SIGINT and SIGTERM."""
     known: list[MatchConfig] = []
-    results = asyncio.run(cancelled_by_signal(_played(wanted, known)))
+    results = asyncio.run(cancelled_by_signal(_play(wanted, known)))
     if not known:
         assert isinstance(results, signal.Signals)
         say("interrupted before the match began", err=True)
@@ -57,7 +57,7 @@ def run(wanted: Wanted, *, as_json: bool) -> None:
     end(known[0], results, as_json=as_json)
 
 
-async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
+async def _play(wanted: WantedRun, known: list[MatchConfig]) -> list[Result]:
     """Return the results; `known` gets the match as soon as it is known."""
     async with Spares(1) as stock:
         with _game_for(wanted) as launched:
@@ -82,7 +82,7 @@ async def _played(wanted: Wanted, known: list[MatchConfig]) -> list[Result]:
 
 
 @contextlib.contextmanager
-def _game_for(wanted: Wanted) -> Iterator[Launched | None]:
+def _game_for(wanted: WantedRun) -> Iterator[Launched | None]:
     """Start a process of the game, if it is for one player against the computer and draws nothing; end it if unused."""
     from khala_orchestrator.config import load_task  # noqa: PLC0415  # see above
 

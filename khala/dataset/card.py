@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import yaml
 
 from khala import __version__
-from khala.dataset.choose import Choice, Split
-from khala.dataset.files import Form
+from khala.dataset.choose import RowChoice, Split
+from khala.dataset.files import RowForm
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
@@ -71,21 +71,21 @@ class Contents:
 class Recipe:
     """How a data set was made."""
 
-    formats: tuple[Form, ...] = tuple(Form)
-    choice: Choice = field(default_factory=Choice)
+    formats: tuple[RowForm, ...] = tuple(RowForm)
+    choice: RowChoice = field(default_factory=RowChoice)
     split: Split = field(default_factory=Split)
     gamma: float = 0.99
     """Discount of the reward-to-go."""
     images: bool = True
 
 
-def card(contents: Contents, recipe: Recipe, form: Form) -> str:
+def card(contents: Contents, recipe: Recipe, form: RowForm) -> str:
     """Return the README of one form."""
     front = yaml.safe_dump(_front(contents, recipe, form), sort_keys=False)
-    return f"---\n{front}---\n\n" + "\n".join(_words(contents, recipe, form))
+    return f"---\n{front}---\n\n" + "\n".join(_body(contents, recipe, form))
 
 
-def _front(contents: Contents, recipe: Recipe, form: Form) -> dict[str, object]:
+def _front(contents: Contents, recipe: Recipe, form: RowForm) -> dict[str, object]:
     splits = [name for name in recipe.split.names if contents.rows[name]]
     tasks = ["text-generation", "reinforcement-learning"]
     return {
@@ -110,11 +110,11 @@ def _size(rows: int) -> str:
     return next((words for most, words in _SIZES.items() if rows < most), "n>10M")
 
 
-def _words(contents: Contents, recipe: Recipe, form: Form) -> Iterator[str]:
+def _body(contents: Contents, recipe: Recipe, form: RowForm) -> Iterator[str]:
     yield "# Decisions of StarCraft II agents\n"
     yield (
         f"{contents.rows.total()} decisions of agents that play StarCraft II over a message bus, exported by Khala "
-        f"{__version__} from {_counted(contents.recordings, 'recording')}. One row is one decision: the prompt, the "
+        f"{__version__} from {_plural(contents.recordings, 'recording')}. One row is one decision: the prompt, the "
         "reply, what became of its actions, and what they were worth.\n"
     )
     yield "## Contents\n"
@@ -151,18 +151,18 @@ def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     yield f"* Prompts of {contents.rebuilt} rows were sent to no model: they are made as a model would have got them."
     yield f"* Pictures: {contents.pictures if recipe.images else 'not exported'}."
     if contents.unrewarded:
-        yield f"* The recordings do not say what {_counted(contents.unrewarded, 'decision')} gained: reward is null."
+        yield f"* The recordings do not say what {_plural(contents.unrewarded, 'decision')} gained: reward is null."
     if contents.unread:
         yield f"* Files that are no recordings of a match: {contents.unread}."
     yield ""
 
 
-COLUMNS: Mapping[Form, str] = {
-    Form.OPENAI: """\
+COLUMNS: Mapping[RowForm, str] = {
+    RowForm.OPENAI: """\
 * `messages`: the prompt, and the reply as its last message, in the form of OpenAI's fine-tuning. Pictures stand in the
   prompt as data URLs, each after its title.
 """,
-    Form.SHAREGPT: """\
+    RowForm.SHAREGPT: """\
 * `id`: run, side, agent, episode and step of the decision.
 * `conversations`: the prompt, and the reply as the last part. `<image>` stands for a picture, after its title;
   `< image>` is in a text that had the same word.
@@ -170,7 +170,7 @@ COLUMNS: Mapping[Form, str] = {
 * `task`, `seed`, `outcome` of the episode; `model` as its endpoint calls it, empty for a player without a model;
   `status` is `fallback` where another policy decided for the model.
 """,
-    Form.PARQUET: """\
+    RowForm.PARQUET: """\
 * `id`, `run`, `task`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which decision it is.
 * `prompt`: the messages, with `role` and `content`; `images` were sent with the last one, each after its title of
   `image_titles`. `prompt_recorded` is false where no model got it.
@@ -212,5 +212,5 @@ def _cell(value: object) -> str:
     return visible_line(str(value))[:100].translate(_ESCAPES)
 
 
-def _counted(number: int, what: str) -> str:
+def _plural(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")

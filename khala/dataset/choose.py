@@ -42,7 +42,7 @@ _NAMES = {1: ("train",), 2: ("train", "test"), 3: ("train", "validation", "test"
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class RowChoice:
     """Which rows are exported."""
 
     only: tuple[Only, ...] = ()

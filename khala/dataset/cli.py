@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from khala.dataset.choose import Choice, Only, Split, SplitBy
-from khala.dataset.files import Form
+from khala.dataset.choose import Only, RowChoice, Split, SplitBy
+from khala.dataset.files import RowForm
 from khala_protocol.commandline import say
 
 app = typer.Typer(no_args_is_help=True, help="Make data sets of recordings.")
@@ -33,7 +33,7 @@ def export(
     *,
     out: Annotated[Path, typer.Option(help="Directory of the data set, new or empty.", metavar="DIR")],
     formats: Annotated[
-        list[Form] | None,
+        list[RowForm] | None,
         typer.Option(
             "--format",
             help="Format of the rows; may be given several times.",
@@ -69,8 +69,8 @@ def export(
     from khala.dataset.card import Recipe  # noqa: PLC0415
     from khala.dataset.export import export as write  # noqa: PLC0415
 
-    forms: tuple[Form, ...] = tuple(dict.fromkeys(formats or Form))
-    choice = Choice(tuple(only or ()), tuple(agent or ()))
+    forms: tuple[RowForm, ...] = tuple(dict.fromkeys(formats or RowForm))
+    choice = RowChoice(tuple(only or ()), tuple(agent or ()))
     contents = write(sources, out, Recipe(forms, choice, Split.of(split, split_by), gamma, images))
     rows = dict(contents.rows)
     left_out = {reason: count for reason, count in contents.left_out.items() if count}

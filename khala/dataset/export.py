@@ -40,7 +40,7 @@ def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
     """
     _require_empty(out)
     contents = Contents()
-    recordings = list(_opened(sources, contents))
+    recordings = list(_open_each(sources, contents))
     try:
         with replacing_directory(out) as part:
             with Files(part, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
@@ -70,7 +70,7 @@ def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[
     contents.left_out += rows.left_out
 
 
-def _opened(sources: Sequence[Path], contents: Contents) -> Iterator[Recording]:
+def _open_each(sources: Sequence[Path], contents: Contents) -> Iterator[Recording]:
     seen: set[Path] = set()
     for source in sources:
         for path in _found(source):

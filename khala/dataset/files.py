@@ -23,7 +23,7 @@ ROW_GROUP_BYTES = 16 * MB
 ROW_GROUP_ROWS = 1000
 
 
-class Form(StrEnum):
+class RowForm(StrEnum):
     """A form of rows: a folder of a data set."""
 
     PARQUET = "parquet"
@@ -33,7 +33,7 @@ class Form(StrEnum):
     @property
     def suffix(self) -> str:
         """The end of the names of its files."""
-        return "parquet" if self is Form.PARQUET else "jsonl"
+        return "parquet" if self is RowForm.PARQUET else "jsonl"
 
 
 class Writer(Protocol):
@@ -57,11 +57,11 @@ class Files:
         images: whether it has pictures.
     """
 
-    def __init__(self, directory: Path, formats: tuple[Form, ...], *, images: bool) -> None:
+    def __init__(self, directory: Path, formats: tuple[RowForm, ...], *, images: bool) -> None:
         self._directory, self._formats, self._images = directory, formats, images
-        self._writers: dict[tuple[Form, str], Writer] = {}
+        self._writers: dict[tuple[RowForm, str], Writer] = {}
         self._stack = ExitStack()
-        if Form.PARQUET in formats:
+        if RowForm.PARQUET in formats:
             import_pyarrow()
 
     def __enter__(self) -> Self:
@@ -156,10 +156,10 @@ class Parquet:
             self._writer.write_table(table)
 
 
-_WRITERS: dict[Form, Callable[[Path, bool], Writer]] = {
-    Form.PARQUET: Parquet,
-    Form.OPENAI: OpenAI,
-    Form.SHAREGPT: ShareGPT,
+_WRITERS: dict[RowForm, Callable[[Path, bool], Writer]] = {
+    RowForm.PARQUET: Parquet,
+    RowForm.OPENAI: OpenAI,
+    RowForm.SHAREGPT: ShareGPT,
 }
 
 

@@ -10,7 +10,7 @@ from base64 import b64encode
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from khala.dataset.row import Picture, Row
+    from khala.dataset.row import Row, RowPicture
     from khala_protocol.messages import ChatMessage
 
 _FROM = {"system": "system", "user": "human", "assistant": "gpt"}
@@ -31,7 +31,7 @@ def openai(row: Row, *, images: bool) -> dict[str, Any]:
     return {"messages": [*asked, {"role": "assistant", "content": said}]}
 
 
-def _content(message: ChatMessage, pictures: dict[str, Picture], *, images: bool) -> str | list[dict[str, Any]]:
+def _content(message: ChatMessage, pictures: dict[str, RowPicture], *, images: bool) -> str | list[dict[str, Any]]:
     """Return the content of a message: before each picture its title, and the text after them, as a model got it."""
     if not images:
         return message.content

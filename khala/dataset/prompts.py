@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_agents.memory import Memory, NoMemory, memory_of
+from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.prompt import Prompt
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class Prompter:
     def __init__(self) -> None:
         self._briefing: Briefing | None = None
         self._prompt: Prompt | None = None
-        self._memory: Memory = NoMemory()
+        self._memory: PromptMemory = NoMemory()
 
     def messages(self, briefing: Briefing, observation: Observation) -> tuple[ChatMessage, ...]:
         """Return the prompt for an observation, with its pictures."""

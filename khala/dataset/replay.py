@@ -19,7 +19,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from khala.dataset.files import Form, import_pyarrow
+from khala.dataset.files import RowForm, import_pyarrow
 from khala.dataset.forms import PLACEHOLDER
 from khala.dataset.prompts import Prompter
 from khala_agents.policy import Decision, Policy
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 PATH, RUN = "KHALA_DATASET", "KHALA_DATASET_RUN"
-_FORMS = (Form.PARQUET, Form.SHAREGPT, Form.OPENAI)
+_FORMS = (RowForm.PARQUET, RowForm.SHAREGPT, RowForm.OPENAI)
 """Folders of a data set, the one that knows most first."""
 _ROLES = {"system": "system", "human": "user", "gpt": "assistant"}
 _PICTURE = f"{PLACEHOLDER}\n"
@@ -168,12 +168,12 @@ def _json_lines(path: Path) -> Iterator[tuple[str | None, Chat, str]]:
         for line in file:
             row = json.loads(line)
             if "messages" in row:
-                chat = [(message["role"], _words(message["content"])) for message in row["messages"]]
+                chat = [(message["role"], _text(message["content"])) for message in row["messages"]]
             else:
                 chat = [(_ROLES[said["from"]], said["value"].split(_PICTURE)[-1]) for said in row["conversations"]]
             yield row.get("id"), chat[:-1], chat[-1][1]
 
 
-def _words(content: str | list[dict[str, Any]]) -> str:
+def _text(content: str | list[dict[str, Any]]) -> str:
     """Return the text of a message, which stands after its pictures."""
     return content if isinstance(content, str) else str(content[-1]["text"])

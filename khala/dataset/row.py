@@ -16,7 +16,7 @@ UNFINISHED = "unfinished"
 """The outcome of an episode whose recording ends before it does."""
 
 
-class Picture(NamedTuple):
+class RowPicture(NamedTuple):
     """A picture that was sent with a prompt."""
 
     ref: ImageRef
@@ -47,7 +47,7 @@ class Row:
     prompt: tuple[ChatMessage, ...]
     prompt_recorded: bool
     """Whether a model got this prompt; otherwise it is made of the briefing and the observation."""
-    pictures: tuple[Picture, ...]
+    pictures: tuple[RowPicture, ...]
     """Those sent with the prompt that are in the recording, in their order."""
     reply: str
     status: str

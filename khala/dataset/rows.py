@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala.dataset.prompts import Prompter
 from khala.dataset.rewards import COUNTED, UNKNOWN, rewards
-from khala.dataset.row import UNFINISHED, Picture, Row
+from khala.dataset.row import UNFINISHED, Row, RowPicture
 from khala_orchestrator.roster import Seat
 from khala_protocol.files import MB
 from khala_protocol.keys import Topic
@@ -33,7 +33,7 @@ MOST_PICTURE_BYTES = 64 * MB
 _READ = frozenset({Topic.BRIEFING, Topic.OBSERVATION, Topic.REPLY, Topic.EXCHANGE, Topic.REPORT})
 
 
-class Place(NamedTuple):
+class DecisionPlace(NamedTuple):
     """Which decision of a run it is."""
 
     seat: Seat
@@ -98,8 +98,8 @@ class Rows:
         self._prompters: dict[Seat, Prompter] = defaultdict(Prompter)
         self._briefings: dict[Seat, Briefing] = {}
         self._pictures = _Pictures()
-        self._open: dict[Place, _Open] = {}
-        self._settled: dict[Place, _Open] = {}
+        self._open: dict[DecisionPlace, _Open] = {}
+        self._settled: dict[DecisionPlace, _Open] = {}
 
     def __iter__(self) -> Iterator[Row]:
         for sample in self._recording:
@@ -132,11 +132,11 @@ class Rows:
             case Observation():
                 self._ask(seat, said)
             case Reply():
-                self._answer(Place(seat, said.episode, said.step), said)
+                self._answer(DecisionPlace(seat, said.episode, said.step), said)
             case ModelCall(purpose="decision"):
-                place = Place(seat, said.episode, said.step)
-                if one := self._open.get(place) or self._settled.get(place):
-                    one.call = said
+                place = DecisionPlace(seat, said.episode, said.step)
+                if decision := self._open.get(place) or self._settled.get(place):
+                    decision.call = said
 
     def _ask(self, seat: Seat, seen: Observation) -> None:
         """Open a decision. A host that goes on after it was killed asks again; what came before was lost with it."""
@@ -146,43 +146,43 @@ class Rows:
         found = {ref.sha256: self._pictures.kept.get(ref.sha256) for ref in seen.images}
         pictures = {digest: data for digest, data in found.items() if data is not None}
         prompt = self._prompters[seat].messages(briefing, seen)
-        self._open[Place(seat, seen.episode, seen.step)] = _Open(seen, prompt, pictures)
+        self._open[DecisionPlace(seat, seen.episode, seen.step)] = _Open(seen, prompt, pictures)
 
-    def _answer(self, place: Place, reply: Reply) -> None:
-        one = self._open.get(place)
-        if one is None or one.reply is not None:
+    def _answer(self, place: DecisionPlace, reply: Reply) -> None:
+        decision = self._open.get(place)
+        if decision is None or decision.reply is not None:
             return
-        one.reply = reply
+        decision.reply = reply
         if reply.status == "ok":
-            self._prompters[place.seat].remember(one.seen, reply.text)
+            self._prompters[place.seat].remember(decision.seen, reply.text)
 
     def _settle(self, report: Report) -> None:
         for agent in report.agents:
             asked = report.step if agent.asked_step is None else agent.asked_step
-            place = Place(Seat(agent.side, agent.agent), report.episode, asked)
-            one = self._open.pop(place, None)
+            place = DecisionPlace(Seat(agent.side, agent.agent), report.episode, asked)
+            decision = self._open.pop(place, None)
             if agent.status not in COUNTED:
                 self.left_out[agent.status] += 1
-            elif one is None or one.reply is None:
+            elif decision is None or decision.reply is None:
                 self.left_out["not recorded"] += 1
-            elif not one.reply.text.strip():
+            elif not decision.reply.text.strip():
                 self.left_out["no words"] += 1
             else:
-                one.report = agent
-                self._settled[place] = one
+                decision.report = agent
+                self._settled[place] = decision
 
     def _ready(self) -> Iterator[Row]:
-        for place in [place for place, one in self._settled.items() if one.is_complete]:
+        for place in [place for place, decision in self._settled.items() if decision.is_complete]:
             yield self._row(self._settled.pop(place))
         while len(self._settled) > MOST_WAITING:
             yield self._row(self._settled.pop(next(iter(self._settled))))
 
-    def _row(self, one: _Open) -> Row:
-        seen, reply, report, call = one.seen, one.reply, one.report, one.call
+    def _row(self, decision: _Open) -> Row:
+        seen, reply, report, call = decision.seen, decision.reply, decision.report, decision.call
         assert reply is not None and report is not None
-        prompt = one.prompt if call is None else call.prompt
+        prompt = decision.prompt if call is None else call.prompt
         result = self._results.get((seen.side, seen.episode))
-        shown = [ref for message in prompt for ref in message.images if ref.sha256 in one.pictures]
+        shown = [ref for message in prompt for ref in message.images if ref.sha256 in decision.pictures]
         return Row(
             run=self._run.run,
             task=self._run.task,
@@ -197,7 +197,7 @@ class Rows:
             game_loop=seen.game_loop,
             prompt=prompt,
             prompt_recorded=call is not None,
-            pictures=tuple(Picture(ref, one.pictures[ref.sha256]) for ref in shown),
+            pictures=tuple(RowPicture(ref, decision.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
             status=reply.status,
             model=(call.answered_by or call.model) if call is not None and reply.status == "ok" else "",

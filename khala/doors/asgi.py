@@ -99,7 +99,7 @@ def _replay(messages: list[Message], receive: Receive) -> Receive:
     """Return a `receive` that begins with what was read already."""
     rest = iter(messages)
 
-    async def replayed() -> Message:
+    async def replay() -> Message:
         return next(rest, None) or await receive()
 
-    return replayed
+    return replay

@@ -30,7 +30,7 @@ HEADERS: Final = {
 _DEFAULTS: Final = {"Content-Security-Policy": "default-src 'none'", "Cache-Control": "no-store"}
 
 
-def guarded(door: Door) -> Middleware:
+def guard(door: Door) -> Middleware:
     """Return the middleware that holds every request to the rules of a door."""
 
     @web.middleware

@@ -176,7 +176,7 @@ class Door:
         if self.token and any(is_same(secret, self.token) for secret in given):
             return None
         if not any(given):
-            return self._denied()
+            return self._denial()
         if (wait_s := self.brake.wait_s(head.peer)) > 0:
             return Refusal(
                 429,
@@ -187,9 +187,9 @@ class Door:
             self.brake.note_right(head.peer)
             return None
         self.brake.note_wrong(head.peer)
-        return self._denied()
+        return self._denial()
 
-    def _denied(self) -> Refusal:
+    def _denial(self) -> Refusal:
         text = f"the token is missing or wrong: open the address that `{self.command}` printed"
         challenge = {"WWW-Authenticate": f'Basic realm="{self.command}", charset="UTF-8"'} if self.password else {}
         return Refusal(self.denied, text, challenge)

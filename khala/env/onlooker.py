@@ -52,7 +52,7 @@ class Onlooker:
         self._bus = broker.session()
         terrains = await self._bus.subscribe(run_key(run, Topic.TERRAIN), Delivery.STATE)
         scenes = await self._bus.subscribe(run_key(run, Topic.SCENE), Delivery.STATE)
-        self._listening = [asyncio.create_task(self._hear(one)) for one in (terrains, scenes)]
+        self._listening = [asyncio.create_task(self._hear(subscriber)) for subscriber in (terrains, scenes)]
 
     async def close(self) -> None:
         """Listen no more."""
@@ -67,7 +67,7 @@ class Onlooker:
                 await self._changed.wait_for(lambda: self._scene is not None and self._scene.step >= step)
         if self._terrain is None or self._scene is None:
             return np.zeros((SIZE_PX, SIZE_PX, 3), np.uint8)
-        return drawn(self._terrain, self._scene)
+        return draw(self._terrain, self._scene)
 
     async def _hear(self, samples: Subscription[Sample]) -> None:
         async for sample in samples:
@@ -79,12 +79,12 @@ class Onlooker:
                 self._changed.notify_all()
 
 
-def drawn(terrain: Terrain, scene: Scene) -> Picture:
+def draw(terrain: Terrain, scene: Scene) -> Picture:
     """Return the playable part of a map with its units, [height, width, 3] RGB."""
     x0, y0, x1, y1 = terrain.bounds
     scale = SIZE_PX / max(x1 - x0, y1 - y0, 1.0)
     picture = _ground(terrain, scale)
-    for unit in sorted(scene.units, key=lambda one: bool(one.flags & UnitFlag.FLYING)):
+    for unit in sorted(scene.units, key=lambda unit: bool(unit.flags & UnitFlag.FLYING)):
         _draw(picture, unit, (unit.x - x0) * scale, (unit.y - y0) * scale, max(unit.radius * scale, 2.0))
     return picture
 

@@ -19,7 +19,7 @@ from khala.env.onlooker import Onlooker
 from khala.env.rewards import battle
 from khala.playing.loop_thread import LoopThread
 from khala.playing.minds import Minds, minds_of
-from khala.playing.seats import Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.playing.seats import Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 from khala_bridge.game.processes import IdleGames
 from khala_bridge.task.code import code_of
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -82,11 +82,11 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         task = load_task(task) if isinstance(task, str) else task
         check_trusted(code_of(task), source=task.name)
         scenes = None if render_mode else "none"
-        self._task = unhurried(change(task, max_steps=max_cycles, scenes=scenes))
-        self._seats = _named(self._task, agents)
+        self._task = without_time_limit(change(task, max_steps=max_cycles, scenes=scenes))
+        self._seats = _seats_by_name(self._task, agents)
         sides = [side.side for side in self._task.per_side()]
         trust_named(others)
-        self._minds = {} if others is None else minds_of(sides, Minds().named(others), {})
+        self._minds = {} if others is None else minds_of(sides, Minds().with_name(others), {})
         self._reward, self._game = reward, game
         self.render_mode = render_mode
         self.possible_agents = list(self._seats)
@@ -102,7 +102,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         self._games = IdleGames()
         self._match: SeatedMatch | None = None
         self._onlooker: Onlooker | None = None
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._texts: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
             self._enter(secrets.randbelow(_MOST_SEED) if seed is None else seed)
         self.agents = list(self.possible_agents)
         self._texts = dict.fromkeys(self.possible_agents, "")
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._turn = self._next({})
         return self._seen(), self._infos({})
 
@@ -222,11 +222,11 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
                 self._thread.run(self._onlooker.close())
         self._match = None
 
-    def _next(self, actions: Mapping[str, str]) -> Turn:
+    def _next(self, actions: Mapping[str, str]) -> SeatsTurn:
         assert self._match is not None and self._thread is not None
-        return self._thread.run(self._answered(self._match, actions))
+        return self._thread.run(self._answer(self._match, actions))
 
-    async def _answered(self, match: SeatedMatch, actions: Mapping[str, str]) -> Turn:
+    async def _answer(self, match: SeatedMatch, actions: Mapping[str, str]) -> SeatsTurn:
         for agent, seat in self._seats.items():
             if seat in self._turn.asked:
                 match.act(seat, actions.get(agent, ""))
@@ -254,7 +254,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         heard = (
             agent for report in self._turn.reports for agent in report.agents if Seat(agent.side, agent.agent) == seat
         )
-        reports = [one.but(latency_s=None) for one in heard]
+        reports = [report.but(latency_s=None) for report in heard]
         info: dict[str, Any] = {"asked": seat in self._turn.asked, "reports": reports}
         if seat in self._turn.asked:
             seen = self._turn.asked[seat]
@@ -262,7 +262,7 @@ class TextParallelEnv(ParallelEnv[str, str, str]):  # type: ignore[misc]  # Pett
         return info if result is None else info | {"result": result.but(**_UNTIMED)}
 
 
-def _named(task: TaskConfig, wanted: Sequence[str] | None) -> dict[str, Seat]:
+def _seats_by_name(task: TaskConfig, wanted: Sequence[str] | None) -> dict[str, Seat]:
     """Return the seats that are played, by the agents' names, with their sides where there are two.
 
     Raises:

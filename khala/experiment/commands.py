@@ -30,8 +30,8 @@ from khala_protocol.signals import cancelled_by_signal
 if TYPE_CHECKING:
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
-    from khala.experiment.runner import Estimate, Runner
-    from khala.experiment.spec import Budget
+    from khala.experiment.runner import CostEstimate, Runner
+    from khala.experiment.spec import ExperimentBudget
 
 SHIPPED = "experiments"
 
@@ -45,21 +45,21 @@ def run(file: str, out: Path, options: dict[str, Any]) -> None:
 
 def resume(directory: Path, out: Path, options: dict[str, Any]) -> None:
     """Go on with an experiment, as its directory has it."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     _play(store.experiment(), store, None, **options)
 
 
 def list_shipped(*, as_json: bool) -> None:
     """List the shipped experiments."""
-    found = {name: load(path, Experiment) for name, path in shipped().items()}
+    found = {name: load(path, Experiment) for name, path in shipped_experiments().items()}
     if as_json:
-        typer.echo(json.dumps({name: one.description for name, one in found.items()}))
+        typer.echo(json.dumps({name: experiment.description for name, experiment in found.items()}))
         return
     table = Table(box=None, pad_edge=False)
     for column in ("experiment", "about"):
         table.add_column(column)
-    for name, one in found.items():
-        table.add_row(name, one.description)
+    for name, experiment in found.items():
+        table.add_row(name, experiment.description)
     stdout_console().print(table)
 
 
@@ -72,14 +72,14 @@ def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
 
 def status(directory: Path, *, game: str, out: Path, as_json: bool) -> None:
     """Show how far an experiment is."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     experiment = store.experiment()
     _print_cells(experiment, plan(experiment, game=game), store, as_json=as_json)
 
 
 def index(directory: Path, *, out: Path) -> None:
     """Make the index of an experiment again."""
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     stderr_console().print(f"{store.rebuild()} matches are in {store.directory / 'index.sqlite'}", soft_wrap=True)
 
 
@@ -91,18 +91,14 @@ def path_of(file: str) -> Path:
     """
     if file.endswith((".yaml", ".yml")):
         return Path(file)
-    if file in (found := shipped()):
+    if file in (found := shipped_experiments()):
         return found[file]
     raise ConfigError(f"there is no experiment {file!r}: there are {', '.join(found)}; a .yaml file works too")
 
 
-def shipped() -> dict[str, Path]:
+def shipped_experiments() -> dict[str, Path]:
     """Return the shipped experiments by name."""
     return {path.stem: path for path in sorted((CONFIGS / SHIPPED).glob("*.yaml"))}
-
-
-def _opened(directory: Path, out: Path) -> Store:
-    return Store.opened(directory if directory.is_dir() else out / directory)
 
 
 # --- playing -----------------------------------------------------------------------------------------
@@ -113,7 +109,7 @@ def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any)
     check_playable(matches, _budget(experiment, given["budget_usd"]).usd)
     if file is not None:
         store.begin(file)
-    with store.locked():
+    with store.lock():
         engine = _engine(given, store)
         playing = _until_done(experiment, store, engine, matches, given)
         done = asyncio.run(cancelled_by_signal(playing))
@@ -145,7 +141,7 @@ async def _until_done(
     return runner
 
 
-def _budget(experiment: Experiment, usd: float | None) -> Budget:
+def _budget(experiment: Experiment, usd: float | None) -> ExperimentBudget:
     return experiment.budget if usd is None else experiment.budget.model_copy(update={"usd": usd})
 
 
@@ -170,7 +166,7 @@ def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
     return False
 
 
-def words_of(estimate: Estimate) -> str:
+def words_of(estimate: CostEstimate) -> str:
     """Return an estimate as a sentence."""
     money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
     return (
@@ -192,7 +188,7 @@ def _engine(given: dict[str, Any], store: Store) -> Engine:
 
 
 def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner, *, as_json: bool) -> None:
-    played = store.played()
+    played = store.matches()
     states = [played[match.key].state if match.key in played else "missing" for match in matches]
     counts = {state: states.count(state) for state in ("done", "invalid", "crashed", "missing") if state in states}
     screen = stderr_console()
@@ -210,18 +206,18 @@ def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner,
 
 
 def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Store, *, as_json: bool) -> None:
-    played = store.played()
+    played = store.matches()
     rows: dict[tuple[str, ...], dict[str, Any]] = {}
     for match in matches:
         row = rows.setdefault(tuple(match.cell.values()), dict(match.cell) | {"matches": 0, "done": 0, "invalid": 0,
                               "crashed": 0, "cost_usd": 0.0, "causes": []})  # fmt: skip
         row["matches"] += 1
-        if (one := played.get(match.key)) is not None:
-            row[one.state] += 1
-            row["cost_usd"] += one.cost_usd or 0.0
-            row["causes"] += [one.cause] if one.cause and one.cause not in row["causes"] else []
+        if (became := played.get(match.key)) is not None:
+            row[became.state] += 1
+            row["cost_usd"] += became.cost_usd or 0.0
+            row["causes"] += [became.cause] if became.cause and became.cause not in row["causes"] else []
     if as_json:
-        plain = [dataclasses.asdict(one) for one in played.values() if one.state != "done"]
+        plain = [dataclasses.asdict(match) for match in played.values() if match.state != "done"]
         typer.echo(json.dumps({"cells": list(rows.values()), "not_done": plain}, default=str))
         return
     table = Table(box=None, pad_edge=False, title=f"{experiment.name}: {len(matches)} matches")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from khala.experiment import power, statistics
-from khala.experiment.likeness import Difference, differences, forbidden
+from khala.experiment.likeness import CardDifference, differences, forbidden
 from khala.experiment.measures import Measures
 from khala.experiment.selection import SIDE, Row, Selection, factor
 from khala_protocol.errors import ConfigError
@@ -72,7 +72,7 @@ class Findings:
     """Matches that say nothing, by state."""
     not_shared: tuple[str, ...]
     """Tasks that only one of the two has."""
-    allowed: tuple[Difference, ...]
+    allowed: tuple[CardDifference, ...]
     """In what the matches differ, and it was allowed."""
 
 
@@ -91,14 +91,14 @@ def compare(a: Selection, b: Selection, *, measures: Sequence[str] = USUAL, allo
         raise ConfigError(f"{a.text} and {b.text} have no match in common: {_tasks(games_a)} and {_tasks(games_b)}")
     allowed = _require_alike(a, b, [(games_a[group], games_b[group]) for group in shared], allow)
     found = [
-        _one(task, name, [group for group in shared if group.task == task], games_a, games_b)
+        _compare(task, name, [group for group in shared if group.task == task], games_a, games_b)
         for task in dict.fromkeys(group.task for group in shared)
         for name in measures
     ]
     pairs = sum(len(games_a[group].keys() & games_b[group].keys()) for group in shared)
     all_a, all_b = (sum(map(len, games.values())) for games in (games_a, games_b))
     either = sorted({group.task for group in games_a} ^ {group.task for group in games_b})
-    return Findings(a.text, b.text, _corrected(found), (all_a - pairs, all_b - pairs), (a.left_out, b.left_out),
+    return Findings(a.text, b.text, _with_holm(found), (all_a - pairs, all_b - pairs), (a.left_out, b.left_out),
                   tuple(either), tuple(allowed))  # fmt: skip
 
 
@@ -126,10 +126,10 @@ def _games(selection: Selection, others: tuple[str, ...]) -> dict[Group, dict[Se
     return dict(groups)
 
 
-def _ambiguous(selection: Selection, one: Row, other: Row) -> str:
-    name = next((name for name in selection.factors if factor(one, name) != factor(other, name)), "")
+def _ambiguous(selection: Selection, row: Row, other: Row) -> str:
+    name = next((name for name in selection.factors if factor(row, name) != factor(other, name)), "")
     again = f"name one value, as {_with(selection, name)}" if name else "their models or files differ"
-    return f"{selection.text} has two matches of task {one['task']} with seed {one['seed']}: {again}"
+    return f"{selection.text} has two matches of task {row['task']} with seed {row['seed']}: {again}"
 
 
 def _with(selection: Selection, name: str) -> str:
@@ -143,19 +143,19 @@ def _tasks(games: Iterable[Group]) -> str:
 
 def _require_alike(
     a: Selection, b: Selection, groups: Iterable[tuple[dict[Seat, Row], dict[Seat, Row]]], allow: Collection[str]
-) -> list[Difference]:
+) -> list[CardDifference]:
     """Return the differences that are allowed.
 
     Raises:
         ConfigError: there are others.
     """
-    found: dict[Difference, None] = {}
+    found: dict[CardDifference, None] = {}
     for games_a, games_b in groups:
         matches_a = [a.matches[row["match"]] for row in games_a.values()]
         matches_b = [b.matches[row["match"]] for row in games_b.values()]
         found |= dict.fromkeys(differences(matches_a, matches_b))
     if unlike := forbidden(found, allow):
-        names = sorted({one.field.partition(".")[0] for one in unlike})
+        names = sorted({difference.field.partition(".")[0] for difference in unlike})
         options = " ".join(f"--allow {name}" for name in names)
         words = "; ".join(map(str, unlike))
         raise ConfigError(f"{a.text} (A) and {b.text} (B) are not alike: {words}. {options} compares them nevertheless")
@@ -165,7 +165,7 @@ def _require_alike(
 # --- what they say ------------------------------------------------------------------------------------
 
 
-def _one(
+def _compare(
     task: str,
     measure: str,
     groups: list[Group],
@@ -179,9 +179,9 @@ def _one(
     else:
         rows_a, rows_b = ([row for group in groups for row in games[group].values()] for games in (games_a, games_b))
     value = _estimate(measure)
-    tested = _paired(measure) if pairs else _unpaired(measure)
+    tested = _paired_test(measure) if pairs else _unpaired_test(measure)
     test = tested(rows_a, rows_b) if tested else None
-    needed = _needed(rows_a, rows_b, test, paired=bool(pairs)) if measure == WIN else None
+    needed = _games_needed(rows_a, rows_b, test, paired=bool(pairs)) if measure == WIN else None
     games = min(len(rows_a), len(rows_b))
     return Compared(task, measure, bool(pairs), games, value(rows_a), value(rows_b), test, None, needed)
 
@@ -194,7 +194,7 @@ def _estimate(measure: str) -> Callable[[list[Row]], Interval]:
     return lambda rows: statistics.mean(_column(rows, measure))
 
 
-def _paired(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
+def _paired_test(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
     if measure == WIN:
         return lambda a, b: statistics.compare_paired_wins(_won(a), _won(b))
     if measure == KD:
@@ -204,7 +204,7 @@ def _paired(measure: str) -> Callable[[list[Row], list[Row]], Comparison]:
     return lambda a, b: statistics.compare_paired_values(_column(a, measure), _column(b, measure))
 
 
-def _unpaired(measure: str) -> Callable[[list[Row], list[Row]], Comparison] | None:
+def _unpaired_test(measure: str) -> Callable[[list[Row], list[Row]], Comparison] | None:
     if measure == WIN:
         return lambda a, b: statistics.compare_wins(sum(_won(a)), len(a), sum(_won(b)), len(b))
     if measure == KD:
@@ -221,7 +221,7 @@ def _column(rows: Iterable[Row], name: str) -> list[float | None]:
     return [row[name] for row in rows]
 
 
-def _needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool) -> int | None:
+def _games_needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool) -> int | None:
     """Return how many games would show such a difference in wins."""
     won_a, won_b = _won(a), _won(b)
     if test is None or test.p < LEVEL or not test.effect.value:
@@ -234,9 +234,9 @@ def _needed(a: list[Row], b: list[Row], test: Comparison | None, *, paired: bool
     return needed if needed <= MOST_GAMES else None
 
 
-def _corrected(found: Sequence[Compared]) -> tuple[Compared, ...]:
-    p = statistics.holm([one.test.p if one.test else None for one in found])
-    return tuple(replace(one, p_holm=value) for one, value in zip(found, p, strict=True))
+def _with_holm(found: Sequence[Compared]) -> tuple[Compared, ...]:
+    p = statistics.holm([comparison.test.p if comparison.test else None for comparison in found])
+    return tuple(replace(comparison, p_holm=value) for comparison, value in zip(found, p, strict=True))
 
 
 def _check(measure: str) -> None:
@@ -247,6 +247,6 @@ def _check(measure: str) -> None:
 
 def measures_that_compare() -> tuple[str, ...]:
     """Return the names that `compare` takes: wins, and every column of numbers."""
-    kinds: dict[str, Any] = {name: str(one.type) for name, one in Measures.__dataclass_fields__.items()}
+    kinds: dict[str, Any] = {name: str(field.type) for name, field in Measures.__dataclass_fields__.items()}
     numbers = [name for name, kind in kinds.items() if kind.startswith(("int", "float"))]
     return (WIN, *(name for name in numbers if name not in ("episode", "seed")))

@@ -52,19 +52,19 @@ def write_parquet(store: Store, path: Path) -> int:
 
 def table(store: Store) -> tuple[Columns, list[dict[str, Any]]]:
     """Return the columns with their types, and the rows."""
-    played = store.played()
+    played = store.matches()
     columns = _columns(factors_of(played.values()))
     rows = [row | {"recording": played[row["match"]].recording} for row in store.results()]
-    return columns, [{name: _typed(row.get(name), kind) for name, kind in columns.items()} for row in rows]
+    return columns, [{name: _convert(row.get(name), kind) for name, kind in columns.items()} for row in rows]
 
 
 def _columns(factors: tuple[str, ...]) -> Columns:
     about: Columns = {"match": str, "state": str, "cause_of_state": str, "repetition": int}
     kinds = {kind.__name__: kind for kind in (str, int, float, bool)}
-    measures = {name: kinds[str(one.type).split(" | ")[0]] for name, one in Measures.__dataclass_fields__.items()}
+    measures = {name: kinds[str(field.type).split(" | ")[0]] for name, field in Measures.__dataclass_fields__.items()}
     return {**about, **{f"{FACTOR}{name}": str for name in factors}, **measures, "recording": str}
 
 
-def _typed(value: Any, kind: type) -> Any:
+def _convert(value: Any, kind: type) -> Any:
     """Return a value of SQLite, which has no booleans, in the type of its column."""
     return None if value is None else kind(value)

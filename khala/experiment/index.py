@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from khala import indexes
 from khala.experiment.measures import CallCount, Measures
 from khala.experiment.plan import FACTOR
-from khala.experiment.played import Played
+from khala.experiment.played import PlayedMatch
 from khala_protocol.transaction import transaction
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def connect(path: Path) -> sqlite3.Connection:
     return indexes.connect(path, schema(), VERSION)
 
 
-def take(index: sqlite3.Connection, path: Path, played: Played, rows: Sequence[Row]) -> None:
+def take(index: sqlite3.Connection, path: Path, played: PlayedMatch, rows: Sequence[Row]) -> None:
     """Note what a recording says, which may be anyone's."""
     try:
         add(index, played, rows)
@@ -88,9 +88,9 @@ def take(index: sqlite3.Connection, path: Path, played: Played, rows: Sequence[R
         log.warning("%s has a number that is larger than SQLite's: it is left out", path)
 
 
-def add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
+def add(index: sqlite3.Connection, played: PlayedMatch, rows: Sequence[Row]) -> None:
     """Note what became of a match; it replaces what was known of it."""
-    values = [getattr(played, name) for name in Played.__slots__]
+    values = [getattr(played, name) for name in PlayedMatch.__slots__]
     plain = [json.dumps(value) if isinstance(value, dict) else value for value in values]
     names = list(result_columns())
     with transaction(index):
@@ -105,10 +105,10 @@ def add(index: sqlite3.Connection, played: Played, rows: Sequence[Row]) -> None:
             index.execute(f"insert into results values {_places(values)}", values)  # noqa: S608
 
 
-def played_in(index: sqlite3.Connection) -> dict[str, Played]:
+def played_in(index: sqlite3.Connection) -> dict[str, PlayedMatch]:
     """Return the matches; raise `ValueError` if one is not as we write it."""
-    names = Played.__slots__
-    columns = ", ".join(Played.__slots__)
+    names = PlayedMatch.__slots__
+    columns = ", ".join(PlayedMatch.__slots__)
     found = index.execute(f"select {columns} from matches order by rowid")  # noqa: S608  # our own names
     rows = (dict(zip(names, row, strict=True)) for row in found)
     plain = (row | {name: json.loads(row[name]) for name in ("cell", "card")} for row in rows)
@@ -116,8 +116,8 @@ def played_in(index: sqlite3.Connection) -> dict[str, Played]:
 
 
 @cache
-def _match() -> TypeAdapter[Played]:
-    return TypeAdapter(Played)
+def _match() -> TypeAdapter[PlayedMatch]:
+    return TypeAdapter(PlayedMatch)
 
 
 def results_in(index: sqlite3.Connection) -> list[dict[str, Any]]:
@@ -126,10 +126,10 @@ def results_in(index: sqlite3.Connection) -> list[dict[str, Any]]:
     kinds = _annotations()
     columns = ", ".join(f'"{name}"' for name in kinds)
     found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
-    return [_joined(matches[key], _checked(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
+    return [_join(matches[key], _check_types(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
 
 
-def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
+def _check_types(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
     """Return a row; raise `ValueError` if a value is of another type than its column: SQLite takes any."""
     for name, kind in kinds.items():
         types, _, nothing = str(kind).partition(" | ")
@@ -138,7 +138,7 @@ def _checked(row: dict[str, Any], kinds: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _joined(match: Played, row: dict[str, Any]) -> dict[str, Any]:
+def _join(match: PlayedMatch, row: dict[str, Any]) -> dict[str, Any]:
     cell = {f"{FACTOR}{name}": value for name, value in match.cell.items()}
     about = {"match": match.key, "state": match.state, "cause_of_state": match.cause, "repetition": match.repetition}
     return {**about, **cell, **row}

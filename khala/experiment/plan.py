@@ -75,11 +75,11 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
     if count > MOST_MATCHES:
         raise ConfigError(f"the grid has {count} matches, more than {MOST_MATCHES}: split the experiment")
     name = games.name_of(game)
-    prepared = [_prepared(cell, settings, name) for cell, settings in grid]
+    prepared = [_prepare(cell, settings, name) for cell, settings in grid]
     planned = [
-        one.match(experiment.name, seed, repetition)
+        cell.match(experiment.name, seed, repetition)
         for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
-        for one in prepared
+        for cell in prepared
     ]
     return list({match.key: match for match in planned}.values())
 
@@ -106,7 +106,7 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
                     check_keys(mind.keys_sent())
                     replace(mind, budget_usd=budget_usd).check()
         except ConfigError as error:
-            raise ConfigError(f"{_words(match.cell)}: {error}") from None
+            raise ConfigError(f"{_title(match.cell)}: {error}") from None
 
 
 def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
@@ -116,12 +116,12 @@ def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
         if not any(excluded.items() <= cell.items() for excluded in experiment.exclude):
             yield from _both_ways(experiment, cell, levels)
     for number, included in enumerate(experiment.include, 1):
-        chosen = [_included(experiment, factor, value, number) for factor, value in included.items()]
+        chosen = [_included_level(experiment, factor, value, number) for factor, value in included.items()]
         names = [level.name for level in chosen]
         yield from _both_ways(experiment, dict(zip(included, names, strict=True)), chosen)
 
 
-def _included(experiment: Experiment, factor: str, value: object, number: int) -> Level:
+def _included_level(experiment: Experiment, factor: str, value: object, number: int) -> Level:
     known = {level.name: level for level in experiment.factors[factor]}
     if isinstance(value, str) and value in known:
         return known[value]
@@ -141,7 +141,7 @@ def _both_ways(
         yield cell, settings
         return
     if not settings.sides or len(settings.sides) != 2:
-        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_words(cell)} has none")
+        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_title(cell)} has none")
     (blue, red), (first, second) = settings.sides, settings.sides.values()
     yield cell | {SWAPPED: "no"}, settings
     yield cell | {SWAPPED: "yes"}, settings.model_copy(update={"sides": {blue: second, red: first}})
@@ -167,7 +167,7 @@ class _Prepared:
         return PlannedMatch(key, self.cell, seed, repetition, config, self.minds)
 
 
-def _prepared(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
+def _prepare(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
     try:
         task = task_of(settings)
         minds = minds_for(task, settings)
@@ -179,7 +179,7 @@ def _prepared(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
             "minds": {side: _identity(mind) for side, mind in minds.items()},
         }
     except ConfigError as error:
-        raise ConfigError(f"{_words(cell)}: {error}") from None
+        raise ConfigError(f"{_title(cell)}: {error}") from None
     return _Prepared(cell, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
 
 
@@ -210,7 +210,7 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     """
     common = Minds(base_url=settings.base_url, latency_s=settings.latency_s or 0.0, fallback=settings.fallback)
     if settings.model is not None:
-        common = replace(common.named(settings.model), base_url=settings.base_url)
+        common = replace(common.with_name(settings.model), base_url=settings.base_url)
     if settings.agents:
         common = replace(common, agents=settings.agents)
     return minds_of([side.side for side in task.per_side()], common, settings.sides or {})
@@ -219,8 +219,8 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
 def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
     said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
-    named = [mind, *(replace(mind, agents={}).named(text) for text in mind.agents.values())]
-    return said | {"files": [_model_file(one.model) for one in named if one.policy is None]}
+    named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
+    return said | {"files": [_model_file(mind.model) for mind in named if mind.policy is None]}
 
 
 def _model_file(name: str) -> Mapping[str, Any]:
@@ -229,5 +229,5 @@ def _model_file(name: str) -> Mapping[str, Any]:
     return load_model(name).model_dump(mode="json", include=fields)
 
 
-def _words(cell: Mapping[str, str]) -> str:
+def _title(cell: Mapping[str, str]) -> str:
     return ", ".join(f"{factor} {value}" for factor, value in cell.items())

@@ -17,7 +17,7 @@ State = Literal["done", "invalid", "crashed"]
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
+class PlayedMatch:
     """What became of one match."""
 
     key: str
@@ -37,15 +37,15 @@ class Played:
     """What of its run card must be the same in runs that are compared."""
 
 
-def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | None) -> Played:
+def unread(match: PlannedMatch, attempts: int, cause: str, cost_usd: float | None) -> PlayedMatch:
     """Return what became of a match of which there is no recording that can be read."""
-    return Played(
+    return PlayedMatch(
         key=match.key, cell=match.cell, seed=match.seed, repetition=match.repetition, state="crashed", cause=cause,
         attempts=attempts, recording="", wall_s=None, cost_usd=cost_usd, tokens=None, card={},
     )  # fmt: skip
 
 
-def judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> Played:
+def judge(card: Run, rows: list[Measures], recording: str, attempts: int, crash: str) -> PlayedMatch:
     """Return what became of a recorded match, without its cost.
 
     Args:
@@ -57,7 +57,7 @@ def judged(card: Run, rows: list[Measures], recording: str, attempts: int, crash
     """
     state, cause = _state(rows, crash)
     labels = card.labels
-    return Played(
+    return PlayedMatch(
         key=labels.get("match", card.run),
         cell={name.removeprefix(FACTOR): value for name, value in labels.items() if name.startswith(FACTOR)},
         seed=card.seed,

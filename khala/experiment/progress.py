@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from khala.experiment.plan import PlannedMatch
-    from khala.experiment.runner import Event, Runner
+    from khala.experiment.runner import Runner, RunnerEvent
 
 SHOWN = 4
 """Matches that are named while they are played."""
@@ -32,7 +32,7 @@ class Watcher:
         self._counts: Counter[str] = Counter()
         self._now: dict[str, str] = {}
         self._total = len(matches)
-        left = len(list(missing(matches, runner.store.played())))
+        left = len(list(missing(matches, runner.store.matches())))
         self._counts["before"] = self._total - left
         title_of, until, words = (
             TextColumn(text, markup=False) for text in ("{task.description}", "ends in", "{task.fields[words]}")
@@ -60,16 +60,16 @@ class Watcher:
     ) -> None:
         self._bar.stop()
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: RunnerEvent) -> None:
         """Show what happened."""
         if event.what == "begins":
             self._now[event.match.key] = event.match.title
         else:
             self._now.pop(event.match.key, None)
             self._tell(event)
-        self._bar.update(self._task, words=self._words(), advance=1.0 if event.what == "ends" else 0.0)
+        self._bar.update(self._task, words=self._activity(), advance=1.0 if event.what == "ends" else 0.0)
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: RunnerEvent) -> None:
         assert event.played is not None
         state = event.played.state
         if event.what == "ends":
@@ -84,7 +84,7 @@ class Watcher:
                 f"{when} {event.match.title}: {state}{took}{because}{again}", soft_wrap=True, highlight=False
             )
 
-    def _words(self) -> str:
+    def _activity(self) -> str:
         money = f"{self._runner.spent.usd:.4f} USD · " if self._runner.spent.usd else ""
         others = [f"{self._counts[state]} {state}" for state in ("invalid", "crashed") if self._counts[state]]
         playing = list(self._now.values())[:SHOWN]

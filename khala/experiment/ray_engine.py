@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 from khala.experiment.engine import MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
 from khala.playing import logs, worker
 from khala.playing.jobs import END_S, Ended, Job
-from khala_agents.llm.money import SUFFIX, Ledger
+from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_protocol.errors import ConfigError
 
 try:
@@ -75,10 +75,10 @@ class Ray:
     async def play(self, job: Job) -> Ended:
         """Play a match on a node that has room for it."""
         assert job.config.record is not None
-        with Ledger(job.config.record.with_suffix(SUFFIX)) as ledger:
+        with MoneyLedger(job.config.record.with_suffix(SUFFIX)) as ledger:
             return await self._play(job, job.config.record, ledger)
 
-    async def _play(self, job: Job, record: Path, ledger: Ledger) -> Ended:
+    async def _play(self, job: Job, record: Path, ledger: MoneyLedger) -> Ended:
         """Play a match; until it is known what it has cost, it counts with all that it may spend."""
         part_usd = sum(mind.budget_usd or 0.0 for mind in job.minds.values())
         entry = ledger.hold("", part_usd, None) if part_usd else None
@@ -148,7 +148,7 @@ def _match(text: str, game: str, url: str | None, actor: Any) -> tuple[str, byte
         job_here = job.model_copy(update={"config": config})
         ended = asyncio.run(worker.play(job_here, game=game, gates=gates_at(actor)))
         recording = here.read_bytes() if here.exists() else None
-        with Ledger(here.with_suffix(SUFFIX)) as ledger:
+        with MoneyLedger(here.with_suffix(SUFFIX)) as ledger:
             cost_usd = ledger.booked_usd()
     if url is None or recording is None:
         return ended.model_dump_json(), recording, cost_usd

@@ -18,7 +18,7 @@ from khala_agents.llm.limits import LimitRules, Turns, own_turns
 
 if TYPE_CHECKING:
     from khala_agents.llm.client import LimitType
-    from khala_agents.llm.limits import Gate, Gates
+    from khala_agents.llm.limits import Gates, RequestGate
 
 LEASE_S = 600.0
 """Then a request has lost its place: the node that made it is dead, as no try takes so long."""
@@ -26,7 +26,7 @@ MOST_WAITING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class LimitRefusal:
     """A `LimitExceeded` as data: Ray would wrap the error."""
 
     kind: LimitType
@@ -41,12 +41,12 @@ class SharedTurns:
     def __init__(self, rules: LimitRules, source: str) -> None:
         self._turns = Turns(rules, source=source)
 
-    async def enter(self, tokens: int, patience_s: float | None) -> int | Refused:
+    async def enter(self, tokens: int, patience_s: float | None) -> int | LimitRefusal:
         """Return the place of a request, or why it gets none."""
         try:
             place = await self._turns.enter(tokens, patience_s)
         except LimitExceeded as error:
-            return Refused(error.type, error.value, error.limit, error.source)
+            return LimitRefusal(error.type, error.value, error.limit, error.source)
         asyncio.get_running_loop().call_later(LEASE_S, self._turns.leave, place, 0)
         return place
 
@@ -82,11 +82,11 @@ class _RemoteGate:
             self._turns = await self._coming
         asked = self._turns.enter.remote(tokens, patience_s)
         try:
-            answer: int | Refused = await asked
+            answer: int | LimitRefusal = await asked
         except asyncio.CancelledError:
             ray.cancel(asked)
             raise
-        if isinstance(answer, Refused):
+        if isinstance(answer, LimitRefusal):
             refused = asdict(answer)
             raise LimitExceeded(refused.pop("kind"), **refused)
         return answer
@@ -105,7 +105,7 @@ def endpoints() -> Any:
 def gates_at(actor: Any) -> Gates:
     """Return how a match gets its gates; an endpoint without limits has its own."""
 
-    def gate(endpoint: str, rules: LimitRules, source: str) -> Gate:
+    def gate(endpoint: str, rules: LimitRules, source: str) -> RequestGate:
         if rules == LimitRules():
             return own_turns(endpoint, rules, source)
         return _RemoteGate(actor.turns.remote(endpoint, rules, source))

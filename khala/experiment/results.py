@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from khala.experiment.compare import Compared, Findings
-    from khala.experiment.store import Store
 
 
 TO_SHOW_IT = (
@@ -53,10 +52,11 @@ def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Pa
     """Write tables and figures of an experiment."""
     from khala.experiment.numbers import plain  # noqa: PLC0415
     from khala.experiment.report import FORMATS, write  # noqa: PLC0415
-    from khala.experiment.report import report as reported  # noqa: PLC0415
+    from khala.experiment.report import report as make_report  # noqa: PLC0415
+    from khala.experiment.store import Store  # noqa: PLC0415
 
-    store = _opened(directory, out)
-    made = reported(store, [name.strip() for name in by.split(",") if name.strip()])
+    store = Store.open(directory, out)
+    made = make_report(store, [name.strip() for name in by.split(",") if name.strip()])
     files = write(made.document, into or store.directory / "report", list(FORMATS) if formats == "all" else [formats])
     for warning in made.document.warnings:
         stderr_console().print(visible_line(warning), style="yellow", soft_wrap=True)
@@ -70,19 +70,14 @@ def report(directory: Path, *, formats: str, into: Path | None, by: str, out: Pa
 def export(directory: Path, *, parquet: Path | None, csv: Path | None, out: Path) -> None:
     """Write a row for each episode and side."""
     from khala.experiment.export import write_csv, write_parquet  # noqa: PLC0415
+    from khala.experiment.store import Store  # noqa: PLC0415
 
     if parquet is None and csv is None:
         raise ConfigError("name a file to write: --parquet FILE or --csv FILE")
-    store = _opened(directory, out)
+    store = Store.open(directory, out)
     for path, write in ((parquet, write_parquet), (csv, write_csv)):
         if path is not None:
             stderr_console().print(f"{write(store, path)} rows are in {path}", soft_wrap=True)
-
-
-def _opened(directory: Path, out: Path) -> Store:
-    from khala.experiment.store import Store  # noqa: PLC0415
-
-    return Store.opened(directory if directory.is_dir() else out / directory)
 
 
 # --- the comparison in words --------------------------------------------------------------------------
@@ -92,38 +87,47 @@ def _table(findings: Findings) -> Table:
     table = Table(box=None, pad_edge=False, title=f"A {visible_line(findings.a)}, B {visible_line(findings.b)}")
     for i, column in enumerate(("task", "measure", "A", "B", "A against B", "p", "corrected", "games", "to show it")):
         table.add_column(column, justify="left" if i < 2 else "right", no_wrap=i < 2)
-    for one in findings.compared:
-        table.add_row(*map(visible_line, _cells(one)))
+    for comparison in findings.compared:
+        table.add_row(*map(visible_line, _cells(comparison)))
     return table
 
 
-def _cells(one: Compared) -> tuple[str, ...]:
+def _cells(comparison: Compared) -> tuple[str, ...]:
     from khala.experiment import numbers  # noqa: PLC0415
 
-    estimate = {"win": numbers.share_with, "kd": numbers.ratio_with}.get(one.measure, numbers.number_with)
-    games = f"{one.games} {'pairs' if one.paired else 'each'}"
-    p = (numbers.p_value(one.test.p if one.test else None), numbers.p_value(one.p_holm))
-    return (one.task, one.measure, estimate(one.a), estimate(one.b), _effect(one), *p, games, _more(one))
+    estimate = {"win": numbers.share_with, "kd": numbers.ratio_with}.get(comparison.measure, numbers.number_with)
+    games = f"{comparison.games} {'pairs' if comparison.paired else 'each'}"
+    p = (numbers.p_value(comparison.test.p if comparison.test else None), numbers.p_value(comparison.p_holm))
+    return (
+        comparison.task,
+        comparison.measure,
+        estimate(comparison.a),
+        estimate(comparison.b),
+        _effect(comparison),
+        *p,
+        games,
+        _more(comparison),
+    )
 
 
-def _effect(one: Compared) -> str:
+def _effect(comparison: Compared) -> str:
     from khala.experiment import numbers  # noqa: PLC0415
 
-    if one.test is None:
+    if comparison.test is None:
         return "needs pairs"
-    if one.measure == "kd":
-        return f"\N{MULTIPLICATION SIGN} {numbers.ratio_with(one.test.effect)}"
-    return (numbers.points_with if one.measure == "win" else numbers.difference_with)(one.test.effect)
+    if comparison.measure == "kd":
+        return f"\N{MULTIPLICATION SIGN} {numbers.ratio_with(comparison.test.effect)}"
+    return (numbers.points_with if comparison.measure == "win" else numbers.difference_with)(comparison.test.effect)
 
 
-def _more(one: Compared) -> str:
-    return f"{max(1, one.games_for_power - one.games)} more" if one.games_for_power else ""
+def _more(comparison: Compared) -> str:
+    return f"{max(1, comparison.games_for_power - comparison.games)} more" if comparison.games_for_power else ""
 
 
 def _remarks(findings: Findings) -> list[str]:
-    tests = list(dict.fromkeys(one.test.test for one in findings.compared if one.test))
+    tests = list(dict.fromkeys(comparison.test.test for comparison in findings.compared if comparison.test))
     lines = [f"Intervals of 95 %. {', '.join(tests)}; corrected for {len(findings.compared)} tests after Holm."]
-    if any(one.games_for_power for one in findings.compared):
+    if any(comparison.games_for_power for comparison in findings.compared):
         lines.append(TO_SHOW_IT)
     if any(findings.unpaired):
         lines.append(f"Games without a partner: {findings.unpaired[0]} of A, {findings.unpaired[1]} of B.")
@@ -133,4 +137,4 @@ def _remarks(findings: Findings) -> list[str]:
             lines.append(f"Matches of {name} that are not used: {counts}.")
     if findings.not_shared:
         lines.append(f"Only one of the two has {', '.join(findings.not_shared)}.")
-    return lines + [f"They differ, which was allowed: {one}." for one in findings.allowed]
+    return lines + [f"They differ, which was allowed: {difference}." for difference in findings.allowed]

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
-    from khala.experiment.played import Played
-    from khala.experiment.spec import Budget, Experiment
+    from khala.experiment.played import PlayedMatch
+    from khala.experiment.spec import Experiment, ExperimentBudget
     from khala.experiment.store import Store
     from khala.playing.jobs import Ended
 
@@ -41,18 +41,18 @@ _CRASHES = {"lost": "crash", "stopped": "crash", "error": "crash", "timeout": "t
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class RunnerEvent:
     """What happens with one match."""
 
     what: Literal["begins", "ends", "again"]
     """`again`: it crashed, and is played once more."""
     match: PlannedMatch
-    played: Played | None = None
+    played: PlayedMatch | None = None
     words: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class CostEstimate:
     """What the matches that are missing will take, from those that were played."""
 
     matches: int
@@ -79,8 +79,8 @@ class Runner:
     experiment: Experiment
     store: Store
     engine: Engine
-    budget: Budget
-    see: Callable[[Event], None] = lambda _: None
+    budget: ExperimentBudget
+    see: Callable[[RunnerEvent], None] = lambda _: None
     processes: bool = False
     """Whether agents get processes of their own."""
     spent: Spent = field(default_factory=Spent)
@@ -89,7 +89,7 @@ class Runner:
     _began_s: float = 0.0
     _next_end: asyncio.Event = field(default_factory=asyncio.Event)
     """Is set when a match ends."""
-    _played: dict[str, Played] = field(default_factory=dict)
+    _played: dict[str, PlayedMatch] = field(default_factory=dict)
     _waiting: deque[PlannedMatch] = field(default_factory=deque)
     _tries: Counter[str] = field(default_factory=Counter)
     _unread_usd: dict[str, float] = field(default_factory=dict)
@@ -102,7 +102,7 @@ class Runner:
     def __post_init__(self) -> None:
         """Count what was spent before, also by a runner that was killed."""
         self.store.adopt()
-        self._played = self.store.played()
+        self._played = self.store.matches()
         self._unread_usd = self.store.booked_usd()
         for played in self._played.values():
             self._count(played)
@@ -132,14 +132,14 @@ class Runner:
                 self.stopped = why
                 return
             else:
-                await self._one(match)
+                await self._play(match)
 
-    async def _one(self, match: PlannedMatch) -> None:
+    async def _play(self, match: PlannedMatch) -> None:
         part_usd = self._part_usd(match)
         self.spent.held_usd += part_usd or 0.0
         self._tries[match.key] += 1
         record = self.store.recording_for(match.key)
-        self.see(Event("begins", match))
+        self.see(RunnerEvent("begins", match))
         minds = match.minds if part_usd is None else share_budget(match.minds, part_usd)
         job = Job(
             config=match.config.model_copy(update={"record": record}),
@@ -164,7 +164,7 @@ class Runner:
         self._next_end.set()
         self._next_end = asyncio.Event()
 
-    def _end(self, match: PlannedMatch, ended: Ended, played: Played) -> None:
+    def _end(self, match: PlannedMatch, ended: Ended, played: PlayedMatch) -> None:
         self.spent.usd -= self._unread_usd.pop(match.key, 0.0)
         if before := self._played.get(match.key):
             self._count(before, -1)  # what its tries have cost together is in the new account
@@ -172,11 +172,11 @@ class Runner:
         self._played[match.key] = played
         if played.state == "crashed" and self._tries[match.key] <= self.experiment.retries:
             self._waiting.append(match)
-            self.see(Event("again", match, played, ended.words))
+            self.see(RunnerEvent("again", match, played, ended.words))
         else:
-            self.see(Event("ends", match, played, ended.words))
+            self.see(RunnerEvent("ends", match, played, ended.words))
 
-    def _count(self, played: Played, sign: int = 1) -> None:
+    def _count(self, played: PlayedMatch, sign: int = 1) -> None:
         self.spent.usd += sign * (played.cost_usd or 0.0)
         self.spent.tokens += sign * (played.tokens or 0)
 
@@ -242,7 +242,7 @@ class Runner:
         """Whether a match was played from which others can be estimated."""
         return any(played.state == "done" for played in self._played.values())
 
-    def estimate(self, matches: Sequence[PlannedMatch]) -> Estimate:
+    def estimate(self, matches: Sequence[PlannedMatch]) -> CostEstimate:
         """Return what those of the matches that are missing will take."""
         left = list(missing(matches, self._played))
         sums = dict.fromkeys(("cost_usd", "tokens", "wall_s"), 0.0)
@@ -251,21 +251,21 @@ class Runner:
                 sums[name] += _mean(self._numbers(match, name)) or 0.0
         priced = any(played.cost_usd is not None for played in self._played.values())
         hours = sums["wall_s"] / 3600 / max(1, min(self.engine.slots, len(left)))
-        return Estimate(len(left), sums["cost_usd"] if priced else None, sums["tokens"], hours)
+        return CostEstimate(len(left), sums["cost_usd"] if priced else None, sums["tokens"], hours)
 
 
 def _minds_of(match: PlannedMatch) -> str:
     return repr(match.minds)
 
 
-def numbers_of(played: Iterable[Played], cell: dict[str, str], name: str) -> list[float]:
+def numbers_of(played: Iterable[PlayedMatch], cell: dict[str, str], name: str) -> list[float]:
     """Return a number of the matches of a cell, of all if none of them was played."""
-    known = [one for one in played if one.state == "done" and getattr(one, name) is not None]
-    same = [one for one in known if one.cell == cell]
-    return [getattr(one, name) for one in same or known]
+    known = [match for match in played if match.state == "done" and getattr(match, name) is not None]
+    same = [match for match in known if match.cell == cell]
+    return [getattr(match, name) for match in same or known]
 
 
-def missing(matches: Iterable[PlannedMatch], played: dict[str, Played]) -> Iterable[PlannedMatch]:
+def missing(matches: Iterable[PlannedMatch], played: dict[str, PlayedMatch]) -> Iterable[PlannedMatch]:
     """Return the matches that were not played, or whose match did not end as it should."""
     return (match for match in matches if match.key not in played or played[match.key].state != "done")
 

@@ -18,7 +18,7 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala.experiment.played import Played
+    from khala.experiment.played import PlayedMatch
 
 SIDE = "side"
 """A name that selections know beside the factors, for duels."""
@@ -36,7 +36,7 @@ class Selection:
     where: dict[str, str]
     factors: tuple[str, ...]
     """Of the experiment, in its order."""
-    matches: dict[str, Played]
+    matches: dict[str, PlayedMatch]
     """By key."""
     rows: list[Row]
     left_out: dict[str, int]
@@ -59,25 +59,25 @@ def select(text: str, out: Path) -> Selection:
         ConfigError: there is no such experiment, factor or value, or no match of it can be used.
     """
     directory, conditions = _split(text)
-    store = Store.opened(Path(directory) if Path(directory).is_dir() else out / directory)
-    played = store.played()
+    store = Store.open(Path(directory), out)
+    played = store.matches()
     factors = factors_of(played.values())
     where = _where(conditions, factors, text)
-    chosen = {key: one for key, one in played.items() if _fits(one.cell, where)}
+    chosen = {key: match for key, match in played.items() if _fits(match.cell, where)}
     _check_values(where, played.values(), text)
-    matches = {key: one for key, one in chosen.items() if one.state == "done"}
+    matches = {key: match for key, match in chosen.items() if match.state == "done"}
     rows = [row for row in store.results() if row["match"] in matches and row[SIDE] == where.get(SIDE, row[SIDE])]
     if not rows:
         raise ConfigError(f"{text} has no match that was played to its end and is valid: see `khala experiment status`")
     return Selection(text, where, factors, matches, rows, states_of(chosen.values()))
 
 
-def factors_of(matches: Iterable[Played]) -> tuple[str, ...]:
+def factors_of(matches: Iterable[PlayedMatch]) -> tuple[str, ...]:
     """Return the names of factors of any match, in their order."""
     return tuple(dict.fromkeys(name for match in matches for name in match.cell))
 
 
-def states_of(matches: Iterable[Played]) -> dict[str, int]:
+def states_of(matches: Iterable[PlayedMatch]) -> dict[str, int]:
     """Return how many matches are not done, by state."""
     states = [match.state for match in matches]
     return {state: states.count(state) for state in ("invalid", "crashed") if state in states}
@@ -109,7 +109,7 @@ def _where(conditions: str, factors: tuple[str, ...], text: str) -> dict[str, st
     return where
 
 
-def _check_values(where: dict[str, str], matches: Iterable[Played], text: str) -> None:
+def _check_values(where: dict[str, str], matches: Iterable[PlayedMatch], text: str) -> None:
     matches = list(matches)
     for name, value in where.items():
         known = list(dict.fromkeys(match.cell.get(name, "") for match in matches))

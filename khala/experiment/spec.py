@@ -30,7 +30,7 @@ MOST_MATCHES = 100_000
 MOST_SEEDS = 10_000
 
 
-def _named(value: str) -> str:
+def _check_name(value: str) -> str:
     try:
         return check_name(value, "experiment")
     except WrongKey as error:
@@ -99,7 +99,7 @@ class Level(Frozen):
     settings: Settings
 
 
-class Budget(Frozen):
+class ExperimentBudget(Frozen):
     """What the whole experiment may take. Matches that would need more are not begun."""
 
     usd: float | None = Field(default=None, gt=0)
@@ -121,7 +121,7 @@ class Published(Frozen):
 class Experiment(Frozen):
     """One experiment."""
 
-    name: Annotated[str, BeforeValidator(lambda value: _named(value) if isinstance(value, str) else value)]
+    name: Annotated[str, BeforeValidator(lambda value: _check_name(value) if isinstance(value, str) else value)]
     description: str = ""
     fixed: Settings = Settings()
     factors: dict[str, tuple[Level, ...]] = Field(min_length=1)
@@ -137,7 +137,7 @@ class Experiment(Frozen):
     """Matches of the same cell and seed; more than one says something only if the model is not deterministic."""
     swap_sides: bool = False
     """In duels: play each match again with the sides' models swapped."""
-    budget: Budget = Budget()
+    budget: ExperimentBudget = ExperimentBudget()
     retries: int = Field(default=2, ge=0, le=20)
     """How often a match that crashed is played again; a lost match is a result and is not."""
     match_hours: float = Field(default=6.0, gt=0)

@@ -61,7 +61,7 @@ class Comparison:
 # data -----------------------------------------------------------------------------------------------------------------
 
 
-def matched(
+def common_values(
     a: Mapping[Key, float | None], b: Mapping[Key, float | None]
 ) -> tuple[list[float | None], list[float | None]]:
     """Return the values of keys, such as seeds, that both have, in the order of `a`."""
@@ -142,7 +142,7 @@ def compare_paired_wins(
     """Compare wins (True or 1) in games that are paired, such as by seed, by McNemar's exact test."""
     x, y = (column.astype(bool) for column in _known(a, b))
     only_a, only_b = int((x & ~y).sum()), int((y & ~x).sum())
-    of_a, of_b = (wilson(int(one.sum()), len(one), confidence=confidence) for one in (x, y))
+    of_a, of_b = (wilson(int(wins.sum()), len(wins), confidence=confidence) for wins in (x, y))
     correlation = _correlation(int((x & y).sum()), only_a, only_b, int((~x & ~y).sum()))
     effect = difference_of_shares(of_a, of_b, correlation=correlation, confidence=confidence)
     p = float(stats.binomtest(only_a, only_a + only_b).pvalue) if only_a + only_b else 1.0

@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from khala import indexes
 from khala.experiment.index import CALLS, Row, add, connect, create, played_in, results_in, schema, take
 from khala.experiment.measures import measure_with_calls
-from khala.experiment.played import Played, judged
+from khala.experiment.played import PlayedMatch, judge
 from khala.experiment.spec import Experiment
 from khala.playing.matches import free_recording, tries_in
 from khala.playing.spending import paid_usd
-from khala_agents.llm.money import SUFFIX, Ledger
+from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.files import make_private, open_private, write_private
@@ -56,12 +56,14 @@ class Store:
         self._is_locked = False
 
     @classmethod
-    def opened(cls, directory: Path) -> Store:
-        """Return the store of an experiment that has begun.
+    def open(cls, directory: Path, out: Path | None = None) -> Store:
+        """Return the store of an experiment that has begun: of a directory, or of one with this name below `out`.
 
         Raises:
             ConfigError: there is none.
         """
+        if out is not None and not directory.is_dir():
+            directory = out / directory
         if not (directory / FILE).is_file():
             raise ConfigError(f"there is no experiment in {directory}: `khala experiment run FILE` begins one")
         return cls(directory)
@@ -82,15 +84,15 @@ class Store:
             write_private(self.directory / FILE, file.read_bytes())
 
     @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
+    def lock(self) -> Iterator[None]:
         """Keep other runners out.
 
         Raises:
             ConfigError: another one is at work here.
         """
-        with open_private(self.directory / LOCK, "ab") as lock:
+        with open_private(self.directory / LOCK, "ab") as file:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise ConfigError(f"another process plays the experiment in {self.directory}: wait for it") from None
             self._is_locked = True
@@ -108,14 +110,14 @@ class Store:
 
     @property
     def _index(self) -> sqlite3.Connection:
-        return self._open or self._keep(self._opened_index())
+        return self._open or self._keep(self._open_index())
 
     def _keep(self, index: sqlite3.Connection) -> sqlite3.Connection:
         self._open = index
         weakref.finalize(self, index.close)  # by whichever thread drops the store
         return index
 
-    def _opened_index(self) -> sqlite3.Connection:
+    def _open_index(self) -> sqlite3.Connection:
         path = self.directory / INDEX
         if not path.exists() and not any(self._tries()):
             return create(path)
@@ -123,36 +125,36 @@ class Store:
             with indexes.faults(path):
                 return connect(path)
         except sqlite3.DatabaseError as error:
-            return self._remade(error if path.exists() else None)
+            return self._rebuild(error if path.exists() else None)
 
-    def _remade(self, error: Exception | None) -> sqlite3.Connection:
+    def _rebuild(self, error: Exception | None) -> sqlite3.Connection:
         """Return the index after it was made again; in memory, where the directory takes nothing."""
         path = self.directory / INDEX
         log.warning("%s %s: it is rebuilt from the recordings", path, f"is broken ({error})" if error else "is missing")
         try:
-            with contextlib.nullcontext() if self._is_locked else self.locked():
-                return self._written()
+            with contextlib.nullcontext() if self._is_locked else self.lock():
+                return self._write()
         except (ConfigError, OSError) as why:
             log.warning("%s is kept in memory for now, and nothing is lost: %s", path, why)
             index = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
             index.executescript(schema())
-            return self._filled(index)
+            return self._fill(index)
 
-    def _written(self) -> sqlite3.Connection:
+    def _write(self) -> sqlite3.Connection:
         """Make a new index, and put it in the place of the old one when it is whole."""
         path = self.directory / INDEX
         part = path.with_name(f".{INDEX}.part")
         indexes.remove(part)
         try:
             with contextlib.closing(create(part)) as index, indexes.faults(part):
-                self._filled(index)
+                self._fill(index)
             indexes.remove(path)
             part.replace(path)
         finally:
             indexes.remove(part)
         return connect(path)
 
-    def _filled(self, index: sqlite3.Connection) -> sqlite3.Connection:
+    def _fill(self, index: sqlite3.Connection) -> sqlite3.Connection:
         for tries in self._tries():
             best = _best(tries)
             if (found := self.read(best, attempts=len(tries))) is not None:
@@ -171,9 +173,9 @@ class Store:
                 return read(index)
         except (sqlite3.DatabaseError, ValueError, LookupError) as error:
             index.close()
-            return read(self._keep(self._remade(error)))
+            return read(self._keep(self._rebuild(error)))
 
-    def add(self, played: Played, rows: Sequence[Row]) -> None:
+    def add(self, played: PlayedMatch, rows: Sequence[Row]) -> None:
         """Note what became of a match; it replaces what was known of it.
 
         Raises:
@@ -181,7 +183,7 @@ class Store:
         """
         self._ask(lambda index: add(index, played, rows))
 
-    def played(self) -> dict[str, Played]:
+    def matches(self) -> dict[str, PlayedMatch]:
         """Return what is known of each match, by its key."""
         if not (self.directory / INDEX).exists() and not any(self._tries()):
             return {}
@@ -207,16 +209,16 @@ class Store:
         if self._open is not None:
             self._open.close()
             self._open = None
-        with self.locked():
-            self._keep(self._written())
-        return len(self.played())
+        with self.lock():
+            self._keep(self._write())
+        return len(self.matches())
 
     def take(self, path: Path, *, attempts: int) -> None:
         """Read a recording into the index; one without a run card says nothing."""
         if (found := self.read(path, attempts=attempts)) is not None:
             self._ask(lambda index: take(index, path, *found))
 
-    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[Played, list[Row]] | None:
+    def read(self, path: Path, *, attempts: int, crash: str = "") -> tuple[PlayedMatch, list[Row]] | None:
         """Return what became of a recorded match, and its measures; None if there is no run card.
 
         Args:
@@ -234,7 +236,7 @@ class Store:
             log.warning("%s has labels that no experiment gives: it is left out", path)
             return None
         rows = measure_with_calls(recording)
-        played = judged(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
+        played = judge(card, [row for row, _ in rows], str(path.relative_to(self.directory)), attempts, crash)
         is_priced = any(row.paid_usd is not None for row, _ in rows)
         cost_usd = sum(map(_paid_usd, tries_in(path.parent)))
         return replace(played, cost_usd=cost_usd if cost_usd or is_priced else None), rows
@@ -243,7 +245,7 @@ class Store:
         """Return by match the most that its tries have cost as far as they have ledgers, also if they were not read."""
         sums = defaultdict[str, float](float)
         for path in (self.directory / MATCHES).glob(f"*/recording*{SUFFIX}"):
-            with Ledger(path) as ledger:
+            with MoneyLedger(path) as ledger:
                 sums[path.parent.name] += ledger.booked_usd()
         return sums
 
@@ -261,13 +263,17 @@ def _best(tries: Sequence[Path]) -> Path:
     """Return the newest recording that has the result of every episode, or else the newest with a run card."""
     if len(tries) == 1:
         return tries[0]
-    found = [recording for path in reversed(tries) if (recording := _opened(path)) and recording.run]
-    whole = (one for one in found if one.run and len({result.episode for result in one.results}) >= one.run.episodes)
+    found = [recording for path in reversed(tries) if (recording := _open_recording(path)) and recording.run]
+    whole = (
+        recording
+        for recording in found
+        if recording.run and len({result.episode for result in recording.results}) >= recording.run.episodes
+    )
     best = next(whole, found[0] if found else None)
     return best.path if best else tries[-1]
 
 
-def _opened(path: Path) -> Recording | None:
+def _open_recording(path: Path) -> Recording | None:
     with contextlib.suppress(RecordingError):
         return Recording.open(path)
     return None

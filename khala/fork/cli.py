@@ -113,7 +113,7 @@ def fork(
     if (at is None) != scan:
         raise ConfigError("say where to fork: --at STEP, or --scan for many steps")
     sides = named_sides(side_model or (), blue=blue, red=red)
-    trunk = commands.opened(recording, episode)
+    trunk = commands.open_trunk(recording, episode)
     changes = {
         "--policy": policy, "--model-name": model_name, "--base-url": base_url, "--fallback": fallback,
         "--agent": agent, "the model of a side": sides, "--advise": advise, "--memory": memory,
@@ -131,7 +131,7 @@ def fork(
     elif about_a_model := [option for option in ("--model-name", "--base-url", "--fallback") if option in changed]:
         raise ConfigError(f"{about_a_model[0]} is for a model: name the model with --model")
     trust_named(policy, fallback, *sides.values(), *(said.partition("=")[2] for said in agent or ()))
-    plan = commands.planned(trunk, out, common, sides, agent or (), advise or (), memory)
+    plan = commands.make_plan(trunk, out, common, sides, agent or (), advise or (), memory)
     if at is not None:
         commands.fork_at(plan, at, times or TIMES, jobs=jobs, budget_usd=budget_usd, game=game, as_json=as_json)
     else:

@@ -19,7 +19,7 @@ from khala.fork import scan as scans
 from khala.fork.figures import are_alike, outcomes, plain
 from khala.fork.futures import Plan, play_all
 from khala.fork.players import players_of
-from khala.fork.recorded import repeated
+from khala.fork.recorded import play_recorded
 from khala.playing.matches import newest_recording
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_orchestrator.past.fork import Trunk, trunk_of
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     T = TypeVar("T")
 
 
-def opened(path: Path, episode: int) -> Trunk:
+def open_trunk(path: Path, episode: int) -> Trunk:
     """Return an episode of a recording, or of the newest one in the directory of a run."""
     return trunk_of(newest_recording(path), episode)
 
 
-def planned(
+def make_plan(
     trunk: Trunk,
     out: Path | None,
     common: Minds | None,
@@ -59,7 +59,7 @@ def repeat(trunk: Trunk, step: int, game: str, *, as_json: bool) -> None:
     """Play the recorded future once more, and say whether it was the same."""
     trunk.check(step)
     with tempfile.TemporaryDirectory() as directory:
-        again = _until_interrupted(repeated(trunk, Path(directory), game=game), "nothing is left of it")
+        again = _until_interrupted(play_recorded(trunk, Path(directory), game=game), "nothing is left of it")
     if again.differences:
         raise RecordingError(
             f"the recorded future could not be repeated: {again.differences[0]}; is this the same version of Khala?"
@@ -74,7 +74,7 @@ def fork_at(
     plan: Plan, step: int, times: int, *, jobs: int | None, budget_usd: float | None, game: str, as_json: bool
 ) -> None:
     """Play forks at one step, and print what became of them."""
-    futures = _played(plan, plan.forks(step, times), jobs, budget_usd, game)
+    futures = _play(plan, plan.forks(step, times), jobs, budget_usd, game)
     if are_alike(futures):
         _say(f"all {times} forks ended alike: who decides is deterministic, and --times 1 is enough")
     shown = outcomes(plan.trunk, step, futures, plan.who)
@@ -88,8 +88,8 @@ def scan(
     """Play forks at many steps, and print the steps in the order of how much changes."""
     steps = scans.steps_of(plan.trunk, every, advised=bool(plan.advice))
     forks = [fork for step in steps for fork in plan.forks(step, times)]
-    futures = _played(plan, forks, jobs, budget_usd, game)
-    points = scans.ranked(plan.trunk, futures)
+    futures = _play(plan, forks, jobs, budget_usd, game)
+    points = scans.rank(plan.trunk, futures)
     _print(
         {"steps": scans.plain_points(plan.trunk, points)} | _origin(plan.trunk), scans.table(points), as_json=as_json
     )
@@ -97,9 +97,7 @@ def scan(
     _end(futures)
 
 
-def _played(
-    plan: Plan, forks: Sequence[Fork], jobs: int | None, budget_usd: float | None, game: str
-) -> Sequence[Future]:
+def _play(plan: Plan, forks: Sequence[Fork], jobs: int | None, budget_usd: float | None, game: str) -> Sequence[Future]:
     async def work() -> list[Future]:
         slots = min(jobs or slots_of_this_machine(), len(forks))
         async with Local(slots, game=game, logs=plan.out / "logs") as engine:

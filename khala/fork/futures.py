@@ -169,7 +169,7 @@ async def play_all(
     async def one(fork: Fork) -> Future:
         async with room:
             part_usd = purse.take()
-            future = await _played(fork, engine, part_usd)
+            future = await _play(fork, engine, part_usd)
             if part_usd:
                 purse.give_back(part_usd - future.spent_usd)
             done(future)
@@ -180,7 +180,7 @@ async def play_all(
     return [task.result() for task in tasks]
 
 
-async def _played(fork: Fork, engine: Engine, budget_usd: float | None) -> Future:
+async def _play(fork: Fork, engine: Engine, budget_usd: float | None) -> Future:
     beginning = fork.record.with_name("beginning.mcap")
     try:
         await asyncio.to_thread(write_beginning, fork.trunk.recording, fork.config, beginning, fork.advice)

@@ -30,7 +30,7 @@ def players_of(
         ConfigError: there is no such side or agent, or nothing is said of one, or one cannot decide this way.
     """
     by_side = minds_of([side.side for side in task.per_side()], common or Minds(), sides)
-    named = _named(task, single)
+    named = _single_models(task, single)
     if common is None:
         _check_all_are_named(task, sides, named)
     players = {side: replace(minds, agents=named.get(side, {})) for side, minds in by_side.items()}
@@ -39,7 +39,7 @@ def players_of(
     return players
 
 
-def _named(task: TaskConfig, single: Iterable[str]) -> dict[str, dict[str, str]]:
+def _single_models(task: TaskConfig, single: Iterable[str]) -> dict[str, dict[str, str]]:
     """Return the models of single agents, by side and name."""
     seats = [(side.side, agent.name) for side in task.per_side() for agent in side.agents]
     named: dict[str, dict[str, str]] = defaultdict(dict)

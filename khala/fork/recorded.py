@@ -47,7 +47,7 @@ class _Results(SilentObserver):
         self.taken.append(result)
 
 
-async def repeated(trunk: Trunk, directory: Path, *, game: str) -> Repeated:
+async def play_recorded(trunk: Trunk, directory: Path, *, game: str) -> Repeated:
     """Play a recorded episode with its recorded decisions.
 
     Args:

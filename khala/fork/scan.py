@@ -57,7 +57,7 @@ def steps_of(trunk: Trunk, every: int | None, *, advised: bool = False) -> list[
     return [step for step in range(0, steps, every) if step or not advised]
 
 
-def ranked(trunk: Trunk, futures: Sequence[Future]) -> list[Point]:
+def rank(trunk: Trunk, futures: Sequence[Future]) -> list[Point]:
     """Return the steps of forks, those first at which most changes: the win rate, then the value."""
     steps = dict.fromkeys(future.fork.step for future in futures)
     points = [_point(trunk, step, [future for future in futures if future.fork.step == step]) for step in steps]

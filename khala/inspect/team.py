@@ -19,7 +19,7 @@ from inspect_ai.util import collect, concurrency, span
 from khala.inspect.model import InspectClient, message_of
 from khala.playing.matches import new
 from khala.playing.minds import Minds, minds_of
-from khala.playing.seats import Seat, SeatedMatch, unhurried
+from khala.playing.seats import Seat, SeatedMatch, without_time_limit
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from inspect_ai.solver import Generate, Solver, TaskState
     from pydantic import JsonValue
 
-    from khala.playing.seats import Seen, Turn
+    from khala.playing.seats import SeatsTurn, Seen
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Report
 
@@ -60,9 +60,9 @@ def team(
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001  # each agent has its own prompt
         asked = dict(state.metadata[MATCH])
         config = new(asked.pop("task"), None, Path(out), **_options(asked, memory))
-        config = config.model_copy(update={"task": unhurried(config.task)})
+        config = config.model_copy(update={"task": without_time_limit(config.task)})
         first, *_ = sides = config.task.per_side()
-        minds = minds_of([side.side for side in sides], Minds().named(others), {})
+        minds = minds_of([side.side for side in sides], Minds().with_name(others), {})
         seats = [Seat(first.side, agent.name) for agent in first.agents]
         async with (
             concurrency("khala games", games or os.cpu_count() or 1),
@@ -122,7 +122,7 @@ class _Player:
         self._state.messages += [observed, ChatMessageAssistant(content=text, source="generate")]
 
 
-def _note(turn: Turn) -> None:
+def _note(turn: SeatsTurn) -> None:
     """Note in the transcript what became of the decisions."""
     for report in turn.reports:
         transcript().info(_fates(report), source="khala")

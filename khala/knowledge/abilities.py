@@ -60,7 +60,7 @@ def needs_of(need: Need | None) -> Needs:
     """
     leaves = list(_leaves(need))
     here = [name for name, state in leaves if state.endswith("_here")]
-    names = dict.fromkeys(_named(name) for name, state in leaves if state == "done")
+    names = dict.fromkeys(_name(name) for name, state in leaves if state == "done")
     return Needs(tuple(names), "TechLab" if any(name.endswith("TechLab") for name in here) else "")
 
 
@@ -87,7 +87,7 @@ def _leaves(need: Need | None) -> list[tuple[str, str]]:
     return [leaf for part in (parts[:1] if need.kind == "or" else parts) for leaf in _leaves(part)]
 
 
-def _named(name: str) -> str:
+def _name(name: str) -> str:
     return upgrade_names().get(name) or unit_names().get(name) or name
 
 

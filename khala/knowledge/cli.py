@@ -49,9 +49,9 @@ def show(
 
     found = find(name, version)
     if as_json:
-        typer.echo(json.dumps([one.model_dump(mode="json", exclude_defaults=True) for one in found]))
+        typer.echo(json.dumps([entry.model_dump(mode="json", exclude_defaults=True) for entry in found]))
     else:
-        say("\n".join(long(one, version) for one in found).removesuffix("\n"))
+        say("\n".join(long(entry, version) for entry in found).removesuffix("\n"))
 
 
 @app.command(epilog=WRITE_EPILOG)
@@ -72,9 +72,9 @@ def write(
 
     versions = [version] if version else VERSIONS
     if not check:
-        for path in (path for one in versions for path in files.write(one)):
+        for path in (path for version in versions for path in files.write(version)):
             say(f"wrote {path}")
-    elif old := [f"{one}/{name}" for one in versions for name in files.outdated(one)]:
+    elif old := [f"{version}/{name}" for version in versions for name in files.outdated_files(version)]:
         names = ", ".join(old)
         raise OutOfDate(
             f"out of date in bridge/khala_bridge/data/knowledge: {names}; `khala knowledge write` makes them"

@@ -40,7 +40,7 @@ def facts(version: str) -> dict[str, str]:
     return {f"{kind}.json": _text(catalog.version, catalog.build, records) for kind, records in made.items()}
 
 
-def outdated(version: str) -> list[str]:
+def outdated_files(version: str) -> list[str]:
     """Return the names of the files of a version that differ from what would be written now."""
     where = directory(version)
     return [name for name, text in facts(version).items() if _bytes(where / name) != text.encode()]

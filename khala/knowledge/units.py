@@ -23,11 +23,10 @@ if TYPE_CHECKING:
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
     """Return one record for each type that PySC2 has a name for, by that name, in alphabetical order."""
     known = [unit for unit in catalog.units if not unit.like and unit.name in unit_names()]
-    return {unit_name(unit.name): sparse(_unit(unit, catalog)) for unit in sorted(known, key=_name)}
-
-
-def _name(unit: UnitType) -> str:
-    return unit_name(unit.name)
+    return {
+        unit_name(unit.name): sparse(_unit(unit, catalog))
+        for unit in sorted(known, key=lambda unit: unit_name(unit.name))
+    }
 
 
 def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
@@ -135,7 +134,7 @@ def _hidden(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[s
     What a Brood Lord drops counts as the Brood Lord's, and a Locust's leap ends its flight: neither is listed again.
     """
     if weapon.launches:
-        yield from _launched(unit, weapon, catalog)
+        yield from _launched_weapons(unit, weapon, catalog)
     elif weapon.is_kamikaze:
         yield from _burst(weapon)
     elif [hit.when for hit in weapon.hits] == ["GroundUnitFilter", "else"]:
@@ -159,7 +158,7 @@ def _blow(hit: Hit) -> dict[str, Any]:
     return {"damage": plain(hit.damage), "attacks": 1, "bonus": {name: plain(more) for name, more in hit.bonus}}
 
 
-def _launched(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
+def _launched_weapons(unit: UnitType, weapon: Weapon, catalog: Catalog) -> Iterator[dict[str, Any]]:
     """Yield the joint weapon of all that a unit can hold and launch, at the distance from which it launches them."""
     for hangar in catalog.abilities_of(unit.row):
         if hangar.effect == "arm" and hangar.unit == weapon.launches:

@@ -83,11 +83,11 @@ def mcp(
     and clients connect to these. The tools are observe, act, message and look_up. The match begins when a client
     first observes. It is recorded like any other, and khala view shows it.
     """
-    from khala.mcp.commands import Wanted, run_mcp  # noqa: PLC0415  # the match and the SDK, which --help can do without
+    from khala.mcp.commands import WantedSeats, run_mcp  # noqa: PLC0415  # the match and the SDK, which --help can do without
 
     match = {
         "seed": seed, "episodes": episodes, "rule": clock, "max_wait_s": max_wait, "step_loops": step_loops,
         "speed": speed, "max_steps": max_steps, "images": images, "opponent": opponent,
         "assemble_s": None,
     }  # fmt: skip
-    run_mcp(Wanted(task, tuple(seat or ()), port, others, budget_usd, game, run, out, match))
+    run_mcp(WantedSeats(task, tuple(seat or ()), port, others, budget_usd, game, run, out, match))

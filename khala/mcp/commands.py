@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from khala.mcp.table import Table
 from khala.playing.matches import new
 from khala.playing.minds import Minds, minds_of
-from khala.playing.seats import seat_named, seats_of, unhurried
+from khala.playing.seats import seat_named, seats_of, without_time_limit
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import trust_named
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedSeats:
     """What the command line says; names are those of its options."""
 
     task: str | None
@@ -34,7 +34,7 @@ class Wanted:
     """How it is played, as `khala.playing.matches.new` takes it."""
 
 
-def run_mcp(wanted: Wanted) -> None:
+def run_mcp(wanted: WantedSeats) -> None:
     """Serve the seats of a match until the client leaves, or a signal comes.
 
     Raises:
@@ -48,7 +48,7 @@ def run_mcp(wanted: Wanted) -> None:
     asyncio.run(over_stdio(table) if wanted.port is None else over_http(table, wanted.port))
 
 
-def table_of(wanted: Wanted) -> Table:
+def table_of(wanted: WantedSeats) -> Table:
     """Return the match, with places for those who connect.
 
     Raises:
@@ -58,7 +58,7 @@ def table_of(wanted: Wanted) -> Table:
         raise ConfigError("give a task, such as 2s3z_pair: `khala tasks` lists them")
     config = new(wanted.task, wanted.run, wanted.out, **wanted.match)
     if wanted.match["max_wait_s"] is None:
-        config = config.model_copy(update={"task": unhurried(config.task)})
+        config = config.model_copy(update={"task": without_time_limit(config.task)})
     there_are = seats_of(config.task)
     seats = [seat_named(name, there_are, source="--seat") for name in wanted.seats]
     if wanted.port is None:
@@ -67,5 +67,5 @@ def table_of(wanted: Wanted) -> Table:
         seats = seats or there_are[:1]
     sides = [side.side for side in config.task.per_side()]
     trust_named(wanted.others)
-    minds = minds_of(sides, Minds(budget_usd=wanted.budget_usd).named(wanted.others), {})
+    minds = minds_of(sides, Minds(budget_usd=wanted.budget_usd).with_name(wanted.others), {})
     return Table(config, seats or there_are, minds, game=wanted.game)

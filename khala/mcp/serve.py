@@ -112,13 +112,13 @@ class SeatAddress:
         # the door has checked host and origin, more strictly than the SDK would
         unchecked = TransportSecuritySettings(enable_dns_rebinding_protection=False)
         self._served: Application = self.server.streamable_http_app(host=HOST, transport_security=unchecked)
-        self.app = Guarded(self._named, self._door)
+        self.app = Guarded(self._name_client, self._door)
 
     def address(self, port: int) -> str:
         """Return the address for a client that plays the seat."""
         return f"http://{HOST}:{port}/{self.seat}/mcp?{TOKEN}={self._door.token}"
 
-    async def _named(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _name_client(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request, and give a client without a name one; free the seat whose client ends its session."""
         headers = dict(head_of(scope).headers)
         client = client_of(headers)
@@ -127,13 +127,13 @@ class SeatAddress:
         elif headers.get(METHOD) == DISCOVER:
             self._holder.greet()
 
-        async def named(message: Message) -> None:
+        async def send_named(message: Message) -> None:
             if message["type"] == "http.response.start" and not client:
                 cookie = f"{CLIENT}={secrets.token_urlsafe(16)}; Path=/{self.seat}; HttpOnly; SameSite=Strict"
                 message["headers"] = [*message.get("headers", ()), (b"set-cookie", cookie.encode())]
             await send(message)
 
-        await self._served(scope, receive, named)
+        await self._served(scope, receive, send_named)
 
 
 class _Server(uvicorn.Server):

@@ -26,7 +26,7 @@ from khala_protocol.errors import KhalaError
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator, Mapping
 
-    from khala.mcp.table import Look, Table
+    from khala.mcp.table import Table, TableLook
     from khala.playing.seats import Seat, Seen
     from khala_protocol.messages import Report
 
@@ -123,7 +123,7 @@ class _SeatServer:
     ) -> str:
         """Read all that is known of a unit type, an upgrade or an ability: numbers, costs, what it is good against."""
         with _clear():
-            return "\n".join(long(one) for one in find(name))
+            return "\n".join(long(entry) for entry in find(name))
 
     @contextlib.contextmanager
     def _playing(self, ctx: Context[None]) -> Iterator[None]:
@@ -137,20 +137,20 @@ class _SeatServer:
         yield
         self._holder.take(client)
 
-    async def _look(self, ctx: Context[None]) -> Look:
+    async def _look(self, ctx: Context[None]) -> TableLook:
         async def on_step(report: Report) -> None:
             await ctx.report_progress(report.game_loop, message=step_line(report))
 
         return await self._table.look(self._seat, within_s=WITHIN_S, on_step=on_step)
 
-    def _shown(self, look: Look, *, briefing: bool = False) -> list[str | Image]:
+    def _shown(self, look: TableLook, *, briefing: bool = False) -> list[str | Image]:
         text = page(look, self._table.config)
         if look.seen is None:
             return [text]
         if self._holder.brief() or briefing:
             text = f"{briefing_page(look.seen.briefing)}\n{text}"
         shown: list[str | Image] = [text]
-        for ref, picture in look.seen.arrived():
+        for ref, picture in look.seen.arrived_pictures():
             self._add(f"pictures/{ref.name}", ref.title, ref.media_type, partial(self._picture, ref.name))
             shown += [ref.title or ref.name, Image(data=picture, format=ref.media_type.removeprefix("image/"))]
         return shown
@@ -174,7 +174,7 @@ class _SeatServer:
         return self._newest().observation.text
 
     async def _picture(self, name: str) -> bytes:
-        for ref, picture in self._newest().arrived():
+        for ref, picture in self._newest().arrived_pictures():
             if ref.name == name:
                 return picture
         raise ResourceNotFoundError(f"the newest observation has no picture {name}")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from khala.playing.minds import Minds
-    from khala.playing.seats import Seen, Turn
+    from khala.playing.seats import SeatsTurn, Seen
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Report, Result
 
@@ -29,7 +29,7 @@ MOST_MESSAGES: Final = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class TableLook:
     """What a player finds when it looks.
 
     Attributes:
@@ -107,7 +107,7 @@ class Table:
         """Return the newest observation of a seat, answered or not; None before its first one."""
         return self._places[seat].seen
 
-    async def look(self, seat: Seat, *, within_s: float, on_step: Callable[[Report], Awaitable[None]]) -> Look:
+    async def look(self, seat: Seat, *, within_s: float, on_step: Callable[[Report], Awaitable[None]]) -> TableLook:
         """Wait until a seat is asked, or an episode is over, and return what its player finds.
 
         Args:
@@ -132,17 +132,17 @@ class Table:
             playing.result()
         return self._taken(place)
 
-    def _taken(self, place: _Place) -> Look:
+    def _taken(self, place: _Place) -> TableLook:
         fates, place.fates = place.fates, []
         results, place.results = place.results, []
         others = [seat for seat, other in self._places.items() if other is not place and other.waits]
         if place.seen is None or not place.waits:
-            return Look(None, None, fates, results, self._over, others)
+            return TableLook(None, None, fates, results, self._over, others)
         place.looked = True
         within_s = place.seen.observation.answer_within_s
         now_s = asyncio.get_running_loop().time()
         left_s = None if within_s is None else max(0.0, within_s - (now_s - place.arrived_s))
-        return Look(place.seen, left_s, fates, results, self._over, others)
+        return TableLook(place.seen, left_s, fates, results, self._over, others)
 
     def message(self, seat: Seat, to: str, text: str) -> None:
         """Put a message into the next answer of a seat.
@@ -196,7 +196,7 @@ class Table:
         self._changed.set()
         self._changed = asyncio.Event()
 
-    def _take(self, turn: Turn) -> None:
+    def _take(self, turn: SeatsTurn) -> None:
         self._over = turn.over
         for report in turn.reports:
             self._step = report

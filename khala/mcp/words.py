@@ -9,7 +9,7 @@ from khala_agents.prompt import Prompt
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala.mcp.table import Look
+    from khala.mcp.table import TableLook
     from khala.playing.seats import Seat
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import AgentReport, Briefing, Report, Result
@@ -38,12 +38,12 @@ def briefing_page(briefing: Briefing) -> str:
     return f"{system.content}\n\n# Example\n{shown}\n\n{HOW}\n"
 
 
-def page(look: Look, config: MatchConfig) -> str:
+def page(look: TableLook, config: MatchConfig) -> str:
     """Return what a player reads when it looks."""
     return "\n".join(_lines(look, config))
 
 
-def _lines(look: Look, config: MatchConfig) -> Iterator[str]:
+def _lines(look: TableLook, config: MatchConfig) -> Iterator[str]:
     yield from map(_fate, look.fates)
     if look.seen is None:  # else the observation has them
         yield from (f"    refused: {no.text}: {no.message}" for fate in look.fates for no in fate.rejections)

@@ -71,6 +71,6 @@ def openenv(
     one agent or all agents of a side, over a websocket or HTTP. On an address that other machines reach, clients need
     a token: the one in KHALA_OPENENV_TOKEN, or a new one that the printed address contains.
     """
-    from khala.openenv.commands import Wanted, run_openenv  # noqa: PLC0415  # the server, which --help can do without
+    from khala.openenv.commands import WantedServer, run_openenv  # noqa: PLC0415  # the server, which --help can do without
 
-    run_openenv(Wanted(task, host, port, sessions, idle, others, tuple(allow or ()), rubric, game, out, is_open))
+    run_openenv(WantedServer(task, host, port, sessions, idle, others, tuple(allow or ()), rubric, game, out, is_open))

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
     from openenv.core.rubrics import Rubric
 
-    from khala.openenv.settings import Settings
+    from khala.openenv.settings import ServerSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedServer:
     """What the command line says; names are those of its options."""
 
     task: str
@@ -40,7 +40,7 @@ class Wanted:
     is_open: bool = False
 
 
-def run_openenv(wanted: Wanted) -> None:
+def run_openenv(wanted: WantedServer) -> None:
     """Serve until a signal comes.
 
     Raises:
@@ -64,21 +64,21 @@ def run_openenv(wanted: Wanted) -> None:
         )
 
 
-def settings_of(wanted: Wanted) -> Settings:
+def settings_of(wanted: WantedServer) -> ServerSettings:
     """Return what the server decides.
 
     Raises:
         ConfigError: there is no such task, model, policy or rubric.
     """
     from khala.openenv.rubrics import Battle  # noqa: PLC0415  # of the extra `openenv`
-    from khala.openenv.settings import Settings  # noqa: PLC0415
+    from khala.openenv.settings import ServerSettings  # noqa: PLC0415
 
     load_task(wanted.task)
     trust_named(wanted.others, *wanted.allow)
     for name in {wanted.others, *wanted.allow}:
-        Minds().named(name).check()
+        Minds().with_name(name).check()
     rubric = Battle if wanted.rubric is None else rubric_of(wanted.rubric)
-    return Settings(wanted.task, wanted.others, wanted.allow, rubric, wanted.game, wanted.out)
+    return ServerSettings(wanted.task, wanted.others, wanted.allow, rubric, wanted.game, wanted.out)
 
 
 def rubric_of(name: str) -> Callable[[], Rubric]:

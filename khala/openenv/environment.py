@@ -18,11 +18,11 @@ from openenv.core.env_server.types import EnvironmentMetadata
 
 from khala import __version__
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, ResetOptions
-from khala.openenv.places import Places
-from khala.openenv.settings import Settings
+from khala.openenv.places import ServerPlaces
+from khala.openenv.settings import ServerSettings
 from khala.openenv.views import outcome_of, view_of
 from khala.playing.loop_thread import LoopThread
-from khala.playing.seats import Turn
+from khala.playing.seats import SeatsTurn
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.configfile import loads
 from khala_protocol.errors import KhalaError
@@ -48,11 +48,11 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
     SUPPORTS_CONCURRENT_SESSIONS = True
 
     def __init__(
-        self, settings: Settings | None = None, games: IdleGames | None = None, places: Places | None = None
+        self, settings: ServerSettings | None = None, games: IdleGames | None = None, places: ServerPlaces | None = None
     ) -> None:
         """Take what the server decides, and the processes and places that its sessions share, or make its own."""
-        self._settings = settings or Settings()
-        self._places = places or Places(1)
+        self._settings = settings or ServerSettings()
+        self._places = places or ServerPlaces(1)
         self._games = games or IdleGames()
         self._owns_games = games is None
         super().__init__(rubric=self._settings.rubric())
@@ -61,7 +61,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: LoopThread | None = None
         self._seats: dict[str, Seat] = {}
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._state = KhalaState()
         self._briefed: set[str] = set()
         self._game_loop = 0
@@ -116,7 +116,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         self._game_loop = 0
         await self._reset_rubric_async()
         await self._advance()
-        return self._observed()
+        return self._observe()
 
     async def step_async(self, action: KhalaAction, timeout_s: float | None = None, **_: Any) -> KhalaObservation:
         """Send the replies of those who are asked, and play until somebody is asked again, or the episode is over.
@@ -150,7 +150,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
                 match.act(seat, replies.get(name, ""))
         await self._advance()
         self._state.step_count += 1
-        observation = self._observed()
+        observation = self._observe()
         observation.reward = await self._apply_rubric_async(action, observation)
         assert self.rubric is not None
         parts = self.rubric.named_rubrics()
@@ -219,7 +219,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
         match, config = chosen
         self._seats = {seat.agent: seat for seat in match.seats}
         self._loop = asyncio.get_running_loop()
-        self._turn = Turn()
+        self._turn = SeatsTurn()
         self._match = await match.__aenter__()
         self._state = KhalaState(
             task=config.task.name,
@@ -268,9 +268,9 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     # what the client gets -----------------------------------------------------------------------------------------
 
-    def _observed(self) -> KhalaObservation:
+    def _observe(self) -> KhalaObservation:
         turn, before = self._turn, self._game_loop
-        reports = [one for one in turn.reports if one.side == self._state.side]
+        reports = [report for report in turn.reports if report.side == self._state.side]
         agents = [agent for report in reports for agent in report.agents if agent.agent in self._seats]
         results = [result for result in turn.results if result.side == self._state.side]
         loops = [seen.observation.game_loop for seen in turn.asked.values()] + [result.game_loop for result in results]

@@ -21,7 +21,7 @@ OVER_YIELD_S: Final = 60.0
 """A session whose episode is over makes room after this long; nothing of it is lost."""
 
 
-class Player(Protocol):
+class PlaceHolder(Protocol):
     """A session that may hold a place."""
 
     @property
@@ -37,7 +37,7 @@ class Player(Protocol):
 
 
 @dataclass(slots=True)
-class Places:
+class ServerPlaces:
     """The places of one server.
 
     Attributes:
@@ -47,10 +47,10 @@ class Places:
 
     most: int
     clock: Callable[[], float] = time.monotonic
-    _last_s: dict[Player, float] = field(default_factory=dict)
+    _last_s: dict[PlaceHolder, float] = field(default_factory=dict)
     """By session with a place: when it did something last."""
 
-    async def take(self, player: Player) -> None:
+    async def take(self, player: PlaceHolder) -> None:
         """Give a session a place, if it has none; the session that has been idle for longest may lose its own.
 
         Raises:
@@ -72,20 +72,20 @@ class Places:
                 "it did nothing for long, and another client needed its place: call reset to begin anew"
             )
 
-    def touch(self, player: Player) -> None:
+    def touch(self, player: PlaceHolder) -> None:
         """Note that a session does something."""
         if player in self._last_s:
             self._last_s[player] = self.clock()
 
-    def free(self, player: Player) -> None:
+    def free(self, player: PlaceHolder) -> None:
         """Take the place of a session back."""
         self._last_s.pop(player, None)
 
-    def holds(self, player: Player) -> bool:
+    def holds(self, player: PlaceHolder) -> bool:
         """Return whether a session has a place."""
         return player in self._last_s
 
-    def _idle(self) -> Player | None:
+    def _idle(self) -> PlaceHolder | None:
         """Return the session that makes room: rather one whose episode is over, and of those the longest idle."""
         now_s = self.clock()
         idle = [

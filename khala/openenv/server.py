@@ -38,8 +38,8 @@ from khala.doors.rules import Door, is_same, token_of
 from khala.doors.serving import uvicorn_config
 from khala.openenv.environment import KhalaEnvironment, NoEpisode
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState
-from khala.openenv.places import Places
-from khala.openenv.settings import Settings
+from khala.openenv.places import ServerPlaces
+from khala.openenv.settings import ServerSettings
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import KhalaError
@@ -98,7 +98,11 @@ def server_config(app: Application, *, sessions: int = SESSIONS, **options: Any)
 
 
 def app_of(
-    settings: Settings | None = None, *, sessions: int = SESSIONS, idle_s: float = IDLE_S, door: Door | None = None
+    settings: ServerSettings | None = None,
+    *,
+    sessions: int = SESSIONS,
+    idle_s: float = IDLE_S,
+    door: Door | None = None,
 ) -> FastAPI:
     """Return the application.
 
@@ -123,7 +127,7 @@ def app_of(
     )
     # those that play, those that wait, and those that are told to leave and have not left yet
     limits = ConcurrencyConfig(max_concurrent_envs=2 * (sessions + MOST_WAITING), session_timeout=idle_s)
-    _Server(settings or Settings(), games, Places(sessions), limits).register_routes(app)
+    _Server(settings or ServerSettings(), games, ServerPlaces(sessions), limits).register_routes(app)
     app.add_middleware(_Leaving)
     app.add_middleware(Guarded, door=door or openenv_door("127.0.0.1"))
     return app
@@ -203,7 +207,9 @@ class _Episode:
 class _Server(HTTPEnvServer):
     """OpenEnv's server, with sessions over HTTP."""
 
-    def __init__(self, settings: Settings, games: IdleGames, places: Places, limits: ConcurrencyConfig) -> None:
+    def __init__(
+        self, settings: ServerSettings, games: IdleGames, places: ServerPlaces, limits: ConcurrencyConfig
+    ) -> None:
         def environment() -> KhalaEnvironment:
             return KhalaEnvironment(settings, games, places)
 
@@ -230,10 +236,10 @@ class _Server(HTTPEnvServer):
         name = wanted.get("episode_id")
         known = self._episodes.get(name or "")
         is_new = known is None
-        with _said():
-            session = (await self._create_session())[0] if known is None else self._opened(known, client)
+        with _answer_errors():
+            session = (await self._create_session())[0] if known is None else self._check_session(known, client)
             try:
-                observation = await self._of(session).reset_async(**wanted)
+                observation = await self._environment(session).reset_async(**wanted)
             except BaseException:
                 if is_new:
                     await self._destroy_session(session)
@@ -245,22 +251,22 @@ class _Server(HTTPEnvServer):
 
     async def step(self, http: Request, request: NamedStep) -> StepResponse:
         """Send replies."""
-        with _said():
-            session = self._named(request.episode_id, http)
-            observation = await self._of(session).step_async(request.action)
+        with _answer_errors():
+            session = self._find_session(request.episode_id, http)
+            observation = await self._environment(session).step_async(request.action)
         self._update_session_activity(session, increment_step=True)
         return StepResponse(**serialize_observation(observation))
 
     async def state(self, http: Request, episode_id: str | None = None) -> KhalaState:
         """Return what is played."""
-        with _said():
-            return self._of(self._named(episode_id, http)).state
+        with _answer_errors():
+            return self._environment(self._find_session(episode_id, http)).state
 
     async def close(self, http: Request, request: Named | None = None) -> Named:
         """End a session and its game."""
-        with _said():
-            session = self._named(None if request is None else request.episode_id, http)
-            name = self._of(session).state.episode_id
+        with _answer_errors():
+            session = self._find_session(None if request is None else request.episode_id, http)
+            name = self._environment(session).state.episode_id
         await self._destroy_session(session)
         return Named(episode_id=name)
 
@@ -286,12 +292,12 @@ class _Server(HTTPEnvServer):
         environment = self._sessions.get(session)
         return isinstance(environment, KhalaEnvironment) and self._places.holds(environment)
 
-    def _of(self, session: str) -> KhalaEnvironment:
+    def _environment(self, session: str) -> KhalaEnvironment:
         environment = self._sessions[session]
         assert isinstance(environment, KhalaEnvironment)
         return environment
 
-    def _opened(self, known: _Episode, client: str) -> str:
+    def _check_session(self, known: _Episode, client: str) -> str:
         """Return the session of an episode.
 
         Raises:
@@ -304,7 +310,7 @@ class _Server(HTTPEnvServer):
             )
         return known.session
 
-    def _named(self, name: str | None, http: Request) -> str:
+    def _find_session(self, name: str | None, http: Request) -> str:
         """Return the session over HTTP of this name, or the only one of the client.
 
         Raises:
@@ -312,7 +318,7 @@ class _Server(HTTPEnvServer):
         """
         client = http.cookies.get(CLIENT, "")
         if name is not None and (known := self._episodes.get(name)) is not None:
-            return self._opened(known, client)
+            return self._check_session(known, client)
         mine = {known.session for known in self._episodes.values() if is_same(client, known.client)}
         if name is None and len(mine) > 1:
             raise NoEpisode("there are several episodes: say which one with episode_id, as reset returned it")
@@ -323,7 +329,7 @@ class _Server(HTTPEnvServer):
 
 
 @contextlib.contextmanager
-def _said() -> Iterator[None]:
+def _answer_errors() -> Iterator[None]:
     """Let the client read what is wrong and what to do."""
     try:
         yield

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from khala.openenv.rubrics import Battle
 from khala.playing.matches import new
 from khala.playing.minds import SCRIPTED, SILENT, Minds, minds_of
-from khala.playing.seats import Seat, SeatedMatch, seat_named, seats_of, unhurried
+from khala.playing.seats import Seat, SeatedMatch, seat_named, seats_of, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.errors import ConfigError
 
@@ -43,7 +43,7 @@ class Chosen(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ServerSettings:
     """What a server decides.
 
     Attributes:
@@ -81,7 +81,7 @@ class Settings:
                 f"{', '.join(sorted({*FREE, self.others, *self.allowed}))}",
                 source="others",
             )
-        minds = minds_of([side.side for side in config.task.per_side()], Minds().named(others), {})
+        minds = minds_of([side.side for side in config.task.per_side()], Minds().with_name(others), {})
         return Chosen(SeatedMatch(config, seats, minds, game=self.game, processes=processes), config)
 
     def _config(self, options: ResetOptions) -> MatchConfig:
@@ -97,7 +97,7 @@ class Settings:
             "step_loops": options.step_loops,
         }
         config = new(name, None, self.out or Path(), **given)
-        changes: dict[str, object] = {"task": unhurried(config.task)}
+        changes: dict[str, object] = {"task": without_time_limit(config.task)}
         if self.out is None:
             changes["record"] = None
         return config.model_copy(update=changes)

@@ -23,7 +23,7 @@ def view_of(seen: Seen, *, briefed: bool) -> AgentView:
         rejections=[f"{rejection.text}: {rejection.message}" for rejection in observation.rejections],
         pictures=[
             Picture(title=ref.title or ref.name, media_type=ref.media_type, data=b64encode(picture).decode())
-            for ref, picture in seen.arrived()
+            for ref, picture in seen.arrived_pictures()
         ],
     )
 

@@ -38,7 +38,7 @@ MAX_RESTARTS = 3
 """A game that dies more often in one run would die for ever, at the same decision."""
 
 
-async def hosted(
+async def host_match(
     config: MatchConfig,
     sc2path: Path,
     bus: Bus,
@@ -74,7 +74,7 @@ async def hosted(
             raise
         except GameError as error:
             restarts += 1
-            past = _played(config) if restarts <= MAX_RESTARTS else None
+            past = _rescue(config) if restarts <= MAX_RESTARTS else None
             if past is None:
                 raise
             log.warning(
@@ -105,7 +105,7 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, proce
     return Sides(thread, [executor_of(side) for side in sides])
 
 
-def _played(config: MatchConfig) -> Unfinished | None:
+def _rescue(config: MatchConfig) -> Unfinished | None:
     """Return what was played of a match whose game is lost, out of the way of a new recording; None if it must end."""
     if config.task.faults.game_lost == "end" or config.record is None or not config.record.exists():
         return None

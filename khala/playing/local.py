@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from khala.playing import games
 from khala.playing.children import Children, Spawn, spawn
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala.playing.local_bus import local_endpoint
 from khala.playing.minds import groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from khala.playing.minds import Minds
-    from khala_agents.llm.money import Ledger
+    from khala_agents.llm.money import MoneyLedger
     from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.past.resume import Unfinished
@@ -89,7 +89,7 @@ async def play(
     for _, mind, _ in groups_of(config.task, minds):
         mind.check()
     supplies = supplies or Supplies()
-    config, sc2path = _prepared(config, directory, game)
+    config, sc2path = _prepare(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)
@@ -109,7 +109,7 @@ async def play(
                 begun.set()
             watch(message)
 
-        match = hosted(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
+        match = host_match(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
         return await _unless_one_dies(match, children, begun)
 
 
@@ -123,11 +123,11 @@ async def play_hosted(
     past: Unfinished | None = None,
 ) -> list[Result]:
     """Play a match whose agents come over the bus; arguments and errors as in `play`."""
-    config, sc2path = _prepared(config, directory, game)
+    config, sc2path = _prepare(config, directory, game)
     async with contextlib.AsyncExitStack() as stack:
         session = await open_bus(bus)
         stack.push_async_callback(session.close)
-        return await hosted(config, sc2path, session, watch=watch, past=past)
+        return await host_match(config, sc2path, session, watch=watch, past=past)
 
 
 def shares(agents: Sequence[str], processes: int = MAX_PROCESSES) -> list[list[str]]:
@@ -154,7 +154,7 @@ class _Share:
         return ["agent", *self.names, "--side", self.side, *self.options, *budget]
 
 
-def spent_before(ledger: Ledger, minds: Mapping[str, Minds]) -> str:
+def spent_before(ledger: MoneyLedger, minds: Mapping[str, Minds]) -> str:
     """Return a sentence on what a match that is resumed has spent, and may still spend; "" if it has spent nothing."""
     if not (before_usd := ledger.booked_usd()):
         return ""
@@ -202,7 +202,7 @@ async def _unless_one_dies(
         await asyncio.wait({playing, keeping})
 
 
-def _prepared(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
+def _prepare(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:
     """Return the match with the name of its game, and the path of the game; create the directory."""
     try:
         make_private(directory)

@@ -45,7 +45,7 @@ def new_or_resumed(
         if task is None:
             raise ConfigError("give a task, such as 2s3z_pair (`khala tasks` lists them), or a recording with --resume")
         return new(task, run, out, **given), None
-    config, past = resumed(resume, out, assemble_s=given["assemble_s"])
+    config, past = resume_match(resume, out, assemble_s=given["assemble_s"])
     refuse_others(config, task=task, run=run, **given)
     return config, past
 
@@ -102,7 +102,7 @@ def new(task: str, run: str | None, out: Path, **given: Any) -> MatchConfig:
         raise ConfigError(words_of(error.errors(include_url=False)[0]), source="command line") from None
 
 
-def resumed(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
+def resume_match(path: Path, out: Path, *, assemble_s: float) -> tuple[MatchConfig, Unfinished]:
     """Return the match of a recording, or of the newest one in the directory of a run, and what was played of it."""
     past = read_unfinished(newest_recording(_run_at(path, out)))
     changes = {"record": free_recording(out / past.config.run), "assemble_s": assemble_s}

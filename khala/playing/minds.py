@@ -15,7 +15,7 @@ from khala.playing import environment
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model, model_files
 from khala_agents.llm.limits import own_turns
-from khala_agents.llm.money import Budget
+from khala_agents.llm.money import SharedBudget
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
@@ -61,11 +61,11 @@ class Minds:
         said = {name: self.agents.get(name) for name in names}
         alone = replace(self, agents={})
         return [
-            (alone if text is None else alone.named(text), [name for name in names if said[name] == text])
+            (alone if text is None else alone.with_name(text), [name for name in names if said[name] == text])
             for text in dict.fromkeys(said.values())
         ]
 
-    def named(self, text: str) -> Minds:
+    def with_name(self, text: str) -> Minds:
         """Return minds with the model or the policy of this name; budget, latency and fallback stay.
 
         Args:
@@ -91,14 +91,14 @@ class Minds:
             return
         file = load_model(self.model)
         host = urlsplit(self.base_url or file.base_url).hostname or ""
-        shipped = {(one.api_key_env, urlsplit(one.base_url).hostname) for one in map(load_model, model_files())}
+        shipped = {(model.api_key_env, urlsplit(model.base_url).hostname) for model in map(load_model, model_files())}
         if file.api_key_env and (file.api_key_env, host) not in shipped:
             yield f"{file.api_key_env} to {host}"
 
     @property
     def asks_a_model(self) -> bool:
         """Whether any of its agents does, and so may spend money."""
-        return any(mind.policy is None for mind in (self, *map(self.named, self.agents.values())))
+        return any(mind.policy is None for mind in (self, *map(self.with_name, self.agents.values())))
 
     def check(self) -> None:
         """Check that an agent could decide this way, before anything is started.
@@ -106,10 +106,10 @@ class Minds:
         Raises:
             ConfigError: a model file, a key or a policy is missing or wrong.
         """
-        self.policies([""], self.base_url, Budget(self.budget_usd))
+        self.policies([""], self.base_url, SharedBudget(self.budget_usd))
 
     def policies(
-        self, names: Sequence[str], base_url: str | None, budget: Budget, gates: Gates = own_turns
+        self, names: Sequence[str], base_url: str | None, budget: SharedBudget, gates: Gates = own_turns
     ) -> dict[str, Policy]:
         """Return a policy for each agent, for agents in this process.
 
@@ -192,7 +192,7 @@ def minds_of(sides: Sequence[str], common: Minds, named: Mapping[str, str]) -> d
     if unknown := [side for side in named if side not in sides]:
         is_it = f"its sides are {' and '.join(sides)}" if len(sides) > 1 else f"its only side is {sides[0]}"
         raise ConfigError(f"the task has no side {unknown[0]}: {is_it}")
-    made = {side: common.named(named[side]) if side in named else common for side in sides}
+    made = {side: common.with_name(named[side]) if side in named else common for side in sides}
     return made if common.budget_usd is None else share_budget(made, common.budget_usd)
 
 

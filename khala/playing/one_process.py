@@ -13,11 +13,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from khala.playing import games
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala.playing.minds import groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
 from khala_agents.llm.limits import own_turns
-from khala_agents.llm.money import Budget, Ledger
+from khala_agents.llm.money import MoneyLedger, SharedBudget
 from khala_agents.worker import run_workers
 from khala_orchestrator.roster import Seat
 from khala_protocol.bus.memory import MemoryBroker
@@ -69,7 +69,7 @@ async def play(
     config = config.model_copy(update={"game": name})
     broker, stop = broker or MemoryBroker(), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
-        ledger = stack.enter_context(ledger_of(config.record, past) if config.record else Ledger())
+        ledger = stack.enter_context(ledger_of(config.record, past) if config.record else MoneyLedger())
         by_side = await _policies(config, minds, ledger, stack, gates, callers)
         if past is not None:
             _remind(by_side, past)
@@ -78,7 +78,8 @@ async def play(
             for side, policies in by_side.items()
         ]
         try:
-            match = hosted(config, sc2path, broker.session(), watch=watch, past=past, processes=processes, asks=asks)
+            session = broker.session()
+            match = host_match(config, sc2path, session, watch=watch, past=past, processes=processes, asks=asks)
             return await _unless_one_fails(asyncio.create_task(match), agents)
         finally:
             stop.set()
@@ -88,7 +89,7 @@ async def play(
 async def _policies(
     config: MatchConfig,
     minds: Mapping[str, Minds],
-    ledger: Ledger,
+    ledger: MoneyLedger,
     stack: contextlib.AsyncExitStack,
     gates: Gates,
     callers: Mapping[Seat, Policy],
@@ -97,7 +98,7 @@ async def _policies(
     groups = list(groups_of(config.task, minds, taken=callers))
     base_url = await scripted_endpoint(stack, groups)
     budgets = {
-        side: Budget(mind.budget_usd, ledger=ledger, account=side, source=f"the budget of side {side}")
+        side: SharedBudget(mind.budget_usd, ledger=ledger, account=side, source=f"the budget of side {side}")
         for side, mind in minds.items()
     }
     made: dict[str, dict[str, Policy]] = {side.side: {} for side in config.task.per_side()}

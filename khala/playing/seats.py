@@ -37,7 +37,17 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Briefing, ImageRef, Observation, Wire
 
-__all__ = ["CallerPolicy", "NotAsked", "Seat", "SeatedMatch", "Seen", "Turn", "seat_named", "seats_of", "unhurried"]
+__all__ = [
+    "CallerPolicy",
+    "NotAsked",
+    "Seat",
+    "SeatedMatch",
+    "SeatsTurn",
+    "Seen",
+    "seat_named",
+    "seats_of",
+    "without_time_limit",
+]
 
 
 class NotAsked(KhalaError):
@@ -59,14 +69,14 @@ class Seen:
     observation: Observation
     pictures: Sequence[bytes] = ()
 
-    def arrived(self) -> Iterator[tuple[ImageRef, bytes]]:
+    def arrived_pictures(self) -> Iterator[tuple[ImageRef, bytes]]:
         """Yield the pictures, each with what the observation says of it."""
         files = {hashlib.sha256(picture).hexdigest(): picture for picture in self.pictures}
         return ((ref, files[ref.sha256]) for ref in self.observation.images if ref.sha256 in files)
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class SeatsTurn:
     """What the caller has to answer, and what has happened since its turn before.
 
     Attributes:
@@ -139,7 +149,7 @@ class SeatedMatch:
         self._questions = _OpenQuestions()
         self._reports: list[Report] = []
         self._results: list[Result] = []
-        self._ended: deque[Turn] = deque()
+        self._ended: deque[SeatsTurn] = deque()
         self._over = False
         self._playing: asyncio.Task[list[Result]] | None = None
 
@@ -158,7 +168,7 @@ class SeatedMatch:
         if error is None and not self._playing.cancelled():
             self._playing.result()
 
-    async def turn(self) -> Turn:
+    async def turn(self) -> SeatsTurn:
         """Wait until all agents of the caller that are asked now have their observations, or an episode is over.
 
         Called again before all of them are answered, it returns those that still wait.
@@ -170,14 +180,14 @@ class SeatedMatch:
         while not (self._ended or self._questions.are_complete):
             if self._playing.done():
                 self._playing.result()
-                return Turn(over=True)
+                return SeatsTurn(over=True)
             self._questions.changed.clear()
             await self._questions.changed.wait()
         if self._ended:
             return self._ended.popleft()
-        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+        return SeatsTurn(asked=self._questions.seen(), reports=self._take_reports())
 
-    async def news(self) -> Turn:
+    async def news(self) -> SeatsTurn:
         """Wait until something is new, and return all that there is: for agents of the caller with paces of their own.
 
         An agent is asked, its time for an answer is over, a step is reported, or an episode has ended. `asked` has
@@ -194,8 +204,8 @@ class SeatedMatch:
             return self._ended.popleft()
         if self._playing.done():
             self._playing.result()
-            return Turn(over=True)
-        return Turn(asked=self._questions.seen(), reports=self._take_reports())
+            return SeatsTurn(over=True)
+        return SeatsTurn(asked=self._questions.seen(), reports=self._take_reports())
 
     def act(self, seat: Seat, said: Said) -> None:
         """Answer for an agent: with a reply, or a reply with its usage.
@@ -235,7 +245,7 @@ class SeatedMatch:
         aborted = any(result.outcome == "aborted" for result in results)
         self._over = aborted or results[0].episode == self._config.episodes - 1
         theirs = tuple(result for result in results if result.side in self._sides)
-        self._ended.append(Turn(reports=self._take_reports(), results=theirs, over=self._over))
+        self._ended.append(SeatsTurn(reports=self._take_reports(), results=theirs, over=self._over))
         self._questions.changed.set()
 
     def _take_reports(self) -> tuple[Report, ...]:
@@ -261,7 +271,7 @@ def seat_named(name: str, there_are: Sequence[Seat], *, source: str) -> Seat:
     raise ConfigError(f"{what}: give one of {', '.join(map(str, there_are))}", source=source)
 
 
-def unhurried(task: TaskConfig) -> TaskConfig:
+def without_time_limit(task: TaskConfig) -> TaskConfig:
     """Return the task without a limit of time for an answer."""
     return task.model_copy(update={"clock": task.clock.model_copy(update={"max_wait_s": None})})
 

@@ -9,7 +9,7 @@ import os
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
-from khala_agents.llm.money import SUFFIX, Ledger
+from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_orchestrator.roster import Seat
 from khala_protocol.files import write_private
 from khala_protocol.messages import ModelCall, Report
@@ -27,7 +27,7 @@ POINTER = "the ledger of this match is "
 """Begins the file that stands in the place of a ledger, and names it."""
 
 
-def ledger_of(record: Path, past: Unfinished | None = None) -> Ledger:
+def ledger_of(record: Path, past: Unfinished | None = None) -> MoneyLedger:
     """Return the ledger of a match that is recorded at a path; each side has an account in it.
 
     A match that goes on has the ledger of the recording that it goes on from, also if that is done twice.
@@ -36,9 +36,9 @@ def ledger_of(record: Path, past: Unfinished | None = None) -> Ledger:
         ConfigError: the file cannot be read.
     """
     if past is None or (past.config.forked is not None and past.config.forked.step == past.steps):
-        ledger = Ledger(_place_of(record))
+        ledger = MoneyLedger(_place_of(record))
     else:
-        ledger = Ledger(_place_of(past.recording.path))
+        ledger = MoneyLedger(_place_of(past.recording.path))
         if not ledger.exists:
             for seat, usd in spent_usd(past.recording).items():
                 ledger.pay(seat.side, usd)
@@ -67,7 +67,7 @@ def paid_usd(record: Path) -> float:
     Raises:
         RecordingError: it has no ledger, and there is no recording.
     """
-    ledger = Ledger(_place_of(record))
+    ledger = MoneyLedger(_place_of(record))
     if not ledger.exists:
         return sum(spent_usd(Recording.open(record)).values())
     with ledger:

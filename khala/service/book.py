@@ -47,7 +47,7 @@ class Limits:
 
 
 @dataclass(slots=True)
-class Entry:
+class BookEntry:
     """One match."""
 
     card: MatchCard
@@ -73,14 +73,14 @@ class Book:
 
     limits: Limits = field(default_factory=Limits)
     draining: bool = False
-    _entries: dict[str, Entry] = field(default_factory=dict)
+    _entries: dict[str, BookEntry] = field(default_factory=dict)
     """By the number of the order."""
     _largest_mb: int = 0
     _turns: dict[str, int] = field(default_factory=dict)
     """By owner, the number of the last turn it had; the newest last."""
     _last_turn: int = 0
 
-    def entry(self, run: str) -> Entry | None:
+    def entry(self, run: str) -> BookEntry | None:
         """Return the newest match of this name that was taken."""
         return next((e for e in reversed(self._entries.values()) if e.card.run == run and e.config), None)
 
@@ -111,7 +111,7 @@ class Book:
             return f"a match called {run} is {entry.card.state} already: give another --run"
         return ""
 
-    def add(self, order: Submit, config: MatchConfig, minds: Mapping[str, Minds]) -> Entry:
+    def add(self, order: Submit, config: MatchConfig, minds: Mapping[str, Minds]) -> BookEntry:
         """Take a match."""
         card = MatchCard(
             run=order.run,
@@ -122,14 +122,14 @@ class Book:
             episodes=config.episodes,
             recording=str(config.record.parent) if config.record else "",
         )
-        return self._put(Entry(card, config, minds, order.resume))
+        return self._put(BookEntry(card, config, minds, order.resume))
 
-    def refuse(self, order: Submit, reason: str) -> Entry:
+    def refuse(self, order: Submit, reason: str) -> BookEntry:
         """Keep in mind why a match was not taken, for the one who asks."""
         card = MatchCard(run=order.run[:MAX_NAME], number=order.number, owner=order.owner, task="", state="refused")
-        return self._put(Entry(card.but(reason=reason[:MAX_WORDS])))
+        return self._put(BookEntry(card.but(reason=reason[:MAX_WORDS])))
 
-    def next(self, used_mb: int) -> Entry | None:
+    def next(self, used_mb: int) -> BookEntry | None:
         """Return the match to begin now, if one is waiting and there is room.
 
         Args:
@@ -142,13 +142,13 @@ class Book:
             return None
         busy = Counter(self._party(entry.card.owner) for entry in running)
 
-        def place(entry: Entry) -> tuple[int, int]:
+        def place(entry: BookEntry) -> tuple[int, int]:
             party = self._party(entry.card.owner)
             return busy[party], self._turns.get(party, 0)
 
         return min(waiting, key=place)
 
-    def begin(self, entry: Entry) -> None:
+    def begin(self, entry: BookEntry) -> None:
         """Note that a match is begun: its owner has had its turn, and is known from now on."""
         entry.update(state="running")
         self._last_turn += 1
@@ -161,12 +161,12 @@ class Book:
     def _party(self, owner: str) -> str:
         return owner if owner in self._turns else STRANGERS
 
-    def measured(self, entry: Entry, rss_mb: int) -> None:
+    def note_memory(self, entry: BookEntry, rss_mb: int) -> None:
         """Take what a match takes in memory."""
         self._largest_mb = max(self._largest_mb, rss_mb)
         entry.update(rss_mb=rss_mb)
 
-    def too_large(self, used_mb: int) -> Entry | None:
+    def too_large(self, used_mb: int) -> BookEntry | None:
         """Return the match to end because all together take too much: the largest."""
         running = [entry for entry in self.of("running") if not entry.stop_because]
         if used_mb <= self.limits.memory_mb or not running:
@@ -187,7 +187,7 @@ class Book:
             entry.results = known
             entry.update(outcomes=tuple(known[place] for place in sorted(known)))
 
-    def ended(self, entry: Entry, state: MatchState, reason: str = "") -> None:
+    def close_match(self, entry: BookEntry, state: MatchState, reason: str = "") -> None:
         """Close a match; the oldest of those that are over are forgotten."""
         entry.update(state=state, reason=reason[:MAX_WORDS], rss_mb=0)
         refused = state == "refused"  # a flood of these must not push out what was played
@@ -199,16 +199,16 @@ class Book:
         for number in alike[: max(0, len(alike) - KEPT)]:
             del self._entries[number]
 
-    def of(self, *states: MatchState) -> list[Entry]:
+    def of(self, *states: MatchState) -> list[BookEntry]:
         """Return the matches in these states."""
         return [entry for entry in self._entries.values() if entry.card.state in states]
 
-    def listed(self) -> Matches:
+    def matches(self) -> Matches:
         """Return the list for all to read."""
         return Matches(matches=tuple(entry.card for entry in self._entries.values()), draining=self.draining)
 
-    def _put(self, entry: Entry) -> Entry:
+    def _put(self, entry: BookEntry) -> BookEntry:
         self._entries[entry.card.number] = entry
         if entry.card.state not in OPEN:
-            self.ended(entry, entry.card.state, entry.card.reason)
+            self.close_match(entry, entry.card.state, entry.card.reason)
         return entry

@@ -49,7 +49,7 @@ def owner() -> str:
         return socket.gethostname()[:64]
 
 
-async def listed(bus: Bus, *, within_s: float = PATIENCE_S) -> Matches:
+async def list_matches(bus: Bus, *, within_s: float = PATIENCE_S) -> Matches:
     """Return the list of the service's matches.
 
     Raises:
@@ -69,7 +69,7 @@ async def submit(bus: Bus, order: Order, *, within_s: float = PATIENCE_S) -> Mat
         Refused: the service does not take it; the text says why.
         NoService: there is none.
     """
-    card = await _ordered(bus, order, lambda cards: _with_number(cards, order.number), within_s)
+    card = await _send_order(bus, order, lambda cards: _with_number(cards, order.number), within_s)
     if card.state == "refused":
         raise Refused(card.reason)
     return card
@@ -82,8 +82,8 @@ async def stop(bus: Bus, order: Order, *, within_s: float = PATIENCE_S) -> Match
         ConfigError: there is no such match.
         NoService: there is no service.
     """
-    find(await listed(bus, within_s=within_s), order.run)
-    return await _ordered(bus, order, lambda cards: _over(cards, order.run), within_s)
+    find(await list_matches(bus, within_s=within_s), order.run)
+    return await _send_order(bus, order, lambda cards: _over(cards, order.run), within_s)
 
 
 async def watch(bus: Bus, run: str, show: Callable[[Wire], None], *, within_s: float = PATIENCE_S) -> MatchCard:
@@ -120,7 +120,9 @@ def find(matches: Matches, run: str) -> MatchCard:
     return found[-1]
 
 
-async def _ordered(bus: Bus, order: Order, done: Callable[[Matches], MatchCard | None], within_s: float) -> MatchCard:
+async def _send_order(
+    bus: Bus, order: Order, done: Callable[[Matches], MatchCard | None], within_s: float
+) -> MatchCard:
     lists = await bus.subscribe(MATCHES_KEY, Delivery.STATE, depth=1)
     orders = await bus.publisher(order_key(order.number), Delivery.SPEECH)
     sending = asyncio.create_task(_send(orders.put, encode(order)))

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Sequence
     from pathlib import Path
 
-    from khala.service.daemon import Listener
+    from khala.service.daemon import MatchListener
     from khala_protocol.bus import Bus
     from khala_protocol.service import MatchCard
 
@@ -114,8 +114,8 @@ async def _serve(
 
 async def _listeners(
     stack: contextlib.AsyncExitStack, metrics: int | None, otlp: str | None, *, traced: bool
-) -> tuple[list[Listener], int | None]:
-    listeners: list[Listener] = []
+) -> tuple[list[MatchListener], int | None]:
+    listeners: list[MatchListener] = []
     port = None
     if metrics is not None:
         from khala.service.metrics import Metrics  # noqa: PLC0415
@@ -134,7 +134,7 @@ async def _listeners(
 
 def matches(connect: list[str] | None, *, tls: Path | None, insecure: bool, as_json: bool) -> None:
     """Print the matches of a service."""
-    found = ask(connect, tls, insecure, ("host", "observer"), client.listed)
+    found = ask(connect, tls, insecure, ("host", "observer"), client.list_matches)
     if as_json:
         typer.echo(json.dumps(found.model_dump(mode="json", exclude={"v", "run", "kind"})))
         return
@@ -187,7 +187,7 @@ def ask(
     """
     config = client_config(connect or (), tls=tls, names=names, insecure=insecure)
 
-    async def asked() -> T:
+    async def connect_and_ask() -> T:
         try:
             bus = await open_bus(config)
         except NoRouter as error:
@@ -199,4 +199,4 @@ def ask(
         finally:
             await bus.close()
 
-    return asyncio.run(asked())
+    return asyncio.run(connect_and_ask())

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from khala.playing.jobs import Ended, Job
 from khala.playing.matches import free_recording
-from khala.service.book import Book, Entry, Limits
+from khala.service.book import Book, BookEntry, Limits
 from khala.service.memory import rss_mb
 from khala.service.orders import match_of
 from khala_protocol.bus import Delivery
@@ -46,7 +46,7 @@ LOOKED_EVERY_S = 1.0
 MEASURED_EVERY_S = 2.0
 
 
-class Listener(Protocol):
+class MatchListener(Protocol):
     """What else hears the matches: metrics, traces."""
 
     def hear(self, message: Wire) -> None:
@@ -68,7 +68,7 @@ class Service:
     out: Path
     limits: Limits
     drain_s: float = 600.0
-    listeners: Sequence[Listener] = ()
+    listeners: Sequence[MatchListener] = ()
     exchanges: bool = False
     """Whether a listener wants what agents asked their models."""
     used_mb: Callable[[], int] = lambda: 0
@@ -109,7 +109,7 @@ class Service:
                 await asyncio.wait({ending, *tasks}, return_when=asyncio.FIRST_COMPLETED)
                 if ending.done():
                     await self._drain()
-                    await list_.put(encode(self.book.listed()))
+                    await list_.put(encode(self.book.matches()))
             finally:
                 ended = {ending, *tasks, *self._playing}
                 for task in ended:
@@ -156,7 +156,7 @@ class Service:
         read = partial(match_of, order, self.out, trusts=self.limits.trusts)
         return await asyncio.to_thread(read) if order.resume else read()  # a long recording takes seconds to read
 
-    def _stop(self, entry: Entry, because: str) -> None:
+    def _stop(self, entry: BookEntry, because: str) -> None:
         if entry.card.state == "queued":
             self._close(entry, "stopped", because)
         elif entry.card.state == "running" and not entry.stop_because:
@@ -179,7 +179,7 @@ class Service:
                     await self._changed.wait()
             self._changed.clear()
 
-    async def _play(self, entry: Entry) -> None:
+    async def _play(self, entry: BookEntry) -> None:
         """Play a match in a worker, and in another one if that is lost."""
         ended = Ended(state="lost", words="its worker was lost")
         try:
@@ -193,7 +193,7 @@ class Service:
             ended = Ended(state="error", words=f"{type(error).__name__}: {error}")
         self._close(entry, *_outcome(entry, ended))
 
-    async def _once(self, entry: Entry) -> Ended:
+    async def _once(self, entry: BookEntry) -> Ended:
         assert entry.config is not None
         resume = entry.resume or (entry.card.starts > 1 and entry.card.step + len(entry.card.outcomes) > 0)
         directory = self.out / entry.card.run
@@ -214,8 +214,8 @@ class Service:
             del self._players[entry.card.number]
             await player.close()
 
-    def _close(self, entry: Entry, state: MatchState, reason: str) -> None:
-        self.book.ended(entry, state, reason)
+    def _close(self, entry: BookEntry, state: MatchState, reason: str) -> None:
+        self.book.close_match(entry, state, reason)
         log.info("match %s%s", state, f": {reason}" if reason else "", extra={"run": entry.card.run})
         self._changed.set()
 
@@ -243,7 +243,7 @@ class Service:
         """Publish the list, some times a second, if it is another one."""
         last = b""
         while True:
-            if (now := encode(self.book.listed())) != last:
+            if (now := encode(self.book.matches())) != last:
                 await list_.put(now)
                 last = now
             await asyncio.sleep(LISTED_EVERY_S)
@@ -253,7 +253,7 @@ class Service:
         while True:
             for entry in self.book.of("running"):
                 if (player := self._players.get(entry.card.number)) is not None:
-                    self.book.measured(entry, self.measure(player.pid))
+                    self.book.note_memory(entry, self.measure(player.pid))
             used_mb = self.used_mb()
             if (large := self.book.too_large(used_mb)) is not None:
                 limit = self.limits.memory_mb
@@ -277,7 +277,7 @@ class Service:
             await asyncio.wait(set(self._playing))
 
 
-def _outcome(entry: Entry, ended: Ended) -> tuple[MatchState, str]:
+def _outcome(entry: BookEntry, ended: Ended) -> tuple[MatchState, str]:
     """Return what became of a match."""
     how = f"; `khala submit --resume {entry.card.run}` goes on" if entry.card.step else ""
     state = "stopped" if entry.stop_because and ended.state != "done" else ended.state

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, get_args
 from aiohttp import web
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
-from khala.doors.pages import guarded
+from khala.doors.pages import guard
 from khala.doors.rules import Door
 from khala_protocol.listening import Patience, bind
 from khala_protocol.messages import Report, Result
@@ -56,7 +56,7 @@ class Metrics:
         Raises:
             ConfigError: the port is taken.
         """
-        application = web.Application(middlewares=[guarded(Door(command="khala serve"))])
+        application = web.Application(middlewares=[guard(Door(command="khala serve"))])
         application.router.add_get("/metrics", self._answer)
         runner = web.AppRunner(application, access_log=None, shutdown_timeout=1.0)
         await runner.setup()
@@ -87,7 +87,7 @@ class Metrics:
 
     def book(self, book: Book, used_mb: int) -> None:
         """Take the list of matches."""
-        by_state = Count(card.state for card in book.listed().matches)
+        by_state = Count(card.state for card in book.matches().matches)
         for state in get_args(MatchState):
             self._matches.labels(state).set(by_state[state])
         self._queue.set(by_state["queued"])

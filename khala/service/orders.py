@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from khala.playing.matches import free_recording, resumed
+from khala.playing.matches import free_recording, resume_match
 from khala.playing.minds import Minds, groups_of, minds_of
 from khala_bridge.observe import Observer
 from khala_bridge.task.code import code_of
@@ -40,7 +40,7 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     """
     check_name(order.run, "run")
     try:
-        config = _resumed(order.run, out) if order.resume else _new(order)
+        config = _resume(order.run, out) if order.resume else _new(order)
         common = _MINDS.validate_python(order.minds)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
@@ -64,11 +64,11 @@ def _new(order: Submit) -> MatchConfig:
     return MatchConfig.model_validate({**order.match, "run": order.run, "record": None})
 
 
-def _resumed(run: str, out: Path) -> MatchConfig:
+def _resume(run: str, out: Path) -> MatchConfig:
     """Return the match of the newest recording of a run."""
     if not (out / run).is_dir():
         raise ConfigError(f"the service has no run {run!r} to resume: it looks for its recording in {out / run}")
-    config, _ = resumed(out / run, out, assemble_s=ASSEMBLE_S)
+    config, _ = resume_match(out / run, out, assemble_s=ASSEMBLE_S)
     if config.run != run:
         raise ConfigError(f"the recording in {out / run} is of the run {config.run!r}: give its directory that name")
     return config

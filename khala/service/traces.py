@@ -30,7 +30,7 @@ KEPT = 1000
 """Model calls that wait for the report of their step, of all matches; a prompt is not kept."""
 
 
-class Decision(NamedTuple):
+class TracedDecision(NamedTuple):
     """What model calls and the report of a step have in common."""
 
     run: str
@@ -40,7 +40,7 @@ class Decision(NamedTuple):
     step: int
 
 
-class Call(NamedTuple):
+class TracedCall(NamedTuple):
     """A model call without its prompt."""
 
     began_s: float
@@ -56,7 +56,7 @@ class Traces:
         self._provider = TracerProvider(resource=Resource.create({"service.name": "khala"}))
         self._provider.add_span_processor(processor)
         self._tracer = self._provider.get_tracer("khala")
-        self._calls: OrderedDict[Decision, list[Call]] = OrderedDict()
+        self._calls: OrderedDict[TracedDecision, list[TracedCall]] = OrderedDict()
 
     def hear(self, message: Wire) -> None:
         """Keep a model call, or make the spans of a step."""
@@ -74,7 +74,7 @@ class Traces:
         self._provider.shutdown()
 
     def _keep(self, call: ModelCall) -> None:
-        at = Decision(call.run, call.side, call.agent, call.episode, call.step)
+        at = TracedDecision(call.run, call.side, call.agent, call.episode, call.step)
         usage = call.usage
         about: dict[str, Any] = {
             "gen_ai.operation.name": "chat",
@@ -85,7 +85,7 @@ class Traces:
             "khala.attempt": call.attempt,
         }
         failed = "" if call.status == "ok" else call.status
-        self._calls.setdefault(at, []).append(Call(call.started_s, call.latency_s, about, failed))
+        self._calls.setdefault(at, []).append(TracedCall(call.started_s, call.latency_s, about, failed))
         while len(self._calls) > KEPT:
             self._calls.popitem(last=False)
 
@@ -109,7 +109,7 @@ class Traces:
     def _agent(self, report: Report, agent: AgentReport, inside: Context, answered_ns: int) -> None:
         """Make the span of one decision, which may have been asked for in an earlier step."""
         asked = report.step if agent.asked_step is None else agent.asked_step
-        calls = self._calls.pop(Decision(report.run, agent.side, agent.agent, report.episode, asked), [])
+        calls = self._calls.pop(TracedDecision(report.run, agent.side, agent.agent, report.episode, asked), [])
         took_s = agent.latency_s or max((call.began_s + call.took_s for call in calls), default=0.0)
         began_ns = answered_ns - _ns(took_s)
         about: dict[str, Any] = {

@@ -55,7 +55,7 @@ class Advisers:
         adviser = Adviser(run=run, side=note.side, name=self._name)
         line = self._lines.get((run, note.side))
         if line is None:
-            line = self._lines[run, note.side] = await self._opened(adviser)
+            line = self._lines[run, note.side] = await self._open(adviser)
         text = " ".join(note.text.split())
         await line.publisher.put(encode(adviser.advice(f"@{note.recipient} {text}", line.card)))
 
@@ -65,14 +65,14 @@ class Advisers:
             _, line = self._lines.popitem()
             await line.bus.close()
 
-    async def _opened(self, adviser: Adviser) -> _Line:
+    async def _open(self, adviser: Adviser) -> _Line:
         *others, last = places(adviser, self._connect, self._tls, insecure=self._insecure)
         for config in others:
             with contextlib.suppress(NoMatch):
-                return await self._at(config, adviser, FIND_NEAR_S)
-        return await self._at(last, adviser, FIND_S)
+                return await self._connect_to(config, adviser, FIND_NEAR_S)
+        return await self._connect_to(last, adviser, FIND_S)
 
-    async def _at(self, config: BusConfig, adviser: Adviser, find_s: float) -> _Line:
+    async def _connect_to(self, config: BusConfig, adviser: Adviser, find_s: float) -> _Line:
         try:
             bus = await open_bus(config)
         except NoRouter as error:

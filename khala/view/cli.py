@@ -70,13 +70,13 @@ def view(
     The page follows a running match. It is served on this machine alone, behind a token in its address, and loads
     nothing from elsewhere. An index in the cache directory makes long recordings open at once.
     """
-    from khala.view.serve import Look, run_export, run_view  # noqa: PLC0415  # a web server, which --help can do without
+    from khala.view.serve import ViewOptions, run_export, run_view  # noqa: PLC0415  # a web server, which --help can do without
 
-    look = Look(
+    options = ViewOptions(
         given=tuple(given or ()), connect=tuple(connect or ()), tls=tls, insecure=insecure, adviser=adviser or "",
         host=host, port=port, asks_password=password, password_file=password_file, https=https, opens=not no_open,
     )  # fmt: skip
     if export is not None:
-        run_export(look, export, steps=steps, agents=agents or ())
+        run_export(options, export, steps=steps, agents=agents or ())
     else:
-        run_view(look)
+        run_view(options)

@@ -48,12 +48,14 @@ def deeds(
         screens: by team.
     """
     speech = parse(reply)
-    standing = [(one.call, one.start, one.end) for one in speech.standing if isinstance(one, Standing)]
-    calls = sorted([*((call, call.start, call.end) for call in speech.calls), *standing], key=lambda one: one[1])
+    standing = [(order.call, order.start, order.end) for order in speech.standing if isinstance(order, Standing)]
+    calls = sorted([*((call, call.start, call.end) for call in speech.calls), *standing], key=lambda call: call[1])
     rejections = list(report.rejections) if report else []
     accepted = list(report.accepted) if report else []
     unread = max(
-        (rejection for rejection in rejections if rejection.reason == "too_many_actions"), key=_start, default=None
+        (rejection for rejection in rejections if rejection.reason == "too_many_actions"),
+        key=lambda rejection: rejection.start,
+        default=None,
     )
     found: list[Deed] = []
     for call, start, end in calls:
@@ -62,7 +64,7 @@ def deeds(
         if why is None and (ok := _was_accepted(call, accepted)) is None and unread and start > unread.start:
             why = unread  # one rejection stands for all calls behind it
         found.append(_deed(reply[start:end], call, start, False if why else ok, why, frames, screens))
-    found += (_rejected(rejection) for rejection in rejections if rejection.text)
+    found += (_refused_deed(rejection) for rejection in rejections if rejection.text)
     return tuple(sorted(found, key=lambda deed: deed.start))
 
 
@@ -72,10 +74,6 @@ def _taken(rejections: list[Rejection], start: int, end: int) -> Rejection | Non
     if mine is not None:
         rejections.remove(mine)
     return mine
-
-
-def _start(one: Rejection) -> int:
-    return one.start
 
 
 def _was_accepted(call: Call, accepted: list[str]) -> bool | None:
@@ -117,9 +115,14 @@ def _deed(
     )
 
 
-def _rejected(one: Rejection) -> Deed:
+def _refused_deed(rejection: Rejection) -> Deed:
     return Deed(
-        text=one.text, start=one.start, team=one.team or "", accepted=False, reason=one.reason, message=one.message
+        text=rejection.text,
+        start=rejection.start,
+        team=rejection.team or "",
+        accepted=False,
+        reason=rejection.reason,
+        message=rejection.message,
     )
 
 

@@ -105,7 +105,7 @@ class Digest:
         latencies = [agent["latency_s"] for agent in agents if agent.get("latency_s") is not None]
         known = {"after": said["game_loop"], f"score/{side}": said.get("score", 0.0)}
         sums = self._sums(side, {
-            "killed_value": self._killed(said, side),
+            "killed_value": self._killed_value(said, side),
             "lost_value": self._lost(said, side),
             "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
             "cost_usd": sum(costs) if costs else None,
@@ -117,7 +117,7 @@ class Digest:
         for incident in said.get("incidents", ()):
             self.mark(said, "incident", incident, side=side)
 
-    def _killed(self, said: Json, side: str) -> float | None:
+    def _killed_value(self, said: Json, side: str) -> float | None:
         value: float | None = said.get("killed_value")
         return value if value is not None else self.memory.fallen.pop(self._other(side), None)
 
@@ -276,7 +276,7 @@ def _from_view(view: Json, side: str, *, alone: bool) -> Json:
     return found
 
 
-def counted(kinds: Iterable[str]) -> str:
+def count_kinds(kinds: Iterable[str]) -> str:
     """Return what there is of several: `2 Stalkers, 1 Probe`."""
     return ", ".join(
         f"{number} {kind if number == 1 else _several(kind)}" for kind, number in Counter(kinds).most_common()

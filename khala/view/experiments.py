@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def listed(directories: Sequence[Path]) -> list[ExperimentLine]:
+def list_experiments(directories: Sequence[Path]) -> list[ExperimentLine]:
     """Return the lines of experiments; how many matches each plans is known until its file changes."""
     with contextlib.closing(cache()) as db:
         return [line for path in directories if (line := _experiment(path, db)) is not None]
@@ -31,7 +31,7 @@ def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | Non
         known = db.execute("select line from line where path = ? and changed_ns = ?", (key, changed)).fetchone()
         with contextlib.suppress(sqlite3.Error):  # an index that is broken is made again below
             if known:
-                return ExperimentLine.model_validate_json(known[0]).but(played=_played(directory))
+                return ExperimentLine.model_validate_json(known[0]).but(played=_count_played(directory))
         from khala.view.table import line_of  # noqa: PLC0415  # it loads all that experiments need
 
         line = line_of(directory)
@@ -41,7 +41,7 @@ def _experiment(directory: Path, db: sqlite3.Connection) -> ExperimentLine | Non
     return line
 
 
-def _played(directory: Path) -> int:
+def _count_played(directory: Path) -> int:
     path = directory / "index.sqlite"
     if not path.exists():
         return 0

@@ -110,11 +110,11 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
 def _answers(run: Opened, part: StepSelection, agents: Collection[str]) -> Iterator[tuple[str, bytes]]:
     """Yield the answers of a run that the page may ask for, by their paths below it."""
     view: dict[str, Any] = json.loads(run.view())
-    seats = [(one["side"], one["name"]) for one in view["agents"]]
+    seats = [(agent["side"], agent["name"]) for agent in view["agents"]]
     wanted = {(side, name) for side, name in seats if not agents or {name, f"{side}/{name}"} & {*agents}}
     yield "", json.dumps(view | {"can_advise": False}).encode()
     pictures: set[str] = set()
-    for episode in (one["episode"] for one in view["episodes"]):
+    for episode in (line["episode"] for line in view["episodes"]):
         begin = f"/episodes/{episode}"
         asked: set[tuple[int, str, str]] = set()
         timeline = run.timeline(episode)
@@ -132,7 +132,7 @@ def _answers(run: Opened, part: StepSelection, agents: Collection[str]) -> Itera
                 if (decision["side"], decision["agent"]) in wanted:
                     asked.add((decision["step"], decision["side"], decision["agent"]))
         for step, side, agent in sorted(asked):
-            yield f"{begin}/steps/{step}/agents/{side}/{agent}", run.asked(episode, step, side, agent)
+            yield f"{begin}/steps/{step}/agents/{side}/{agent}", run.texts(episode, step, side, agent)
     yield from _pictures(run, pictures)
 
 

@@ -76,7 +76,7 @@ class Spot(NamedTuple):
     place: int
 
 
-class Found(NamedTuple):
+class FoundSample(NamedTuple):
     """A sample that the index knows."""
 
     step: int
@@ -135,30 +135,30 @@ class Index:
         found = self.rows("select value from meta where name = ?", name)
         return json.loads(found[0][0]) if found else default
 
-    def newest(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> Found | None:
+    def newest(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> FoundSample | None:
         """Return the sample of an agent's topic at a step, or else the last one before it."""
         found = self.rows(
             "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? and "
             "side = ? and agent = ? and step <= ? order by step desc, rowid desc limit 1",
             topic, episode, side, agent, step,
         )  # fmt: skip
-        return Found(*found[0]) if found else None
+        return FoundSample(*found[0]) if found else None
 
-    def first(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> Found | None:
+    def first(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> FoundSample | None:
         """Return the first sample of an agent's topic at exactly this step."""
         found = self.rows(
             "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? and "
             "side = ? and agent = ? and step = ? order by rowid limit 1", topic, episode, side, agent, step,
         )  # fmt: skip
-        return Found(*found[0]) if found else None
+        return FoundSample(*found[0]) if found else None
 
-    def at(self, topic: Topic, episode: int, first: int, last: int) -> Iterator[Found]:
+    def at(self, topic: Topic, episode: int, first: int, last: int) -> Iterator[FoundSample]:
         """Yield the samples of a topic from step to step, both included, in the order of steps and of the file."""
         for row in self.rows(
             "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? "
             "and step between ? and ? order by step, rowid", topic, episode, first, last,
         ):  # fmt: skip
-            yield Found(*row)
+            yield FoundSample(*row)
 
     def payload(self, spot: Spot) -> bytes:
         """Return the bytes of a sample.

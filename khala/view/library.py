@@ -85,15 +85,15 @@ def _with_life(head: Head, changed_s: float) -> Head:
 def _read_head(path: Path, size: int, changed_ns: int) -> Head:  # noqa: ARG001  # a changed file is another one
     summary = Summary.of(path)
     run = next((key.split("/")[1] for key in summary.keys.values() if key.endswith(f"/{Topic.RUN}")), None)
-    card = next(_decoded(Run, summary, run_key(run, Topic.RUN)), None) if run else None
-    results = tuple(_decoded(Result, summary, run_key(run, Topic.RESULT))) if run and summary.complete else ()
+    card = next(_decode(Run, summary, run_key(run, Topic.RUN)), None) if run else None
+    results = tuple(_decode(Result, summary, run_key(run, Topic.RESULT))) if run and summary.complete else ()
     reports = summary.counts.get(run_key(run, Topic.REPORT), 0) if run else 0
     sides = len({agent.side for agent in card.agents}) if card else 1
     began_s = summary.begun_ns / 1e9 or changed_ns / 1e9
     return Head(card, results, summary.complete, False, summary.size, began_s, reports // max(1, sides))
 
 
-def _decoded(kind: type[W], summary: Summary, key: str) -> Iterator[W]:
+def _decode(kind: type[W], summary: Summary, key: str) -> Iterator[W]:
     with contextlib.suppress(KhalaError):
         for payload in summary.payloads(key):
             yield decode_as(kind, payload)
@@ -106,7 +106,7 @@ def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in t
     models = tuple(dict.fromkeys(labels[name] for name in PLAYERS if name in labels))
     costs = [usage.cost_usd for result in results for usage in result.usage.values() if usage.cost_usd is not None]
     outcomes: dict[str, list[str]] = {}
-    for result in sorted(results, key=lambda one: one.episode):
+    for result in sorted(results, key=lambda result: result.episode):
         outcomes.setdefault(result.side, []).append(result.outcome)
     seconds = {result.episode: result.game_s for result in results}
     return RunLine(
@@ -133,7 +133,7 @@ def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in t
     )
 
 
-class Found(NamedTuple):
+class FoundRecordings(NamedTuple):
     """What a directory holds."""
 
     recordings: list[Path]
@@ -142,13 +142,13 @@ class Found(NamedTuple):
     """Directories of experiments."""
 
 
-def found_in(directory: Path) -> Found:
+def found_in(directory: Path) -> FoundRecordings:
     """Return the recordings and experiments of a directory and of those below it.
 
     Raises:
         ConfigError: it cannot be read.
     """
-    found = Found([], [])
+    found = FoundRecordings([], [])
     try:
         times = sorted(islice(_walk(directory, 0, found.experiments), MOST_FILES), reverse=True)
     except OSError as error:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from khala.view.deeds import Screen, deeds
 from khala.view.digest import tag_number
 from khala.view.timeline import loop_of, whole_number
-from khala.view.wire import Asked, Decision, Deed, Letter, Moment, SideMoment, TeamMark
+from khala.view.wire import DecisionTexts, Deed, Letter, SeenDecision, SeenTeam, SideMoment, StepView
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
@@ -35,7 +35,7 @@ from khala_protocol.speech import thought_of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from khala.view.index import Found, Index, Spot
+    from khala.view.index import FoundSample, Index, Spot
     from khala.view.wire import AgentLine
     from khala_protocol.messages import AgentReport
 
@@ -58,7 +58,7 @@ class Moments:
         self._index, self._agents, self._scale = index, agents, cells_per_unit
         self._briefings: dict[Spot, tuple[float, dict[str, tuple[str, ...]]]] = {}
 
-    def moment(self, episode: int, step: int) -> Moment | None:
+    def moment(self, episode: int, step: int) -> StepView | None:
         """Return everything about a step but the map; None if there is no such step."""
         rows = self._index.rows(
             "select step, data from step where episode = ? and step <= ? order by step desc limit 2", episode, step
@@ -72,7 +72,7 @@ class Moments:
         for report in reports:
             unasked |= {f"{report.side}/{agent}": why for agent, why in report.unasked.items()}
         named = len({agent.side for agent in self._agents}) > 1
-        return Moment(
+        return StepView(
             episode=episode,
             step=step,
             game_loop=loop,
@@ -90,7 +90,7 @@ class Moments:
             timings=reports[0].timings if reports else Timings(),
         )  # fmt: skip
 
-    def asked(self, episode: int, step: int, side: str, agent: str) -> Asked | None:
+    def texts(self, episode: int, step: int, side: str, agent: str) -> DecisionTexts | None:
         """Return the long texts of an agent's decision at a step, or of the last one before; None if there is none."""
         if (found := self._index.newest(Topic.OBSERVATION, episode, side, agent, step)) is None:
             return None
@@ -99,7 +99,7 @@ class Moments:
         earlier = self._index.newest(Topic.OBSERVATION, episode, side, agent, found.step - 1)
         before = self._read(Observation, earlier) if earlier else None
         reply = self._reply(episode, found.step, side, agent)
-        return Asked(
+        return DecisionTexts(
             side=side,
             agent=agent,
             step=found.step,
@@ -128,7 +128,7 @@ class Moments:
                 cost_usd=row.get(f"cost_usd/{side}"),
             )
 
-    def _decision(self, episode: int, step: int, side: str, agent: str) -> Decision | None:
+    def _decision(self, episode: int, step: int, side: str, agent: str) -> SeenDecision | None:
         if (found := self._index.newest(Topic.OBSERVATION, episode, side, agent, step)) is None:
             return None
         if (seen := self._read(Observation, found)) is None:
@@ -136,7 +136,7 @@ class Moments:
         effect, report = self._effect(episode, found.step, side, agent)
         reply = self._reply(episode, found.step, side, agent)
         text = reply.text if reply else ""
-        return Decision(
+        return SeenDecision(
             side=side,
             agent=agent,
             step=seen.step,
@@ -167,9 +167,9 @@ class Moments:
         )  # fmt: skip
         for (effect,) in rows:
             for report in self._reports(episode, effect):
-                for one in report.agents:
-                    if (one.side, one.agent) == (side, agent) and step in (one.asked_step, effect):
-                        return effect, one
+                for decided in report.agents:
+                    if (decided.side, decided.agent) == (side, agent) and step in (decided.asked_step, effect):
+                        return effect, decided
         return None, None
 
     def _reply(self, episode: int, step: int, side: str, agent: str) -> Reply | None:
@@ -180,8 +180,8 @@ class Moments:
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:
         samples = self._index.at(Topic.EXCHANGE, episode, step, step)
         mine = [sample for sample in samples if (sample.side, sample.agent) == (side, agent)]
-        for one in mine[:SLOWEST_CALLS]:
-            if (call := self._read(ModelCall, one)) is not None:
+        for found in mine[:SLOWEST_CALLS]:
+            if (call := self._read(ModelCall, found)) is not None:
                 yield call
 
     def _sent(self, episode: int, step: int | None, side: str, agent: str) -> Iterator[Letter]:
@@ -196,11 +196,11 @@ class Moments:
     def _model(self, side: str, agent: str) -> str:
         return next((line.model for line in self._agents if (line.side, line.name) == (side, agent)), "")
 
-    def _teams(self, seen: Observation) -> Iterator[TeamMark]:
+    def _teams(self, seen: Observation) -> Iterator[SeenTeam]:
         size = round(self._briefing(seen)[0] * self._scale, 2)
         for team in seen.view.teams:
             tags = tuple(tag_number(unit.tag) for unit in team.units)
-            yield TeamMark(name=team.name, tags=tags, minimap=team.minimap, screen=size)
+            yield SeenTeam(name=team.name, tags=tags, minimap=team.minimap, screen=size)
 
     def _deeds(self, reply: str, report: AgentReport | None, seen: Observation) -> tuple[Deed, ...]:
         cells, frames = self._briefing(seen)
@@ -222,7 +222,7 @@ class Moments:
             self._briefings[found.spot] = frames.screen, {action.name.casefold(): action.args for action in actions}
         return self._briefings[found.spot]
 
-    def _read(self, kind: type[W], found: Found) -> W | None:
+    def _read(self, kind: type[W], found: FoundSample) -> W | None:
         """Return the message of a sample; None if it is not one of this kind: anybody may have written it."""
         try:
             return decode_as(kind, self._index.payload(found.spot))
@@ -235,5 +235,5 @@ def _why(said: AgentReport | Reply | None) -> str:
     return ": ".join(filter(None, (said.detail, said.reason))) if said else ""
 
 
-def _letter(one: Any, step: int) -> Letter:
-    return Letter(sender=one.sender, recipient=one.recipient, text=one.text, step=step, again=one.again)
+def _letter(letter: Any, step: int) -> Letter:
+    return Letter(sender=letter.sender, recipient=letter.recipient, text=letter.text, step=step, again=letter.again)

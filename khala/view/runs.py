@@ -15,7 +15,7 @@ from khala.view.library import PLAYERS, line_of, read_head
 from khala.view.moments import Moments
 from khala.view.scan import Scanning
 from khala.view.timeline import timeline
-from khala.view.wire import MOST_SCENES, AgentLine, EpisodeLine, Progress, RunView, Scenes
+from khala.view.wire import MOST_SCENES, AgentLine, EpisodeLine, RecordingProgress, RunView, Scenes
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
@@ -90,7 +90,7 @@ class Opened:
             sides=self.sides,
             agents=self.agents(),
             episodes=tuple(self.episodes()),
-            indexed=self.indexed(),
+            indexed=self.indexed_share(),
             scenes=self._drawn_from(),
             can_advise=line.live and self.may_advise,
             card=card.model_dump(mode="json") if card else {},
@@ -107,7 +107,7 @@ class Opened:
     def terrain(self, episode: int) -> bytes:
         """Return the `Terrain` of an episode."""
         self._require(episode)
-        if (spot := terrain.recorded(self.index, episode)) is not None:
+        if (spot := terrain.find(self.index, episode)) is not None:
             return self.index.payload(spot)
         return terrain.from_views(self.index, self.run, episode).model_dump_json().encode()
 
@@ -116,7 +116,7 @@ class Opened:
         self._require(episode)
         last = min(last, first + MOST_SCENES - 1)
         if self._drawn_from() != "views":
-            return scenes.recorded(self.index, episode, first, last)
+            return scenes.recorded_scenes(self.index, episode, first, last)
         found = scenes.from_views(self.index, self.run, self.sides, episode, first, last, self._scale(episode))
         return Scenes(scenes=tuple(found)).model_dump_json().encode()
 
@@ -127,9 +127,9 @@ class Opened:
             raise NotThere(f"episode {episode} has no step {step} yet")
         return found.model_dump_json().encode()
 
-    def asked(self, episode: int, step: int, side: str, agent: str) -> bytes:
+    def texts(self, episode: int, step: int, side: str, agent: str) -> bytes:
         """Return what an agent was `Asked`."""
-        found = self._moments(episode).asked(episode, step, side, agent)
+        found = self._moments(episode).texts(episode, step, side, agent)
         if found is None:
             raise NotThere(f"{side}/{agent} was not asked up to step {step} of episode {episode}")
         return found.model_dump_json().encode()
@@ -143,13 +143,13 @@ class Opened:
             raise NotThere("there is no such picture in this recording")
         return kind, data
 
-    def progress(self) -> Progress:
+    def progress(self) -> RecordingProgress:
         """Return how far the match, and the index, are."""
         newest = self.index.rows("select episode, count(*) from step group by episode order by episode desc limit 1")
         episode, steps = newest[0] if newest else (0, 0)
         live = read_head(self.path).live
         lag_s = self.index.meta("lag_s") if live else None
-        return Progress(episode=episode, steps=steps, indexed=self.indexed(), live=live, lag_s=lag_s)
+        return RecordingProgress(episode=episode, steps=steps, indexed=self.indexed_share(), live=live, lag_s=lag_s)
 
     @property
     def may_advise(self) -> bool:
@@ -163,7 +163,7 @@ class Opened:
 
     # --- parts --------------------------------------------------------------------------------------
 
-    def indexed(self) -> float:
+    def indexed_share(self) -> float:
         """Return the part of the recording that is indexed; of one that is torn or grows, of what is whole of it."""
         if self.index.meta("ended") or self.index.meta("broken"):
             return 1.0
@@ -262,7 +262,7 @@ class Opened:
         if (known := self._scales.get(episode)) is not None:
             return known
         scale = terrain.scale_of(self.index, episode)
-        if self.indexed() >= 1.0:
+        if self.indexed_share() >= 1.0:
             self._scales[episode] = scale
         return scale
 

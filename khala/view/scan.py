@@ -107,7 +107,7 @@ class Scanner:
                 if not self._claim():
                     self._db.execute("rollback")
                     return None
-                scan = self._scan or self._resumed(file)
+                scan = self._scan or self._resume(file)
                 before = scan.offset
                 batch = self._read(scan, file, within_s)
                 self._write(batch, scan, file)
@@ -144,7 +144,7 @@ class Scanner:
         self._renew_s = now_s + LEASE_S / 2
         self._note("writer", [self._name, now_s + LEASE_S])
 
-    def _resumed(self, file: BinaryIO) -> Scan:
+    def _resume(self, file: BinaryIO) -> Scan:
         """Return the scan where the index ends, if this is the file as it was then; otherwise at its beginning."""
         with contextlib.suppress(*WRONG):  # of another version, or of somebody else
             state = {name: json.loads(value) for name, value in self._db.execute("select name, value from meta")}
@@ -183,12 +183,12 @@ class Scanner:
             batch.images.append((hashlib.sha256(sample.payload).hexdigest(), chunk.offset, sample.place))
         elif address.topic in _KEPT and len(sample.payload) <= MAX_MESSAGE_BYTES:
             with contextlib.suppress(*WRONG):
-                episode, step = self._digested(batch, sample.payload, address)
+                episode, step = self._digest(batch, sample.payload, address)
                 side, agent = address.side or "", address.agent or ""
                 where = (chunk.offset, sample.place, sample.log_time_ns)
                 batch.samples.append((str(address.topic), episode, side, agent, step, *where))
 
-    def _digested(self, batch: _Batch, payload: bytes, address: Address) -> tuple[int, int]:
+    def _digest(self, batch: _Batch, payload: bytes, address: Address) -> tuple[int, int]:
         """Take in a message, and return its episode and step.
 
         Raises:

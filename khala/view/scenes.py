@@ -41,7 +41,7 @@ _RADIUS = 0.375
 _NOWHERE = (-1.0, -1.0)
 
 
-def recorded(index: Index, episode: int, first: int, last: int) -> bytes:
+def recorded_scenes(index: Index, episode: int, first: int, last: int) -> bytes:
     """Return the answer with the recorded scenes of these steps, as JSON."""
     scenes = {found.step: index.payload(found.spot) for found in index.at(Topic.SCENE, episode, first, last)}
     return b'{"scenes":[%s]}' % b",".join(scenes.values())

@@ -49,7 +49,7 @@ SWITCH_S = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ViewOptions:
     """What `khala view` was asked for; see its options."""
 
     given: tuple[str, ...]
@@ -65,63 +65,63 @@ class Look:
     opens: bool = True
 
 
-def run_view(look: Look) -> None:
+def run_view(options: ViewOptions) -> None:
     """Serve until a signal ends it.
 
     Raises:
         KhalaError: there is nothing to be seen, or it cannot be served so.
     """
-    context = _tls(look)
-    door = door_of(look)
+    context = _tls(options)
+    door = door_of(options)
     sys.setswitchinterval(SWITCH_S)
-    ended = asyncio.run(cancelled_by_signal(_view(look, door, context)))
+    ended = asyncio.run(cancelled_by_signal(_view(options, door, context)))
     if isinstance(ended, signal.Signals):
         raise SystemExit(SIGNALLED + ended)
 
 
-def run_export(look: Look, path: Path, *, steps: str | None, agents: Sequence[str]) -> None:
+def run_export(options: ViewOptions, path: Path, *, steps: str | None, agents: Sequence[str]) -> None:
     """Write a view into a file.
 
     Raises:
         KhalaError: there is nothing to export, or too much.
     """
-    if look.connect:
+    if options.connect:
         raise ConfigError("an export needs a recording: name one, or watch the match without --export")
-    size = export(find(look.given, RUNS), page(), path, steps=StepSelection.of(None, steps), agents=agents)
+    size = export(find(options.given, RUNS), page(), path, steps=StepSelection.of(None, steps), agents=agents)
     stderr_console().print(f"{path}: {size / 1e6:.1f} MB, opens in a browser without a server", soft_wrap=True)
 
 
-def door_of(look: Look) -> Door:
+def door_of(options: ViewOptions) -> Door:
     """Return the rules for who may ask.
 
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near = is_near(look.host)
-    password = password_of(look)
-    if not near and not password and look.https is None:
+    near = is_near(options.host)
+    password = password_of(options)
+    if not near and not password and options.https is None:
         raise ConfigError(
-            f"{look.host} can be reached by other machines, and recordings hold prompts and replies: give --password, "
-            "or --https CERT KEY, or leave --host out and connect through `ssh -L`"
+            f"{options.host} can be reached by other machines, and recordings hold prompts and replies: "
+            "give --password, or --https CERT KEY, or leave --host out and connect through `ssh -L`"
         )
-    return view_door(password=password, is_near=near, is_secure=look.https is not None)
+    return view_door(password=password, is_near=near, is_secure=options.https is not None)
 
 
-def password_of(look: Look) -> str:
+def password_of(options: ViewOptions) -> str:
     """Return the password of a view, "" for none. No option holds it: every user of a machine can read those.
 
     Raises:
         ConfigError: its file cannot be read, or there is nothing in it.
     """
-    if look.password_file is None:
-        return getpass("Password: ") if look.asks_password else os.environ.get(PASSWORD, "")
+    if options.password_file is None:
+        return getpass("Password: ") if options.asks_password else os.environ.get(PASSWORD, "")
     try:
-        password = read_limited(look.password_file, MOST_PASSWORD_BYTES).decode().partition("\n")[0].rstrip("\r")
+        password = read_limited(options.password_file, MOST_PASSWORD_BYTES).decode().partition("\n")[0].rstrip("\r")
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        raise ConfigError(f"{look.password_file} cannot be read: {why}", source="--password-file") from None
+        raise ConfigError(f"{options.password_file} cannot be read: {why}", source="--password-file") from None
     if not password:
-        raise ConfigError(f"{look.password_file} is empty: its first line is the password", source="--password-file")
+        raise ConfigError(f"{options.password_file} is empty: its first line is the password", source="--password-file")
     return password
 
 
@@ -130,37 +130,37 @@ def is_near(host: str) -> bool:
     return is_loopback(host.strip("[]").casefold())
 
 
-def _tls(look: Look) -> ssl.SSLContext | None:
-    if look.https is None:
+def _tls(options: ViewOptions) -> ssl.SSLContext | None:
+    if options.https is None:
         return None
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     try:
-        context.load_cert_chain(*look.https)
+        context.load_cert_chain(*options.https)
     except (OSError, ssl.SSLError) as error:
-        names = " and ".join(map(str, look.https))
+        names = " and ".join(map(str, options.https))
         raise ConfigError(f"--https: {names} are not a certificate and its key in PEM: {error}") from None
     return context
 
 
-async def _view(look: Look, door: Door, context: ssl.SSLContext | None) -> None:
+async def _view(options: ViewOptions, door: Door, context: ssl.SSLContext | None) -> None:
     async with contextlib.AsyncExitStack() as stack:
-        sources = await stack.enter_async_context(_sources(look))
+        sources = await stack.enter_async_context(_sources(options))
         advise = None
-        if look.adviser:
+        if options.adviser:
             from khala.view.advice import Advisers  # noqa: PLC0415  # loads the native library of the bus
 
-            advisers = Advisers(look.adviser, look.connect, look.tls, insecure=look.insecure)
+            advisers = Advisers(options.adviser, options.connect, options.tls, insecure=options.insecure)
             stack.push_async_callback(advisers.close)
             advise = advisers.send
         server = Server(sources, door, advise)
         runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
         stack.push_async_callback(runner.cleanup)
         await runner.setup()
-        port = await stack.enter_async_context(_listening(runner, look, context))
+        port = await stack.enter_async_context(_listening(runner, options, context))
         scheme = "https" if door.is_secure else "http"
-        address = f"{scheme}://{_name(look.host)}:{port}/?{TOKEN}={door.token}"
+        address = f"{scheme}://{_name(options.host)}:{port}/?{TOKEN}={door.token}"
         stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
-        if look.opens:
+        if options.opens:
             with contextlib.suppress(webbrowser.Error):
                 await asyncio.to_thread(webbrowser.open, address)
         await asyncio.Event().wait()
@@ -174,11 +174,11 @@ def _name(host: str) -> str:
 
 
 @contextlib.asynccontextmanager
-async def _listening(runner: web.AppRunner, look: Look, context: ssl.SSLContext | None) -> AsyncIterator[int]:
+async def _listening(runner: web.AppRunner, options: ViewOptions, context: ssl.SSLContext | None) -> AsyncIterator[int]:
     """Take connections for the application, and yield the port."""
     assert runner.server is not None
     patience = Patience(runner.server)
-    listening = bind(look.host.strip("[]"), look.port)
+    listening = bind(options.host.strip("[]"), options.port)
     handshake_s = None if context is None else HANDSHAKE_S
     server = await asyncio.get_running_loop().create_server(
         patience, sock=listening, ssl=context, ssl_handshake_timeout=handshake_s
@@ -190,22 +190,22 @@ async def _listening(runner: web.AppRunner, look: Look, context: ssl.SSLContext 
 
 
 @contextlib.asynccontextmanager
-async def _sources(look: Look) -> AsyncIterator[Sources]:
+async def _sources(options: ViewOptions) -> AsyncIterator[Sources]:
     """Yield what is to be seen; a match on a bus is recorded meanwhile."""
-    if not look.connect:
-        yield find(look.given, RUNS, adviser=look.adviser)
+    if not options.connect:
+        yield find(options.given, RUNS, adviser=options.adviser)
         return
     from khala.view.live import Following, running_match  # noqa: PLC0415
     from khala_protocol.bus.zenoh import open_bus  # noqa: PLC0415  # loads the native library
     from khala_protocol.recording import Recorder  # noqa: PLC0415
 
-    if len(look.given) > 1:
+    if len(options.given) > 1:
         raise ConfigError("one match is followed at a time: name one run, or none if only one is played there")
     names = ("observer", "host")
-    bus = await open_bus(client_config(look.connect, tls=look.tls, names=names, insecure=look.insecure))
+    bus = await open_bus(client_config(options.connect, tls=options.tls, names=names, insecure=options.insecure))
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(bus.close)
-        name = look.given[0] if look.given else None
+        name = options.given[0] if options.given else None
         stderr_console().print(f"looking for {name or 'a match'} at {', '.join(bus.endpoints)}", soft_wrap=True)
         card = await running_match(bus, name)
         directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="khala-view-", ignore_cleanup_errors=True))
@@ -213,7 +213,7 @@ async def _sources(look: Look) -> AsyncIterator[Sources]:
         recorder = Recorder(path)
         following = asyncio.create_task(Following(bus, card, recorder).follow(), name="follow")
         try:
-            yield Sources(f"{card.run}, live", None, [path], adviser=look.adviser)
+            yield Sources(f"{card.run}, live", None, [path], adviser=options.adviser)
         finally:
             following.cancel()
             await asyncio.wait([following])

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 from aiohttp import WSMsgType, web
 from pydantic import ValidationError
 
-from khala.doors.pages import guarded
+from khala.doors.pages import guard
 from khala.view.guard import policy_of, welcoming
 from khala.view.runs import NotThere, Opened
-from khala.view.wire import MOST_SCENES, AdviceNote, Note
+from khala.view.wire import MOST_SCENES, AdviceNote, PageNote
 from khala_protocol.errors import KhalaError
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Server:
 
     def application(self) -> web.Application:
         """Return the application."""
-        middlewares = [guarded(self._door), welcoming(self._door)]
+        middlewares = [guard(self._door), welcoming(self._door)]
         application = web.Application(middlewares=middlewares, client_max_size=self._door.most_body_bytes)
         episode, step = r"/api/runs/{run}/episodes/{episode:\d{1,9}}", r"/steps/{step:\d{1,9}}"
         application.add_routes([
@@ -92,7 +92,7 @@ class Server:
             web.get(f"{episode}/terrain", self._terrain),
             web.get(f"{episode}/scenes", self._scenes),
             web.get(f"{episode}{step}", self._moment),
-            web.get(f"{episode}{step}/agents/{{side}}/{{agent}}", self._asked),
+            web.get(f"{episode}{step}/agents/{{side}}/{{agent}}", self._texts),
             web.get("/api/experiments/{experiment}", self._experiment),
         ])  # fmt: skip
         application.cleanup_ctx.append(self._running)
@@ -147,12 +147,12 @@ class Server:
         step = _number(request, "step")
         return await self._answer(request, lambda: opened.moment(episode, step))
 
-    async def _asked(self, request: web.Request) -> web.Response:
+    async def _texts(self, request: web.Request) -> web.Response:
         opened = await self._run(request)
         episode = _number(request, "episode")
         step = _number(request, "step")
         side, agent = request.match_info["side"], request.match_info["agent"]
-        return await self._answer(request, lambda: opened.asked(episode, step, side, agent))
+        return await self._answer(request, lambda: opened.texts(episode, step, side, agent))
 
     async def _image(self, request: web.Request) -> web.Response:
         opened = await self._run(request)
@@ -166,7 +166,7 @@ class Server:
 
         def made() -> tuple[bytes, bool]:
             data = make()
-            return (_packed(data), True) if packs and len(data) > WORTH_PACKING else (data, False)
+            return (_pack(data), True) if packs and len(data) > WORTH_PACKING else (data, False)
 
         data, is_packed = await self._made(made)
         headers = {"Content-Encoding": "gzip"} if is_packed else {}
@@ -233,7 +233,7 @@ class Server:
         try:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
-                    await socket.send_str((await self._advised(opened, message.data)).model_dump_json())
+                    await socket.send_str((await self._pass_advice_on(opened, message.data)).model_dump_json())
         finally:
             self._sockets.discard(socket)
             telling.cancel()
@@ -253,17 +253,17 @@ class Server:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), 1.0)
 
-    async def _advised(self, opened: Opened, text: str) -> Note:
+    async def _pass_advice_on(self, opened: Opened, text: str) -> PageNote:
         if self._advise is None or not opened.may_advise:
             what = "start it with --adviser NAME, an adviser that the task names"
-            return Note(ok=False, text=f"this view may not write to agents: {what}")
+            return PageNote(ok=False, text=f"this view may not write to agents: {what}")
         try:
             await self._advise(opened.run, AdviceNote.model_validate_json(text))
         except ValidationError:
-            return Note(ok=False, text="this is no advice: it has a side, a recipient and a text")
+            return PageNote(ok=False, text="this is no advice: it has a side, a recipient and a text")
         except KhalaError as error:
-            return Note(ok=False, text=str(error))
-        return Note(ok=True, text="sent: the host says in a message what became of it")
+            return PageNote(ok=False, text=str(error))
+        return PageNote(ok=True, text="sent: the host says in a message what became of it")
 
 
 def _number(request: web.Request, name: str) -> int:
@@ -277,7 +277,7 @@ def _asked_number(request: web.Request, name: str) -> int:
     return int(given)
 
 
-def _packed(data: bytes) -> bytes:
+def _pack(data: bytes) -> bytes:
     """Return gzip of the bytes, quickly: pages are on the same machine most of the time."""
     packer = zlib.compressobj(1, zlib.DEFLATED, 31)
     return packer.compress(data) + packer.flush()

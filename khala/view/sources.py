@@ -38,14 +38,14 @@ class Sources:
 
     def library(self) -> Library:
         """Return what can be opened."""
-        found = library.found_in(self._directory) if self._directory else library.Found([], [])
+        found = library.found_in(self._directory) if self._directory else library.FoundRecordings([], [])
         paths = list(dict.fromkeys((*self._first, *found.recordings)))
         self._recordings |= {run_id(path): path for path in paths}
         self._experiments |= {run_id(path): path for path in found.experiments}
         return Library(
             title=self.title,
             runs=tuple(library.lines(paths, self._directory or Path())),
-            experiments=tuple(experiments.listed(found.experiments)),
+            experiments=tuple(experiments.list_experiments(found.experiments)),
             opened=tuple(run_id(path) for path in self._first),
         )
 

@@ -9,18 +9,18 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from khala.experiment.report.build import planned, report
+from khala.experiment.report.build import count_planned, report
 from khala.experiment.store import FILE, INDEX, Store
 from khala.view.library import lines, run_id
-from khala.view.wire import Cell, ExperimentLine, ExperimentView, Row
+from khala.view.wire import ExperimentLine, ExperimentView, TableCell, TableRow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from khala.experiment.played import Played
-    from khala.experiment.report.document import Table
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.played import PlayedMatch
+    from khala.experiment.report.document import ReportTable
+    from khala.experiment.report.summary import CellSummary
     from khala.experiment.statistics import Interval
 
 
@@ -36,8 +36,8 @@ def line_of(directory: Path) -> ExperimentLine:
         id=run_id(directory),
         name=experiment.name,
         description=experiment.description,
-        played=len(store.played()),
-        matches=planned(experiment),
+        played=len(store.matches()),
+        matches=count_planned(experiment),
     )
 
 
@@ -56,11 +56,11 @@ def _changed_ns(path: Path) -> int:
 
 @lru_cache(maxsize=8)
 def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> ExperimentView:  # noqa: ARG001  # as they were
-    store = Store.opened(directory)
+    store = Store.open(directory)
     made = report(store)
-    played = list(store.played().values())
+    played = list(store.matches().values())
     table = next(table for section in made.document.sections for table in section.tables if table.title == "By cell")
-    recordings = [directory / one.recording for one in played if one.recording]
+    recordings = [directory / match.recording for match in played if match.recording]
     line = line_of(directory)
     said = [words for words in made.document.paragraphs if words != line.description]
     return ExperimentView(
@@ -73,24 +73,26 @@ def _view(directory: Path, below: Path, file_ns: int, index_ns: int) -> Experime
     )
 
 
-def _rows(table: Table, summaries: list[Summary], played: list[Played], directory: Path) -> Iterator[Row]:
+def _rows(
+    table: ReportTable, summaries: list[CellSummary], played: list[PlayedMatch], directory: Path
+) -> Iterator[TableRow]:
     columns = table.columns[table.words :]
-    for texts, one in zip(table.rows, summaries, strict=True):
+    for texts, summary in zip(table.rows, summaries, strict=True):
         cells = zip(columns, texts[table.words :], strict=True)
-        mine = [match for match in played if match.recording and match.cell.items() <= one.where.items()]
-        yield Row(
+        mine = [match for match in played if match.recording and match.cell.items() <= summary.where.items()]
+        yield TableRow(
             names=texts[: table.words],
-            games=one.games,
-            cells=tuple(_cell(column, text, one) for column, text in cells),
+            games=summary.games,
+            cells=tuple(_cell(column, text, summary) for column, text in cells),
             runs=tuple(run_id(directory / match.recording) for match in mine),
         )
 
 
-def _cell(column: str, text: str, one: Summary) -> Cell:
-    intervals: dict[str, Interval] = {"won": one.won, "K/D": one.kd}
+def _cell(column: str, text: str, summary: CellSummary) -> TableCell:
+    intervals: dict[str, Interval] = {"won": summary.won, "K/D": summary.kd}
     if (interval := intervals.get(column)) is None or interval.value is None:
-        return Cell(text=text)
-    return Cell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
+        return TableCell(text=text)
+    return TableCell(text=text, value=_finite(interval.value), low=_finite(interval.low), high=_finite(interval.high))
 
 
 def _finite(value: float) -> float | None:

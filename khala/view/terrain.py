@@ -32,7 +32,7 @@ _NOTHING = GridView(width=0, height=0, data="")
 _RESOURCE_RADIUS = 1.0
 
 
-def recorded(index: Index, episode: int) -> Spot | None:
+def find(index: Index, episode: int) -> Spot | None:
     """Return where the terrain of an episode is; None if there is none."""
     found = index.newest(Topic.TERRAIN, episode, "", "", 0)
     return found.spot if found else None
@@ -40,7 +40,7 @@ def recorded(index: Index, episode: int) -> Spot | None:
 
 def scale_of(index: Index, episode: int) -> float:
     """Return cells of the minimap frame per world unit."""
-    if (spot := recorded(index, episode)) is not None:
+    if (spot := find(index, episode)) is not None:
         try:
             said = decode_as(Terrain, index.payload(spot))
             return said.minimap / max(*said.size, 1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from pydantic_core import from_json
 
-from khala.view.digest import counted
+from khala.view.digest import count_kinds
 from khala.view.wire import Curve, CurveName, Mark, Timeline
 from khala_protocol.keys import Topic
 from khala_protocol.messages import LOOPS_PER_S
@@ -72,7 +72,7 @@ class _Fight:
         """Return the mark: of the side that lost most, with what each of them lost."""
         text = ", ".join(f"{side} lost {value:g}" for side, value in sorted(self.lost.items()))
         most = max(self.lost, key=lambda side: self.lost[side])
-        return Mark(step=self.step, kind="fight", side=most, text=text, weight=self.value, at=_rounded(self.at))
+        return Mark(step=self.step, kind="fight", side=most, text=text, weight=self.value, at=_round(self.at))
 
 
 def timeline(index: Index, episode: int) -> Timeline:
@@ -149,8 +149,8 @@ def _deaths(losses: Iterable[tuple[int, str, str, float, Point | None]]) -> Iter
     for step, side, kind, _, at in losses:
         groups[step, side].append((kind, at))
     for (step, side), those in groups.items():
-        at = _rounded(_middle([place for _, place in those if place is not None]))
-        text = f"{counted(kind for kind, _ in those)} died"
+        at = _round(_middle([place for _, place in those if place is not None]))
+        text = f"{count_kinds(kind for kind, _ in those)} died"
         yield Mark(step=step, kind="death", side=side, text=text, weight=len(those), at=at)
 
 
@@ -174,5 +174,5 @@ def _middle(places: Sequence[Point]) -> Point | None:
     return sum(x for x, _ in places) / len(places), sum(y for _, y in places) / len(places)
 
 
-def _rounded(at: Point | None) -> Point | None:
+def _round(at: Point | None) -> Point | None:
     return None if at is None else (round(at[0], 1), round(at[1], 1))

@@ -236,7 +236,7 @@ class Deed(Frozen):
     """The place that it names, in the minimap frame."""
 
 
-class TeamMark(Frozen):
+class SeenTeam(Frozen):
     """A team as its agent saw it."""
 
     name: str
@@ -247,7 +247,7 @@ class TeamMark(Frozen):
     """Size of its screen, in the minimap frame."""
 
 
-class Decision(Frozen):
+class SeenDecision(Frozen):
     """What an agent last was asked, and what it answered."""
 
     side: str
@@ -265,7 +265,7 @@ class Decision(Frozen):
     attempts: int = 0
     usage: Usage = Usage()
     model: str = ""
-    teams: tuple[TeamMark, ...] = ()
+    teams: tuple[SeenTeam, ...] = ()
     thought: str = ""
     """The reply before its first heading: what the agent makes of its position."""
     reply: str = ""
@@ -287,7 +287,7 @@ class SideMoment(Frozen):
     cost_usd: float | None
 
 
-class Moment(Frozen):
+class StepView(Frozen):
     """Everything about one step but the map."""
 
     episode: int
@@ -295,7 +295,7 @@ class Moment(Frozen):
     game_loop: int
     time_s: float
     sides: tuple[SideMoment, ...]
-    decisions: tuple[Decision, ...]
+    decisions: tuple[SeenDecision, ...]
     """The last one of each agent up to this step, in the order of the agents."""
     unasked: dict[str, Unasked]
     """By `side/agent`."""
@@ -305,7 +305,7 @@ class Moment(Frozen):
     timings: Timings = Timings()
 
 
-class Asked(Frozen):
+class DecisionTexts(Frozen):
     """The long texts of a decision."""
 
     side: str
@@ -325,7 +325,7 @@ class Asked(Frozen):
 # --- experiments ------------------------------------------------------------------------------------
 
 
-class Cell(Frozen):
+class TableCell(Frozen):
     """A cell of a table: a number with its interval."""
 
     text: str
@@ -335,13 +335,13 @@ class Cell(Frozen):
     high: float | None = None
 
 
-class Row(Frozen):
+class TableRow(Frozen):
     """One place of the grid."""
 
     names: tuple[str, ...]
     """The values of the factors."""
     games: int
-    cells: tuple[Cell, ...]
+    cells: tuple[TableCell, ...]
     runs: tuple[str, ...]
     """Ids of its recordings."""
 
@@ -352,7 +352,7 @@ class ExperimentView(Frozen):
     line: ExperimentLine
     factors: tuple[str, ...]
     columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
     notes: tuple[str, ...] = ()
     """What the reader of the table must know."""
     runs: tuple[RunLine, ...] = ()
@@ -361,7 +361,7 @@ class ExperimentView(Frozen):
 # --- live -------------------------------------------------------------------------------------------
 
 
-class Progress(Frozen):
+class RecordingProgress(Frozen):
     """Server → page: there is more to see."""
 
     kind: Literal["progress"] = "progress"
@@ -384,7 +384,7 @@ class AdviceNote(Frozen):
     text: str
 
 
-class Note(Frozen):
+class PageNote(Frozen):
     """Server → page: what became of an advice, or why something cannot be had."""
 
     kind: Literal["note"] = "note"

@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { address, isExport } from "./api";
 import type { Match } from "./match";
-import type { AdviceNote, Note, Progress } from "./wire";
+import type { AdviceNote, PageNote, RecordingProgress } from "./wire";
 
 /** Seconds until the connection is tried again. */
 const AGAIN_S = 2;
@@ -11,12 +11,12 @@ const AGAIN_S = 2;
 const REST_S = 0.3;
 
 /** The last words of the server on an advice. */
-export const note = signal<Note | null>(null);
+export const note = signal<PageNote | null>(null);
 
 export class Live {
   private socket: WebSocket | null = null;
   private ended = false;
-  private newest: Progress | null = null;
+  private newest: RecordingProgress | null = null;
   private growing = false;
 
   constructor(private readonly match: Match) {
@@ -37,13 +37,13 @@ export class Live {
   private connect(): void {
     const socket = new WebSocket(address(`runs/${this.match.id}/live`, "ws"));
     this.socket = socket;
-    socket.onmessage = (event) => this.hear(JSON.parse(String(event.data)) as Progress | Note);
+    socket.onmessage = (event) => this.hear(JSON.parse(String(event.data)) as RecordingProgress | PageNote);
     socket.onclose = () => {
       if (!this.ended && this.match.grows()) setTimeout(() => this.ended || this.connect(), AGAIN_S * 1000);
     };
   }
 
-  private hear(told: Progress | Note): void {
+  private hear(told: RecordingProgress | PageNote): void {
     if (told.kind === "note") note.value = told;
     else {
       this.newest = told;

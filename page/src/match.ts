@@ -6,7 +6,7 @@ import { Recent, newest } from "./cache";
 import * as clock from "./clock";
 import { SceneStore } from "./scenes";
 import { locate, type Place } from "./time";
-import type { AgentLine, Asked, Curve, Decision, EpisodeLine, Moment, Progress, RunView, Terrain, Timeline } from "./wire";
+import type { AgentLine, DecisionTexts, Curve, SeenDecision, EpisodeLine, StepView, RecordingProgress, RunView, Terrain, Timeline } from "./wire";
 
 /** The side of an opponent that Khala does not play. */
 export const OPPONENT = "opponent";
@@ -19,7 +19,7 @@ export class Match {
   readonly run = signal<RunView | null>(null);
   readonly timeline = signal<Timeline | null>(null);
   readonly terrain = signal<Terrain | null>(null);
-  readonly moment = signal<Moment | null>(null);
+  readonly moment = signal<StepView | null>(null);
   /** Why something could not be had; "" if all is well. */
   readonly trouble = signal("");
   /** Seconds that the page is behind a live match; null if it is not live. */
@@ -29,8 +29,8 @@ export class Match {
   readonly step: ReadonlySignal<number>;
   readonly scenes: SceneStore;
   private readonly path: string;
-  private readonly moments = new Recent<Moment>(256);
-  private readonly askedOf = new Recent<Asked>(64);
+  private readonly moments = new Recent<StepView>(256);
+  private readonly askedOf = new Recent<DecisionTexts>(64);
   private readonly endings: (() => void)[] = [];
 
   constructor(readonly id: string, readonly episode: number) {
@@ -54,7 +54,7 @@ export class Match {
   }
 
   /** Take what is new in a recording that grows. */
-  async grow(progress: Progress): Promise<void> {
+  async grow(progress: RecordingProgress): Promise<void> {
     this.lag.value = progress.live ? progress.lag_s : null;
     const known = this.timeline.value;
     const ended = !progress.live && progress.indexed >= 1; // the last line that comes
@@ -70,10 +70,10 @@ export class Match {
   }
 
   /** Return the long texts of what an agent was asked last up to a step. */
-  async asked(side: string, agent: string, step: number): Promise<Asked> {
+  async asked(side: string, agent: string, step: number): Promise<DecisionTexts> {
     const path = `${this.path}/steps/${step}/agents/${side}/${agent}`;
     const held = this.grows() ? undefined : this.askedOf.get(path);
-    const answer = held ?? (await get<Asked>(path));
+    const answer = held ?? (await get<DecisionTexts>(path));
     this.askedOf.set(path, answer);
     return answer;
   }
@@ -97,7 +97,7 @@ export class Match {
 
   readonly line = computed<EpisodeLine | undefined>(() => this.lineIn(this.run.value));
 
-  readonly decisions = computed(() => new Map<string, Decision>((this.moment.value?.decisions ?? []).map((d) => [keyOf(d), d])));
+  readonly decisions = computed(() => new Map<string, SeenDecision>((this.moment.value?.decisions ?? []).map((d) => [keyOf(d), d])));
 
   private readonly curves = computed(() => new Map((this.timeline.value?.curves ?? []).map((c) => [`${c.name}/${c.side}`, c.values])));
 
@@ -113,8 +113,8 @@ export class Match {
   }
 
   private watch(): void {
-    const loadMoment = newest<Moment>(
-      async (path) => (this.grows() ? undefined : this.moments.get(path)) ?? (await get<Moment>(path)),
+    const loadMoment = newest<StepView>(
+      async (path) => (this.grows() ? undefined : this.moments.get(path)) ?? (await get<StepView>(path)),
       (moment, path) => {
         this.moments.set(path, moment);
         this.moment.value = moment;

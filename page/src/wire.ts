@@ -20,31 +20,6 @@ export interface AgentLine {
   role: string;
 }
 
-/** The long texts of a decision. */
-export interface Asked {
-  side: string;
-  agent: string;
-  /** Of the observation: at the asked step, or the last one before it. */
-  step: number;
-  /** The observation in words. */
-  text: string;
-  /** The agent's observation before; None for its first one. */
-  before: string | null;
-  reply: string;
-  images: ImageRef[];
-  /** Requests to its model, in their order. */
-  calls: ModelCall[];
-}
-
-/** A cell of a table: a number with its interval. */
-export interface Cell {
-  /** As the report prints it: `45 % (25 to 66)`. */
-  text: string;
-  value: number | null;
-  low: number | null;
-  high: number | null;
-}
-
 /** One message of a prompt. */
 export interface ChatMessage {
   role: "system" | "user" | "assistant";
@@ -64,32 +39,20 @@ export interface Curve {
   values: (number | null)[];
 }
 
-/** What an agent last was asked, and what it answered. */
-export interface Decision {
+/** The long texts of a decision. */
+export interface DecisionTexts {
   side: string;
   agent: string;
-  /** Of the observation. */
+  /** Of the observation: at the asked step, or the last one before it. */
   step: number;
-  game_loop: number;
-  /** In which its answer took effect; None if that has not happened. */
-  effect_step: number | null;
-  status: "ok" | "empty" | "cut" | "refused" | "filtered" | "malformed" | "failed" | "late" | "fallback" | "gone" | null;
-  detail: string;
-  fate: "fresh" | "stale" | "adapted" | "refused" | "dropped" | null;
-  age_loops: number;
-  latency_s: number | null;
-  attempts: number;
-  usage: Usage;
-  model: string;
-  teams: TeamMark[];
-  /** The reply before its first heading: what the agent makes of its position. */
-  thought: string;
-  /** Word for word. */
+  /** The observation in words. */
+  text: string;
+  /** The agent's observation before; None for its first one. */
+  before: string | null;
   reply: string;
-  deeds: Deed[];
-  sent: Letter[];
-  read: Letter[];
   images: ImageRef[];
+  /** Requests to its model, in their order. */
+  calls: ModelCall[];
 }
 
 /** One call of a reply, and what became of it. */
@@ -139,7 +102,7 @@ export interface ExperimentView {
   line: ExperimentLine;
   factors: string[];
   columns: string[];
-  rows: Row[];
+  rows: TableRow[];
   /** What the reader of the table must know. */
   notes: string[];
   runs: RunLine[];
@@ -243,25 +206,8 @@ export interface ModelCall {
   usage: Usage;
 }
 
-/** Everything about one step but the map. */
-export interface Moment {
-  episode: number;
-  step: number;
-  game_loop: number;
-  time_s: number;
-  sides: SideMoment[];
-  /** The last one of each agent up to this step, in the order of the agents. */
-  decisions: Decision[];
-  /** By `side/agent`. */
-  unasked: Record<string, "no_units" | "not_due">;
-  incidents: string[];
-  /** What the game executed, by side `blue: Attack_screen …`. */
-  functions: string[];
-  timings: Timings;
-}
-
 /** Server → page: what became of an advice, or why something cannot be had. */
-export interface Note {
+export interface PageNote {
   kind: "note";
   ok: boolean;
   text: string;
@@ -292,7 +238,7 @@ export interface PlayerMark {
 export type PowerMark = [player: number, x: number, y: number, radius: number];
 
 /** Server → page: there is more to see. */
-export interface Progress {
+export interface RecordingProgress {
   kind: "progress";
   episode: number;
   /** Of this episode, so far. */
@@ -306,16 +252,6 @@ export interface Progress {
 }
 
 export type ResourceMark = [tag: number, type: string, x: number, y: number, radius: number];
-
-/** One place of the grid. */
-export interface Row {
-  /** The values of the factors. */
-  names: string[];
-  games: number;
-  cells: Cell[];
-  /** Ids of its recordings. */
-  runs: string[];
-}
 
 /** One recording, as a list shows it. */
 export interface RunLine {
@@ -406,6 +342,44 @@ export interface Scenes {
   scenes: Scene[];
 }
 
+/** What an agent last was asked, and what it answered. */
+export interface SeenDecision {
+  side: string;
+  agent: string;
+  /** Of the observation. */
+  step: number;
+  game_loop: number;
+  /** In which its answer took effect; None if that has not happened. */
+  effect_step: number | null;
+  status: "ok" | "empty" | "cut" | "refused" | "filtered" | "malformed" | "failed" | "late" | "fallback" | "gone" | null;
+  detail: string;
+  fate: "fresh" | "stale" | "adapted" | "refused" | "dropped" | null;
+  age_loops: number;
+  latency_s: number | null;
+  attempts: number;
+  usage: Usage;
+  model: string;
+  teams: SeenTeam[];
+  /** The reply before its first heading: what the agent makes of its position. */
+  thought: string;
+  /** Word for word. */
+  reply: string;
+  deeds: Deed[];
+  sent: Letter[];
+  read: Letter[];
+  images: ImageRef[];
+}
+
+/** A team as its agent saw it. */
+export interface SeenTeam {
+  name: string;
+  tags: number[];
+  /** Centre of its screen. */
+  minimap: [number, number] | null;
+  /** Size of its screen, in the minimap frame. */
+  screen: number;
+}
+
 /** The state of one side at a step. */
 export interface SideMoment {
   side: string;
@@ -416,14 +390,40 @@ export interface SideMoment {
   cost_usd: number | null;
 }
 
-/** A team as its agent saw it. */
-export interface TeamMark {
-  name: string;
-  tags: number[];
-  /** Centre of its screen. */
-  minimap: [number, number] | null;
-  /** Size of its screen, in the minimap frame. */
-  screen: number;
+/** Everything about one step but the map. */
+export interface StepView {
+  episode: number;
+  step: number;
+  game_loop: number;
+  time_s: number;
+  sides: SideMoment[];
+  /** The last one of each agent up to this step, in the order of the agents. */
+  decisions: SeenDecision[];
+  /** By `side/agent`. */
+  unasked: Record<string, "no_units" | "not_due">;
+  incidents: string[];
+  /** What the game executed, by side `blue: Attack_screen …`. */
+  functions: string[];
+  timings: Timings;
+}
+
+/** A cell of a table: a number with its interval. */
+export interface TableCell {
+  /** As the report prints it: `45 % (25 to 66)`. */
+  text: string;
+  value: number | null;
+  low: number | null;
+  high: number | null;
+}
+
+/** One place of the grid. */
+export interface TableRow {
+  /** The values of the factors. */
+  names: string[];
+  games: number;
+  cells: TableCell[];
+  /** Ids of its recordings. */
+  runs: string[];
 }
 
 /** Host → all but agents: the ground of an episode, once at its beginning. */

@@ -1,9 +1,9 @@
 import { effect } from "@preact/signals";
 import { afterEach, expect, test, vi } from "vitest";
 import { Match } from "../src/match";
-import type { Progress, RunView, Timeline } from "../src/wire";
+import type { RecordingProgress, RunView, Timeline } from "../src/wire";
 
-const progress = (indexed: number, steps: number): Progress => ({ kind: "progress", episode: 0, steps, indexed, live: false, lag_s: null });
+const progress = (indexed: number, steps: number): RecordingProgress => ({ kind: "progress", episode: 0, steps, indexed, live: false, lag_s: null });
 const run = (indexed: number) => ({ line: { live: false }, sides: ["blue"], agents: [], episodes: [{ episode: 0 }], indexed }) as unknown as RunView;
 const timeline = (steps: number) =>
   ({ steps: [...Array(steps).keys()], time_s: [...Array(steps).keys()], curves: [] }) as unknown as Timeline;

@@ -13,7 +13,7 @@ from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import LLMError, Request
-from khala_agents.llm.money import Budget
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import FunctionPolicy, ObjectPolicy
@@ -49,7 +49,7 @@ def test_every_shipped_model_file_is_tried() -> None:
 
 def test_the_shipped_agents_file_makes_policies() -> None:
     file = load_agents(ROOT / "configs" / "agents" / "mixed.yaml")
-    workshop = Workshop(budget=Budget(file.budget_usd))
+    workshop = Workshop(budget=SharedBudget(file.budget_usd))
     policies = {name: workshop.policy(spec) for name, spec in file.agents.items()}
     assert {name: type(policy) for name, policy in policies.items()} == {
         "CombatGroupSmac": LLMPolicy,
@@ -346,5 +346,5 @@ def test_a_model_that_cannot_be_had_is_one_clear_sentence(
 ) -> None:
     monkeypatch.setenv("DEEPSEEK_API_KEY", "sk-0123456789")
     with pytest.raises(ConfigError) as caught:
-        Workshop(budget=Budget(budget), overrides=overrides).policy(WorkerSpec(model=model))
+        Workshop(budget=SharedBudget(budget), overrides=overrides).policy(WorkerSpec(model=model))
     assert str(caught.value) == text

@@ -13,13 +13,13 @@ from khala_agents.config import WorkerSpec
 from khala_agents.fallback import Fallback
 from khala_agents.llm.breaker import Breaker, BreakerRule
 from khala_agents.llm.client import Completion, LLMError, OutOfMoney, Request, Unreachable
-from khala_agents.llm.limits import Limits
-from khala_agents.llm.money import Budget
+from khala_agents.llm.limits import RequestLimits
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Context, Decision
-from khala_agents.scripted.policies import Fixed, Player
+from khala_agents.scripted.policies import Fixed, ScriptedPlayer
 from khala_agents.worker import run_worker
 from khala_protocol.messages import Usage
 
@@ -119,7 +119,7 @@ async def decided(policy: Fallback, briefing: Briefing, observation: Observation
 async def test_when_the_money_is_used_up_the_other_policy_decides(
     client: Unsteady, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    limits = Limits(budget=Budget(1.0), prices=Prices(prompt=1.0, completion=1.0))
+    limits = RequestLimits(budget=SharedBudget(1.0), prices=Prices(prompt=1.0, completion=1.0))
     policy = Fallback(LLMPolicy(client, limits=limits), Fixed(OTHER), name="fixed")
     assert await policy.decide(Context(briefing(), observation())) == "of the model"
     assert await decided(policy, briefing(), observation(1)) == (OTHER, "fallback", "budget: fixed")
@@ -146,7 +146,7 @@ async def test_a_scripted_player_plays_in_the_process_of_its_agent(
     briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
     player = load_policy("skilled")
-    assert isinstance(player, Player)
+    assert isinstance(player, ScriptedPlayer)
     context = Context(briefing(), observation(text=TEXT))
     said = await player.decide(context)
     assert "<Attack_Unit(" in str(said)

@@ -21,8 +21,8 @@ from khala_agents.llm.client import (
     Unreachable,
     Verdict,
 )
-from khala_agents.llm.limits import LimitRules, Limits
-from khala_agents.llm.money import Budget
+from khala_agents.llm.limits import LimitRules, RequestLimits
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.retry import RetryRule
@@ -103,7 +103,7 @@ async def test_no_try_is_begun_that_cannot_end_before_the_deadline(
 async def test_time_in_the_queue_of_the_limits_is_told_apart_from_the_request(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    limits = Limits(LimitRules(in_flight=1))
+    limits = RequestLimits(LimitRules(in_flight=1))
     policies = [traced(listed_model(3.0, "good"), limits=limits) for _ in range(2)]
     await asyncio.gather(*(policy.decide(briefing(), observation()) for policy, _ in policies))
     assert [(e.waited_s, e.started_s, e.latency_s) for _, (e,) in policies] == [(0, 0, 3), (3, 3, 3)]
@@ -112,7 +112,7 @@ async def test_time_in_the_queue_of_the_limits_is_told_apart_from_the_request(
 async def test_a_spent_budget_stops_requests_before_they_are_made(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    limits = Limits(prices=Prices(prompt=1, completion=1), budget=Budget(1.0))
+    limits = RequestLimits(prices=Prices(prompt=1, completion=1), budget=SharedBudget(1.0))
     model = listed_model("one", "two", "three")
     policy, exchanges = traced(model, limits=limits)
     for step in range(2):
@@ -176,7 +176,7 @@ async def test_a_refusal_that_no_later_request_can_escape_is_hopeless(
 async def test_a_request_of_unknown_usage_says_the_most_that_it_may_have_cost(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
-    limits = Limits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := Budget(1.0)))
+    limits = RequestLimits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := SharedBudget(1.0)))
     policy, exchanges = traced(listed_model(60.0, "too late"), limits=limits)
     with pytest.raises(TimeoutError):
         async with asyncio.timeout(5):
@@ -199,7 +199,7 @@ async def test_a_request_that_never_left_costs_nothing(
         raise AssertionError
 
     monkeypatch.setattr(model, "complete", connect)
-    limits = Limits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := Budget(1.0)))
+    limits = RequestLimits(prices=Prices(prompt=1.0, completion=1.0), budget=(budget := SharedBudget(1.0)))
     policy, exchanges = traced(model, limits=limits)
     with pytest.raises(TimeoutError):
         async with asyncio.timeout(5):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.llm.limits import Limits, Ticket
+from khala_agents.llm.limits import RequestLimits, Ticket
 from khala_agents.llm.replay import NotRecorded
 from khala_agents.llm.vision import ANTHROPIC, Vision
 from khala_agents.llm_policy import LLMPolicy
@@ -137,7 +137,7 @@ async def test_a_model_that_sees_is_shown_the_pictures_of_its_observation(
     assert exchanges[0].usage.prompt_tokens == 100  # as the endpoint counted
 
 
-class Counting(Limits):
+class Counting(RequestLimits):
     """Limits that note how many tokens a request is expected to take."""
 
     def __init__(self) -> None:

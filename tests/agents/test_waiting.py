@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_agents.commands import PATIENCE_S, Place, _say_if_nobody_comes
+from khala_agents.commands import PATIENCE_S, BusPlace, _say_if_nobody_comes
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.certificates import certify_agent, make_authority
@@ -44,19 +44,19 @@ async def test_an_agent_that_the_run_does_not_know_says_so(capsys: pytest.Captur
 
 def test_agents_share_a_link_but_over_tls_each_has_its_own(tmp_path: Path) -> None:
     names = ["Stalkers", "Zealots"]
-    (shared,) = Place().links("blue", names)
+    (shared,) = BusPlace().links("blue", names)
     assert (shared.names, shared.config.connect_to) == (names, ("tcp/127.0.0.1:7447",))
     make_authority(tmp_path)
     for name in names:
         certify_agent(tmp_path, "blue", name)
-    links = Place(tls=tmp_path).links("blue", names)
+    links = BusPlace(tls=tmp_path).links("blue", names)
     assert [(link.names, link.config.tls and link.config.tls.key.parent.name) for link in links] == [
         (["Stalkers"], "agent.blue.Stalkers"), (["Zealots"], "agent.blue.Zealots"),
     ]  # fmt: skip
 
 
 def test_a_link_to_another_machine_without_tls_is_loud(capsys: pytest.CaptureFixture[str]) -> None:
-    Place(["tcp/10.0.0.5:7447"], insecure=True).links("blue", ["Stalkers"])
+    BusPlace(["tcp/10.0.0.5:7447"], insecure=True).links("blue", ["Stalkers"])
     assert capsys.readouterr().err == (
         "WARNING: tcp/10.0.0.5:7447 has no encryption and no identities: everyone who reaches it can read all, and "
         "speak as any agent or as the host; `khala keys` makes keys for --tls\n"

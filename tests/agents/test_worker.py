@@ -12,8 +12,8 @@ import pytest
 
 from khala_agents.guard import Guard
 from khala_agents.llm.client import LLMError, RequestRefused
-from khala_agents.llm.limits import Limits
-from khala_agents.llm.money import Budget
+from khala_agents.llm.limits import RequestLimits
+from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Decision, FunctionPolicy, Policy
@@ -519,7 +519,7 @@ async def test_an_agent_without_money_goes_on_without_decisions(
     observation: Callable[..., Observation], caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
     model = listed_model("one", "two", "three")
-    limits = Limits(prices=Prices(prompt=1, completion=1), budget=Budget(1.0, source="--budget-usd"))
+    limits = RequestLimits(prices=Prices(prompt=1, completion=1), budget=SharedBudget(1.0, source="--budget-usd"))
     await players.start(LLMPolicy(model, limits=limits))
     await host.say(briefing())
     for step in range(5):

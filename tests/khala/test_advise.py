@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.commands.advise import Adviser, Advising, MatchGone, run_advise, told
+from khala.commands.advise import Adviser, Advising, MatchGone, lines_about, run_advise
 from khala.playing import games, local_bus
 from khala.playing.hosting import game_of
 from khala.testing import replay_host
@@ -189,7 +189,7 @@ def test_a_persons_lines_say_what_happened_and_hide_no_control_characters() -> N
             "messages": [{"sender": "Ada", "recipient": "everyone", "text": "go\x1b[2J"}],
         }
     )  # fmt: skip
-    assert list(told(report)) == ["0:10  step 3  score 50  Stalkers late", "    Ada → everyone: go\\x1b[2J"]
+    assert list(lines_about(report)) == ["0:10  step 3  score 50  Stalkers late", "    Ada → everyone: go\\x1b[2J"]
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala.playing import games
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
@@ -57,7 +57,7 @@ async def play(config: MatchConfig, past: Unfinished | None = None) -> list[Resu
         for agent in task.agents
     ]
     try:
-        return await hosted(config.model_copy(update={"game": name}), sc2path, broker.session(), past=past)
+        return await host_match(config.model_copy(update={"game": name}), sc2path, broker.session(), past=past)
     finally:
         for agent in agents:
             agent.cancel()

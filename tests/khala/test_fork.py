@@ -19,8 +19,8 @@ from khala.commands.exit_codes import NOT_VALID, SIGNALLED
 from khala.fork.figures import are_alike, figures, of_side, rate
 from khala.fork.futures import Future, Plan, Purse, play_all
 from khala.fork.players import players_of
-from khala.fork.recorded import repeated
-from khala.fork.scan import ranked, steps_of
+from khala.fork.recorded import play_recorded
+from khala.fork.scan import rank, steps_of
 from khala.playing import one_process, worker
 from khala.playing.jobs import Ended
 from khala.playing.minds import Minds
@@ -60,7 +60,7 @@ def golden() -> Trunk:
 
 
 def planned(trunk: Trunk, out: Path, who: str, **options: Any) -> Plan:
-    return Plan(trunk, players_of(trunk.config.task, Minds().named(who), {}, []), out, **options)
+    return Plan(trunk, players_of(trunk.config.task, Minds().with_name(who), {}, []), out, **options)
 
 
 def seen_in(recording: Recording, steps: range) -> list[bytes]:
@@ -74,7 +74,7 @@ def seen_in(recording: Recording, steps: range) -> list[bytes]:
 @pytest.mark.slow
 @pytest.mark.game
 async def test_the_recorded_future_comes_about_again(golden: Trunk, tmp_path: Path) -> None:
-    again = await repeated(golden, tmp_path, game="simulator")
+    again = await play_recorded(golden, tmp_path, game="simulator")
     assert again.differences == []
     assert again.same
     (now,), (recorded,) = again.results, golden.results
@@ -132,7 +132,7 @@ async def test_a_scan_finds_where_it_matters_that_somebody_decides(golden: Trunk
     plan = planned(golden, tmp_path, "silent")
     steps = steps_of(golden, 25)
     assert steps == [0, 25, 50]
-    points = ranked(golden, await play_all([fork for step in steps for fork in plan.forks(step, 1)], Here()))
+    points = rank(golden, await play_all([fork for step in steps for fork in plan.forks(step, 1)], Here()))
     assert [point.step for point in points][-1] == 50
     assert [abs(point.more_won) for point in points] == sorted((abs(one.more_won) for one in points), reverse=True)
 
@@ -141,7 +141,7 @@ async def test_a_scan_finds_where_it_matters_that_somebody_decides(golden: Trunk
 @pytest.mark.slow
 async def test_each_side_of_a_duel_gets_a_player(tmp_path: Path) -> None:
     config = MatchConfig(task=change(load_task("duel_3m"), max_steps=12), run="duel", record=tmp_path / "duel.mcap")
-    await one_process.play(config, dict.fromkeys(("blue", "red"), Minds().named("skilled")), game="simulator")
+    await one_process.play(config, dict.fromkeys(("blue", "red"), Minds().with_name("skilled")), game="simulator")
     trunk = trunk_of(Recording.open(tmp_path / "duel.mcap"))
     minds = players_of(trunk.config.task, None, {"blue": "silent", "red": "skilled"}, [])
     (future,) = await play_all(Plan(trunk, minds, tmp_path / "forks").forks(6, 1), Here())
@@ -346,7 +346,7 @@ def test_steps_are_ranked_by_wins_and_then_by_value(golden: Trunk, futures: Any)
         *futures(30, better, recorded),
         *futures(40, recorded.but(outcome="loss"), recorded.but(outcome="loss")),
     ]
-    points = ranked(golden, played)
+    points = rank(golden, played)
     assert [(point.step, point.more_won, point.more_value) for point in points] == [
         (40, -1.0, 0.0), (20, -0.5, 0.0), (30, 0.0, 50.0), (10, 0.0, 0.0),
     ]  # fmt: skip

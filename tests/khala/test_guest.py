@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.playing import games
-from khala.playing.hosting import game_of, hosted
+from khala.playing.hosting import game_of, host_match
 from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
@@ -70,7 +70,7 @@ async def play(config: MatchConfig) -> list[Result]:
         for agent in config.task.agents
     ]
     try:
-        return await hosted(config.model_copy(update={"game": name}), sc2path, broker.session())
+        return await host_match(config.model_copy(update={"game": name}), sc2path, broker.session())
     finally:
         for agent in agents:
             agent.cancel()

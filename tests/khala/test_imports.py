@@ -30,21 +30,6 @@ def test_help_imports_options_and_nothing_that_is_needed_to_play(arguments: list
     assert imported(script) & HEAVY == of_typer
 
 
-def test_help_leaves_markdown_and_tracebacks_of_rich_usable() -> None:
-    script = """
-from khala.commands.help import _import_rich_utils
-_import_rich_utils()
-import sys
-assert "rich.markdown" not in sys.modules
-from typer import rich_utils
-from rich.markdown import Markdown
-from rich.traceback import Traceback
-assert isinstance(rich_utils.Markdown("# x"), Markdown)
-assert isinstance(rich_utils.Traceback.from_exception(ValueError, ValueError("x"), None), Traceback)
-"""
-    imported(script + SHOW)
-
-
 def test_an_agent_imports_no_game_and_no_language_of_replies_before_its_first_observation() -> None:
     heavy = {"cryptography", "httpx", "khala_bridge", "khala_protocol.speech", "mcap", "numpy", "pysc2", "scipy"}
     assert imported(f"import khala.cli, khala_agents.commands\n{SHOW}") & heavy == set()

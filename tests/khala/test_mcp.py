@@ -21,10 +21,10 @@ from mcp.types import BlobResourceContents, CallToolResult, ImageContent, TextCo
 
 from khala.mcp.serve import over_http
 from khala.mcp.server import server_of
-from khala.mcp.table import Look, Table, with_messages
+from khala.mcp.table import Table, TableLook, with_messages
 from khala.mcp.words import page
 from khala.playing.minds import Minds
-from khala.playing.seats import Seat, unhurried
+from khala.playing.seats import Seat, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol import speech
@@ -42,9 +42,9 @@ STALKERS, ZEALOTS = Seat("blue", "Stalkers"), Seat("blue", "Zealots")
 def table(*seats: Seat, record: Path | None = None, episodes: int = 1, hurried: bool = False, **changes: Any) -> Table:
     task = change(load_task("2s3z_pair"), **changes)
     config = MatchConfig(
-        task=task if hurried else unhurried(task), run="mcp", episodes=episodes, record=record, assemble_s=20
+        task=task if hurried else without_time_limit(task), run="mcp", episodes=episodes, record=record, assemble_s=20
     )
-    return Table(config, seats, {"blue": Minds().named("silent")})
+    return Table(config, seats, {"blue": Minds().with_name("silent")})
 
 
 @contextlib.asynccontextmanager
@@ -315,4 +315,4 @@ def test_messages_stand_behind_a_reply_and_are_read_as_written() -> None:
 )
 def test_a_player_without_a_question_reads_why(others: list[Seat], over: bool, says: str) -> None:
     config = MatchConfig(task=load_task("2s3z_pair"), run="mcp")
-    assert page(Look(None, None, [], [], over, others), config) == says
+    assert page(TableLook(None, None, [], [], over, others), config) == says

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.mcp.commands import Wanted, run_mcp, table_of
+from khala.mcp.commands import WantedSeats, run_mcp, table_of
 from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError
 
@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def wanted(tmp_path: Path, *seats: str, task: str | None = "duel_3m", port: int | None = None, **match: Any) -> Wanted:
+def wanted(
+    tmp_path: Path, *seats: str, task: str | None = "duel_3m", port: int | None = None, **match: Any
+) -> WantedSeats:
     given = {"seed": None, "episodes": None, "assemble_s": None, "max_wait_s": None, **match}
-    return Wanted(task, seats, port, "silent", None, "simulator", None, tmp_path, given)
+    return WantedSeats(task, seats, port, "silent", None, "simulator", None, tmp_path, given)
 
 
 def test_options_choose_seats_and_their_time(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from khala.commands.host import reasons_not_valid, until_interrupted, without_or
 from khala.playing.local import _shares_of, spent_before
 from khala.playing.minds import Minds, minds_of, named_sides
 from khala.playing.spending import spent_usd
-from khala_agents.llm.money import Ledger
+from khala_agents.llm.money import MoneyLedger
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Seat
 from khala_protocol.codec import encode
@@ -40,7 +40,7 @@ COMMON = Minds(model="deepseek", model_name="chat", base_url="http://x/v1", fall
     ],
 )
 def test_a_side_is_given_a_model_its_name_or_a_policy(text: str, model: str, name: str | None, policy: str) -> None:
-    mind = COMMON.named(text)
+    mind = COMMON.with_name(text)
     assert (mind.model, mind.model_name, mind.policy) == (model, name, policy)
     assert mind.base_url is None  # it is that of --model
     assert mind.fallback == "silent"
@@ -121,7 +121,7 @@ def test_what_was_paid_in_a_recording_is_the_larger_sum_of_calls_and_of_reports(
 
 
 def test_a_resumed_match_says_what_was_spent_and_what_is_left_for_each_side() -> None:
-    ledger = Ledger()
+    ledger = MoneyLedger()
     assert spent_before(ledger, {"blue": Minds(budget_usd=2.0)}) == ""
     ledger.pay("blue", 1.25)
     ledger.pay("red", 2.0)

@@ -33,7 +33,7 @@ async def test_a_match_in_a_process_that_has_played_is_that_of_a_new_process(
         config = MatchConfig(
             task=change(load_task(task), max_steps=steps), run="match", seed=seed, record=tmp_path / f"{name}.mcap"
         )
-        await one_process.play(config, {"blue": Minds().named("skilled")}, game="simulator", processes=processes)
+        await one_process.play(config, {"blue": Minds().with_name("skilled")}, game="simulator", processes=processes)
         assert config.record is not None
         return list(Recording.open(config.record).of(Observation))
 

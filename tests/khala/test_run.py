@@ -13,12 +13,12 @@ import typer
 
 from khala.commands.exit_codes import SIGNALLED
 from khala.commands.options import MindOptions
-from khala.commands.run import Wanted, _game_for, run
+from khala.commands.run import WantedRun, _game_for, run
 
 
-def wanted(task: str | None, **match: Any) -> Wanted:
+def wanted(task: str | None, **match: Any) -> WantedRun:
     given = {"images": None, "opponent": None} | match
-    return Wanted(task, None, None, Path("runs"), "nowhere", given, MindOptions())
+    return WantedRun(task, None, None, Path("runs"), "nowhere", given, MindOptions())
 
 
 def test_a_signal_before_the_match_is_known_ends_it_in_order(
@@ -28,7 +28,7 @@ def test_a_signal_before_the_match_is_known_ends_it_in_order(
         os.kill(os.getpid(), signal.SIGTERM)
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("khala.commands.run._played", imports)
+    monkeypatch.setattr("khala.commands.run._play", imports)
     with pytest.raises(typer.Exit) as ended:
         run(wanted("2s3z"), as_json=False)
     assert ended.value.exit_code == SIGNALLED + signal.SIGTERM

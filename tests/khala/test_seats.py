@@ -9,7 +9,7 @@ import pytest
 
 from khala.playing import one_process
 from khala.playing.minds import Minds
-from khala.playing.seats import NotAsked, Seat, SeatedMatch, Turn, seats_of, unhurried
+from khala.playing.seats import NotAsked, Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
@@ -24,7 +24,7 @@ STALKERS, ZEALOTS = Seat("blue", "Stalkers"), Seat("blue", "Zealots")
 
 
 def config(name: str = "2s3z_pair", *, episodes: int = 1, record: Path | None = None, **changes: object) -> MatchConfig:
-    task = unhurried(change(load_task(name), **changes))
+    task = without_time_limit(change(load_task(name), **changes))
     return MatchConfig(task=task, run="seats", episodes=episodes, record=record)
 
 
@@ -32,9 +32,9 @@ def skilled(text: str) -> str:
     return PLAYERS["skilled"](text, random.Random(f"0 {text}"))
 
 
-async def played(match: SeatedMatch) -> list[Turn]:
+async def played(match: SeatedMatch) -> list[SeatsTurn]:
     """Play all seats of a match as the scripted player does."""
-    turns: list[Turn] = []
+    turns: list[SeatsTurn] = []
     while not turns or not turns[-1].over:
         turns.append(turn := await match.turn())
         for seat, seen in turn.asked.items():
@@ -49,7 +49,7 @@ async def test_a_match_of_seats_is_the_match_over_the_bus(tmp_path: Path) -> Non
     async with SeatedMatch(of_seats, seats_of(of_seats.task)) as match:
         turns = await played(match)
     over_bus = config(max_steps=6, record=there)
-    (result,) = await one_process.play(over_bus, {"blue": Minds().named("skilled")}, game="simulator")
+    (result,) = await one_process.play(over_bus, {"blue": Minds().with_name("skilled")}, game="simulator")
     times = {"wall_s": 0, "latency_p50_s": 0, "latency_p95_s": 0, "lag_s": 0}
     assert [one.but(**times) for turn in turns for one in turn.results] == [result.but(**times)]
     first, second = Recording.open(here), Recording.open(there)
@@ -90,7 +90,7 @@ async def test_a_turn_asks_all_agents_of_the_caller_and_reports_what_became_of_t
 @game
 async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
     asked = config("duel_3m", max_steps=3)
-    async with SeatedMatch(asked, [Seat("red", "Captain")], {"blue": Minds().named("focus-fire")}) as match:
+    async with SeatedMatch(asked, [Seat("red", "Captain")], {"blue": Minds().with_name("focus-fire")}) as match:
         turns = await played(match)
     assert [list(turn.asked) for turn in turns] == [[Seat("red", "Captain")]] * 3 + [[]]
     assert {report.side for turn in turns for report in turn.reports} == {"red"}
@@ -100,7 +100,7 @@ async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
 @game
 async def test_news_are_each_agent_that_is_asked_or_no_longer_waited_for_and_each_step() -> None:
     hasty = change(load_task("2s3z_pair"), max_steps=1, max_wait_s=0.5)
-    told: list[Turn] = []
+    told: list[SeatsTurn] = []
     async with SeatedMatch(MatchConfig(task=hasty, run="seats"), [STALKERS, ZEALOTS]) as match:
         while not told or not told[-1].over:
             told.append(await match.news())
@@ -156,7 +156,7 @@ def test_seats_are_those_of_both_sides_in_the_order_of_the_match() -> None:
 
 
 def test_an_unhurried_task_has_no_limit_for_an_answer() -> None:
-    task = unhurried(load_task("duel_3m"))
+    task = without_time_limit(load_task("duel_3m"))
     assert [side.clock.max_wait_s for side in task.per_side()] == [None, None]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing.hosting import MAX_RESTARTS, hosted
+from khala.playing.hosting import MAX_RESTARTS, host_match
 from khala_bridge.errors import GameError, GameMissing
 from khala_orchestrator.past.resume import RESUMED
 from khala_protocol.messages import Observation, Report
@@ -80,7 +80,7 @@ class Stable:
 
     async def play(self, config: MatchConfig) -> list[Result]:
         async def by(config: MatchConfig, _: Sides, *arguments: Any, **options: Any) -> list[Result]:
-            return await hosted(config, Path(), *arguments, **options)
+            return await host_match(config, Path(), *arguments, **options)
 
         async def attack(peer: Peer, seen: Observation) -> None:
             await peer.answer(seen, f"Team Stalker-1:\n<Attack_Unit(0xb)>\n<MessageTo(Zealots, '{seen.step}')>")

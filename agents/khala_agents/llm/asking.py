@@ -1,27 +1,34 @@
 """What the clients of all kinds of endpoints share: one try over HTTP, without what an endpoint refuses by name.
 
-Below it are `khala_agents.llm.http` and `khala_agents.llm.quirks`. Above it are `openai_compatible` and `anthropic`,
-which make the body of a request and read that of an answer.
+Below it are `khala_agents.llm.http` and `khala_agents.llm.quirks`. Above it are `openai_compatible` and `anthropic`:
+each makes the body of a request, takes an answer apart, and counts its tokens.
 """
 
 from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar
+from base64 import b64encode
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Required, TypedDict, TypeVar
 
+from pydantic import BaseModel, ValidationError
 from pydantic_core import to_json
 
-from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens
-from khala_agents.llm.faults import verdict_of
-from khala_agents.llm.http import OK
+from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
+from khala_agents.llm.faults import no_completion, verdict_of, without_byte_order_mark
+from khala_agents.llm.http import OK, HttpEndpoint
 from khala_agents.llm.quirks import LIMITS, REFUSALS, SystemRole, quirks_of
+from khala_agents.llm.verdict import AnswerParts, judge
 from khala_protocol.messages import MOST
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_agents.llm.http import HttpAnswer, HttpEndpoint
+    from pydantic import JsonValue, SecretStr
+
+    from khala_agents.llm.http import HttpAnswer
+    from khala_agents.llm.pricing import Prices
+    from khala_protocol.messages import ChatMessage, Usage
 
 _LONG_PROMPT = 2000
 _FAR_FEWER = 0.5
@@ -29,26 +36,76 @@ _FAR_FEWER = 0.5
 tags and coordinates take more than a token for four characters."""
 
 
-class HttpClient(ABC):
+class ClientOptions(TypedDict, total=False):
+    """Options that the clients of all kinds of endpoints have."""
+
+    model: Required[str]
+    """As the endpoint calls it."""
+    base_url: Required[str]
+    """Usually ends in `/v1`."""
+    prices: Required[Prices]
+    """To price the tokens with."""
+    key: SecretStr | None
+    """None for no key."""
+    key_header: tuple[str, str]
+    """Name and prefix of the header that carries the key; the API's own if it is left out."""
+    headers: Mapping[str, str]
+    """Sent with each request."""
+    query: Mapping[str, str]
+    """Sent with each request."""
+    extra: Mapping[str, JsonValue]
+    """Fields of the request body, unchanged."""
+
+
+class AnswerBody(BaseModel):
+    """The body of an answer. Of what is no text for us any form is taken: it must not cost us the text."""
+
+    model: Any = None
+    usage: Any = None
+
+
+AnswerBodyT = TypeVar("AnswerBodyT", bound=AnswerBody)
+
+
+class HttpClient(ABC, Generic[AnswerBodyT]):
     """An `LLMClient` over HTTP.
 
     Args:
-        http: the endpoint.
-        model: as the endpoint calls it.
-        fields: of each request's body, beside the model and the messages.
+        asked: fields of each request's body, beside the model and the messages; those with None are not sent.
+        options: see `ClientOptions`.
+
+    Attributes:
+        PATH: of requests, after the base URL.
+        ANSWER: the form of their answers.
+        CALLED: what errors call an answer.
+        KEY_HEADER: name and prefix of the header that carries the key.
+        HEADERS: sent with each request, before those of the options.
     """
 
     PATH: ClassVar[str]
+    ANSWER: type[AnswerBodyT]
+    CALLED: ClassVar[str]
+    KEY_HEADER: ClassVar[tuple[str, str]] = ("Authorization", "Bearer ")
+    HEADERS: ClassVar[Mapping[str, str]] = {}
 
-    def __init__(self, http: HttpEndpoint, *, model: str, fields: Mapping[str, Any]) -> None:
-        self.model = model
-        self.endpoint = http.address
-        self.quirks = quirks_of(http.address, model)
+    def __init__(self, asked: Mapping[str, JsonValue], options: ClientOptions) -> None:
+        http = HttpEndpoint(
+            options["base_url"],
+            headers={**self.HEADERS, **options.get("headers", {})},
+            query=options.get("query"),
+            key_header=options.get("key_header", self.KEY_HEADER),
+            key=options.get("key"),
+        )
+        fields = {name: value for name, value in asked.items() if value is not None} | dict(options.get("extra", {}))
         limits = [value for name in LIMITS if isinstance(value := fields.get(name), int)]
+        self.model = options["model"]
+        self.endpoint = http.address
+        self.quirks = quirks_of(http.address, self.model)
         self.answer_tokens: int | None = max(limits, default=None)
         self.params: Mapping[str, Scalar] = {}
         self._http = http
-        self._all_fields = dict(fields)
+        self._prices = options["prices"]
+        self._all_fields = fields
         self._fields = self._fit()
 
     async def complete(self, request: Request) -> Completion:
@@ -85,13 +142,48 @@ class HttpClient(ABC):
         """Return the body of a request, with `self._fields` in it."""
 
     @abstractmethod
-    def _read(self, answer: HttpAnswer) -> Completion:
-        """Return the completion in an answer, or raise an `LLMError`."""
+    def _take_apart(self, body: AnswerBodyT, url: str) -> AnswerParts:
+        """Return an answer of the endpoint in common terms, or raise an `LLMError`; `url` is the address asked."""
+
+    @abstractmethod
+    def _usage(self, counts: object) -> Usage:
+        """Return the tokens of an answer and their price from the endpoint's own counts."""
+
+    @abstractmethod
+    def _picture(self, media_type: str, data: str) -> dict[str, Any]:
+        """Return a picture, in base64, as a part of a message."""
 
     @property
     def _role(self) -> SystemRole | None:
         """The role of the system message, if it can change."""
         return None
+
+    def _content(self, message: ChatMessage, pictures: Mapping[str, bytes]) -> str | list[dict[str, Any]]:
+        """Return the content of a message: its text, behind its pictures if it has any, each under its title."""
+        if not message.images:
+            return message.content
+        parts: list[dict[str, Any]] = []
+        for image in message.images:
+            parts.append({"type": "text", "text": image.title})
+            parts.append(self._picture(image.media_type, b64encode(pictures[image.sha256]).decode()))
+        return [*parts, {"type": "text", "text": message.content}]
+
+    def _read(self, answer: HttpAnswer) -> Completion:
+        """Return the completion in an answer, or raise an `LLMError`."""
+        try:
+            body = self.ANSWER.model_validate_json(without_byte_order_mark(answer.body))
+        except ValidationError:
+            raise no_completion(answer.url, answer.body, self.CALLED) from None
+        parts = self._take_apart(body, answer.url)
+        judged = judge(parts)
+        return Completion(
+            text=judged.text,
+            usage=self._usage(body.usage),
+            finish=parts.finish,
+            model=model_name(body.model),
+            verdict=judged.verdict,
+            reason=judged.reason,
+        )
 
     async def _ask(self, request: Request) -> HttpAnswer:
         """Return the answer to a request; ask again where only a field was refused, which is done once for each."""

@@ -60,7 +60,7 @@ class Origin:
 
 
 @dataclass(slots=True)
-class Delivery:
+class Departure:
     """How far a request came: one that never left costs nothing.
 
     Attributes:
@@ -93,7 +93,7 @@ class Request:
     attempt: int = 1
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     stable: int = 0
-    delivery: Delivery = field(default_factory=Delivery)
+    delivery: Departure = field(default_factory=Departure)
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,7 @@ class EndpointFault:
     message: str
 
 
-def unpacked(body: bytes) -> bytes:
+def without_byte_order_mark(body: bytes) -> bytes:
     """Return a body without the mark of byte order that some gateways put in front of JSON."""
     return body.removeprefix(_BOM)
 
@@ -89,7 +89,7 @@ def unpacked(body: bytes) -> bytes:
 def fault_in(body: bytes) -> EndpointFault | None:
     """Return what an error body in a known form says; None for any other body."""
     try:
-        said = from_json(unpacked(body))
+        said = from_json(without_byte_order_mark(body))
     except ValueError:
         return None
     if isinstance(said, list) and said:  # Gemini
@@ -133,7 +133,7 @@ def error_for(url: str, status: int, headers: Mapping[str, str], body: bytes) ->
     name = f"http {status}"
     said = f"{url} answered {name}" + (f": {message}" if message else "")
     if 300 <= status < 400:
-        return RequestRefused(_moved(url, name, headers), status=name)
+        return RequestRefused(_why_moved(url, name, headers), status=name)
     if status in {401, 403} or (status == 400 and _NO_KEY.search(" ".join((*names, message)))):
         return Unauthorized(f"{said}; is the key right, and may it use this model?", status=name)
     if status == 402 or not _SPENT.isdisjoint(names) or (status == 400 and _NO_CREDIT.search(message)):
@@ -187,7 +187,7 @@ def verdict_of(status: int, body: bytes) -> tuple[Verdict, str] | None:
     return None
 
 
-def _moved(url: str, name: str, headers: Mapping[str, str]) -> str:
+def _why_moved(url: str, name: str, headers: Mapping[str, str]) -> str:
     place = headers.get("location")
     if not place:
         return f"{url} answered {name}: it has moved, and does not say where"

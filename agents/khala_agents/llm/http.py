@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from khala_agents.llm.address import checked_address
-from khala_agents.llm.client import Delivery, LLMError, MalformedCompletion, RequestRefused, Unreachable
+from khala_agents.llm.client import Departure, LLMError, MalformedCompletion, RequestRefused, Unreachable
 from khala_agents.llm.faults import error_for
-from khala_agents.llm.network import Trust, proxy_for, trusted
+from khala_agents.llm.network import Trust, find_trust, proxy_for
 from khala_agents.secret import excerpt
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class HttpEndpoint:
     ) -> None:
         self.address = checked_address(base_url)
         self._proxy = proxy_for(self.address)
-        self._trust = trusted() if self.address.startswith("https:") else None
+        self._trust = find_trust() if self.address.startswith("https:") else None
         self._headers = {
             "Content-Type": "application/json",
             "Accept": "application/json",
@@ -95,7 +95,7 @@ class HttpEndpoint:
         self._urls: dict[str, httpx.URL] = {}
         self._transport: httpx.AsyncBaseTransport | None = None
 
-    async def post(self, path: str, body: bytes, delivery: Delivery | None = None) -> HttpAnswer:
+    async def post(self, path: str, body: bytes, delivery: Departure | None = None) -> HttpAnswer:
         """Return the answer, whatever its status, and note whether the request has left.
 
         Raises:
@@ -112,7 +112,7 @@ class HttpEndpoint:
         except httpx.DecodingError:
             raise MalformedCompletion(f"{self.address} sent a body that cannot be unpacked") from None
         except httpx.InvalidURL as error:
-            raise RequestRefused(f"{self.address} is no URL: {_words(error)}", status="connection") from None
+            raise RequestRefused(f"{self.address} is no URL: {_explain(error)}", status="connection") from None
         except httpx.TransportError as error:
             never_sent = isinstance(error, httpx.ConnectError | httpx.ConnectTimeout | httpx.ProxyError)
             raise Unreachable(self._unreachable(error), sent=not never_sent) from None
@@ -147,7 +147,7 @@ class HttpEndpoint:
             await transport.aclose()
 
     async def _answer(
-        self, method: str, path: str, body: bytes | None = None, delivery: Delivery | None = None
+        self, method: str, path: str, body: bytes | None = None, delivery: Departure | None = None
     ) -> HttpAnswer:
         """Return the answer to a request.
 
@@ -158,12 +158,12 @@ class HttpEndpoint:
 
         if path not in self._urls:
             self._urls[path] = httpx.URL(self.address + path + self._query)
-        extensions = {} if delivery is None else {Delivery.EXTENSION: delivery}
+        extensions = {} if delivery is None else {Departure.EXTENSION: delivery}
         request = httpx.Request(method, self._urls[path], headers=self._headers, content=body, extensions=extensions)
-        answer = await self._connected().handle_async_request(request)
+        answer = await self._connect().handle_async_request(request)
         return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 
-    def _connected(self) -> httpx.AsyncBaseTransport:
+    def _connect(self) -> httpx.AsyncBaseTransport:
         if self._transport is None:
             from khala_agents.llm.transport import AiohttpTransport, SocksTransport  # noqa: PLC0415  # see above
 
@@ -181,10 +181,10 @@ class HttpEndpoint:
         hint = ""
         if "CERTIFICATE_VERIFY_FAILED" in str(error):
             hint = "; if a company's proxy signs its certificate, name the company's own in SSL_CERT_FILE"
-        return f"{said}: {_words(error)}{hint}"
+        return f"{said}: {_explain(error)}{hint}"
 
 
-def _words(error: Exception) -> str:
+def _explain(error: Exception) -> str:
     text = excerpt(str(error))
     return f"{text} ({type(error).__name__})" if text else type(error).__name__
 

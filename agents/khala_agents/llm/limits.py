@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 from pydantic import Field
 
 from khala_agents.llm.client import LimitExceeded, LimitType
-from khala_agents.llm.money import Budget
+from khala_agents.llm.money import SharedBudget
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Bucket:
         return now
 
 
-class Gate(Protocol):
+class RequestGate(Protocol):
     """Where the requests to one endpoint wait for their turn, in the order of their arrival."""
 
     async def enter(self, tokens: int, patience_s: float | None) -> int:
@@ -161,11 +161,11 @@ class Turns:
                 raise
 
 
-Gates: TypeAlias = "Callable[[str, LimitRules, str], Gate]"
+Gates: TypeAlias = "Callable[[str, LimitRules, str], RequestGate]"
 """Makes the gate of an endpoint: from its name, its rules, and where they stand."""
 
 
-def own_turns(_: str, rules: LimitRules, source: str) -> Gate:
+def own_turns(_: str, rules: LimitRules, source: str) -> RequestGate:
     """Return a gate for this process alone."""
     return Turns(rules, source=source)
 
@@ -189,7 +189,7 @@ class Ticket:
         self.usage = usage
 
 
-class Limits:
+class RequestLimits:
     """The limits of one endpoint: its gate, and the money of those who ask it.
 
     Args:
@@ -204,10 +204,10 @@ class Limits:
         rules: LimitRules | None = None,
         *,
         prices: Prices | None = None,
-        budget: Budget | None = None,
-        gate: Gate | None = None,
+        budget: SharedBudget | None = None,
+        gate: RequestGate | None = None,
     ) -> None:
-        self.budget = budget or Budget(None)
+        self.budget = budget or SharedBudget(None)
         self._prices = prices
         self._gate = gate or Turns(rules)
         self._counted = 0.0

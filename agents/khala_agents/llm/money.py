@@ -40,7 +40,7 @@ create table held (entry integer primary key autoincrement, account text not nul
 """
 
 
-class Ledger:
+class MoneyLedger:
     """Sums of money in US dollars by account, in memory or in a file.
 
     Args:
@@ -176,7 +176,7 @@ class Bill:
         self.usd = usd
 
 
-class Budget:
+class SharedBudget:
     """What some agents may spend together.
 
     Args:
@@ -187,11 +187,16 @@ class Budget:
     """
 
     def __init__(
-        self, limit_usd: float | None, *, ledger: Ledger | None = None, account: str = "", source: str = "the budget"
+        self,
+        limit_usd: float | None,
+        *,
+        ledger: MoneyLedger | None = None,
+        account: str = "",
+        source: str = "the budget",
     ) -> None:
         self.limit_usd = limit_usd
         self.source = source
-        self._ledger = ledger or Ledger()
+        self._ledger = ledger or MoneyLedger()
         self._account = account
         self._under_way = 0
         self._settled = asyncio.Event()

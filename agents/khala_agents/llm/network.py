@@ -96,7 +96,7 @@ def _usable(url: str, source: str) -> Proxy:
     return Proxy(url, source)
 
 
-def trusted(environ: Mapping[str, str] = os.environ) -> Trust | None:
+def find_trust(environ: Mapping[str, str] = os.environ) -> Trust | None:
     """Return the certificates that the environment names; None for those that httpx brings.
 
     Raises:

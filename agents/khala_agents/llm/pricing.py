@@ -76,7 +76,7 @@ class Listed(Frozen):
 def price_of(model: str, base_url: str) -> Prices:
     """Return the list price of a model at an address; unknown prices if the table has none."""
     host = urlsplit(base_url).hostname or ""
-    for provider in listed().values():
+    for provider in list_prices().values():
         if host in provider.hosts:
             return provider.models.get(model) or provider.models.get(_DATED.sub("", model)) or Prices()
     return Prices()
@@ -97,7 +97,7 @@ def check_priced(prices: Prices, model: str, base_url: str) -> None:
 
 
 @cache
-def listed() -> dict[str, Listed]:
+def list_prices() -> dict[str, Listed]:
     """Return the table of list prices, by provider."""
     text = files(__package__).joinpath("prices.yaml").read_text(encoding="utf-8")
     return TypeAdapter(dict[str, Listed]).validate_python(yaml.safe_load(text))

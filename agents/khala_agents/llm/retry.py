@@ -45,7 +45,7 @@ def is_retried(status: int) -> bool:
     return status in RETRIED_STATUSES or 500 <= status <= 599
 
 
-async def retried(
+async def with_retries(
     attempt: Callable[[], Awaitable[T]], rule: RetryRule, *, deadline: float | None, rng: random.Random
 ) -> T:
     """Return the result of `attempt`, retried after an `LLMError` that may pass. Raise the error of the last try.

@@ -16,7 +16,7 @@ import aiohttp
 import httpx
 from aiohttp.http_exceptions import ContentEncodingError
 
-from khala_agents.llm.client import Delivery
+from khala_agents.llm.client import Departure
 
 if TYPE_CHECKING:
     import ssl
@@ -59,7 +59,7 @@ class AiohttpTransport(httpx.AsyncBaseTransport):
                 request never left.
             httpx.DecodingError: it cannot be unpacked, or is too large.
         """
-        delivery: Delivery | None = request.extensions.get(Delivery.EXTENSION)
+        delivery: Departure | None = request.extensions.get(Departure.EXTENSION)
         if delivery is not None:
             delivery.left = False
         try:

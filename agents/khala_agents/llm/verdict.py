@@ -61,7 +61,7 @@ class AnswerParts:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class AnswerJudgement:
     """What is played of an answer, and why there is nothing; `reason` may also remark on words that there are."""
 
     text: str
@@ -69,22 +69,24 @@ class Judgement:
     reason: str = ""
 
 
-def judge(said: AnswerParts) -> Judgement:
+def judge(said: AnswerParts) -> AnswerJudgement:
     """Return what became of an answer."""
     text = scrub(said.text)
     finish = said.finish.lower()
     if finish in FILTERED:
-        return Judgement(
+        return AnswerJudgement(
             text, "filtered", f"a filter of the endpoint took the answer away ({excerpt(said.finish, 40)})"
         )
     words = _without_thoughts(text)
     if finish == "refusal" or (said.refusal and not words):
         told = excerpt(said.refusal or text)
-        return Judgement(scrub(said.refusal) or text, "refused", f"the model declined: {told or 'it gave no reason'}")
+        return AnswerJudgement(
+            scrub(said.refusal) or text, "refused", f"the model declined: {told or 'it gave no reason'}"
+        )
     if words:
         if _declines(words):
-            return Judgement(text, "refused", f"the model declined: {excerpt(words)}")
-        return Judgement(text)
+            return AnswerJudgement(text, "refused", f"the model declined: {excerpt(words)}")
+        return AnswerJudgement(text)
     return _wordless(said, text, finish)
 
 
@@ -95,19 +97,19 @@ def _declines(words: str) -> bool:
     return bool(_DECLINES.search(words.replace("\u2019", "'")))
 
 
-def _wordless(said: AnswerParts, text: str, finish: str) -> Judgement:
+def _wordless(said: AnswerParts, text: str, finish: str) -> AnswerJudgement:
     thought = said.reasoned or bool(said.thoughts.strip() or text.strip())
     if finish in CUT:
-        return Judgement(text, "cut", _why_cut(said.limit, finish, thought=thought))
+        return AnswerJudgement(text, "cut", _why_cut(said.limit, finish, thought=thought))
     if said.tools:
         names = excerpt(", ".join(said.tools), 80)
-        return Judgement(text, "empty", f"the model called tools, of which none are offered: {names}")
+        return AnswerJudgement(text, "empty", f"the model called tools, of which none are offered: {names}")
     if said.thoughts.strip() and not text.strip():
-        return Judgement(
+        return AnswerJudgement(
             scrub(said.thoughts), "ok", "the whole answer was among the model's reasoning, and is read there"
         )
     why = "the model thought, and then said nothing" if thought else "the model said nothing"
-    return Judgement(text, "empty", f"{why} (it ended with {excerpt(said.finish, 40)!r})")
+    return AnswerJudgement(text, "empty", f"{why} (it ended with {excerpt(said.finish, 40)!r})")
 
 
 def _why_cut(limit: int | None, finish: str, *, thought: bool) -> str:

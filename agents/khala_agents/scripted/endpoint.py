@@ -26,7 +26,7 @@ from aiohttp import web
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import to_json
 
-from khala_agents.scripted.faults import Faults
+from khala_agents.scripted.faults import InjectedFaults
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.listening import Patience, bind
@@ -61,7 +61,7 @@ class Behaviour:
     """
 
     latency_s: float = 0.0
-    faults: Faults = field(default_factory=Faults)
+    faults: InjectedFaults = field(default_factory=InjectedFaults)
     retry_after_s: float = 1.0
     drip_s: float = 0.5
     seed: int = 0

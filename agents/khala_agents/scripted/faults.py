@@ -28,7 +28,7 @@ NAMED = ("quota", "garbage", "nonsense", "half", "reset", "drip", "stall")
 _MAX_COUNTED = 100_000
 
 
-class Faults:
+class InjectedFaults:
     """Which request gets which fault.
 
     Args:

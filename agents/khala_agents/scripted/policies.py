@@ -25,7 +25,7 @@ class Fixed(Policy):
         return self._text
 
 
-class Player(Policy):
+class ScriptedPlayer(Policy):
     """A scripted player within a worker: it plays from the text of the observation alone.
 
     Args:

@@ -105,7 +105,7 @@ class TextUnit(NamedTuple):
         return self.hit_points / self.full if self.full else 1.0
 
 
-class Group(NamedTuple):
+class AlliedTeam(NamedTuple):
     """A team of another agent."""
 
     agent: str
@@ -115,7 +115,7 @@ class Group(NamedTuple):
     """On the minimap."""
 
 
-class ArmyPart(NamedTuple):
+class ArmyGroup(NamedTuple):
     """Own units of the army that are together."""
 
     units: dict[str, int]
@@ -128,7 +128,7 @@ class ArmyPart(NamedTuple):
     """Where most of them go; None if they are idle, or have an order without a place."""
 
 
-class Place(NamedTuple):
+class MapPlace(NamedTuple):
     """A place of the map that has a name."""
 
     name: str
@@ -229,11 +229,11 @@ class Situation:
     """Types of enemies, and where on the minimap one of each type is."""
     seen: dict[str, int] = field(default_factory=dict)
     """Enemies that were seen and are not known to be dead, by type."""
-    groups: list[Group] = field(default_factory=list)
+    groups: list[AlliedTeam] = field(default_factory=list)
     """The teams of other agents."""
-    army: list[ArmyPart] = field(default_factory=list)
+    army: list[ArmyGroup] = field(default_factory=list)
     """The own army, by place."""
-    places: list[Place] = field(default_factory=list)
+    places: list[MapPlace] = field(default_factory=list)
     """Places of the map, in the order of the text."""
     playable: tuple[float, float, float, float] = (0.0, 0.0, 64.0, 64.0)
     """Where on the minimap units can be: x and y of two corners."""
@@ -396,14 +396,14 @@ def _read_sites(situation: Situation, body: str) -> None:
 
 def _read_others(situation: Situation, body: str) -> None:
     situation.groups = [
-        Group(agent, tuple(kind for _, kind in _COUNT.findall(units)), (float(x), float(y)))
+        AlliedTeam(agent, tuple(kind for _, kind in _COUNT.findall(units)), (float(x), float(y)))
         for agent, lines in _FRIENDS.findall(body)
         for units, x, y in _FRIEND.findall(lines)
     ]
 
 
 def _read_map(situation: Situation, body: str) -> None:
-    situation.places = [Place(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
+    situation.places = [MapPlace(name, (float(x), float(y)), about) for name, x, y, about in _MAP_PLACE.findall(body)]
 
 
 def _read_armies(situation: Situation, body: str) -> None:
@@ -411,7 +411,7 @@ def _read_armies(situation: Situation, body: str) -> None:
     for x, y, units, doing in _ARMY_PART.findall(own):
         counts = {kind: int(number) for number, kind in _COUNT.findall(units)}
         goal = next(iter(points(doing)), None)
-        situation.army.append(ArmyPart(counts, (float(x), float(y)), doing == "idle", goal))
+        situation.army.append(ArmyGroup(counts, (float(x), float(y)), doing == "idle", goal))
 
 
 def _read_warping(situation: Situation, body: str) -> None:

@@ -65,7 +65,7 @@ class Board(NamedTuple):
         return cls(ground.size, (x1 - x0, y1 - y0), margin, np.pad(walkable, margin), around, heights)
 
 
-class Scene:
+class BattleScene:
     """A battle at one moment: what all agents may do and see, and the state."""
 
     def __init__(self, spec: SmacMap, options: Options, board: Board, own: OwnForce, enemy: Force) -> None:
@@ -114,7 +114,7 @@ class Scene:
         parts = [
             *self._moves(),
             self._features(slice(agents, None), first, self._vitals(self._enemy)).reshape(agents, -1),
-            self._features(slice(agents), 1.0, self._allied(last_action))[others].reshape(agents, -1),
+            self._features(slice(agents), 1.0, self._ally_rows(last_action))[others].reshape(agents, -1),
             self._self(),
         ]
         if self._options.obs_timestep_number:
@@ -156,7 +156,7 @@ class Scene:
         """Return [units, features] health, shields and type of each, as far as observations have them."""
         return self._columns(force, health=self._options.obs_all_health)
 
-    def _allied(self, last_action: Floats) -> Floats:
+    def _ally_rows(self, last_action: Floats) -> Floats:
         rows = self._vitals(self._own)
         return np.concatenate((rows, last_action), axis=1) if self._options.obs_last_action else rows
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from khala.env.numeric import rewards, sizes
-from khala.env.numeric.features import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP, STOP, Board, Scene
+from khala.env.numeric.features import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP, STOP, BattleScene, Board
 from khala.env.numeric.forces import enemy_force, look, own_force
 from khala.env.numeric.maps import smac_map
 from khala.env.numeric.options import Options
@@ -76,7 +76,7 @@ class StarCraft2Env:
         self._board: Board
         self._own: OwnForce
         self._enemy: Force
-        self._scene: Scene
+        self._scene: BattleScene
 
     @property
     def battle(self) -> Battle:
@@ -177,7 +177,7 @@ class StarCraft2Env:
             self.battle.order(ATTACK, tag, target=int(self._enemy.now.tag[action - FIRST_TARGET]))
 
     def _look(self) -> None:
-        self._scene = Scene(self._spec, self.options, self._board, self._own, self._enemy)
+        self._scene = BattleScene(self._spec, self.options, self._board, self._own, self._enemy)
 
     def _outcome(self) -> tuple[float, bool, dict[str, Any]]:
         """Return what `step` returns, and count the battle if it is over."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, get_args
 from khala_protocol.messages import Fate, RejectionReason
 
 if TYPE_CHECKING:
-    from khala.experiment.measures.evidence import Step
+    from khala.experiment.measures.evidence import SideStep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +76,7 @@ class ActionTally:
         self._fates: Counter[Fate | None] = Counter()
         self._reasons: Counter[RejectionReason] = Counter()
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         self._unasked += len(step.report.unasked)
         for agent in step.report.agents:

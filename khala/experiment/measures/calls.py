@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from khala.experiment.measures.evidence import Step
+    from khala.experiment.measures.evidence import SideStep
 
 _NAME = re.compile(r"<\s*/?(\w{1,40})")
 NAMELESS = "?"
@@ -32,7 +32,7 @@ class CallTally:
     def __init__(self) -> None:
         self._counts: Counter[tuple[str, str, str]] = Counter()
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         for agent in step.report.agents:
             self._counts.update((agent.agent, _action(call), "accepted") for call in agent.accepted)

@@ -19,7 +19,7 @@ from khala_bridge.knowledge import knowledge
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from khala.experiment.measures.evidence import Decision, Step
+    from khala.experiment.measures.evidence import RecordedDecision, SideStep
     from khala_protocol.messages import Observation, Point, Received, UnitView
 
 NEAR_MINIMAP = 4.0
@@ -65,7 +65,7 @@ class CommunicationTally:
         self._orders: dict[str, frozenset[str]] = {}
         """By agent, the orders of its last answer."""
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         self._sent += len(step.messages)
         reasons = [rejection.reason for agent in step.report.agents for rejection in agent.rejections]
@@ -75,7 +75,7 @@ class CommunicationTally:
                 self._check(decision, step)
                 self._answer(decision, step)
 
-    def _check(self, decision: Decision, step: Step) -> None:
+    def _check(self, decision: RecordedDecision, step: SideStep) -> None:
         """Look for the tags of an agent's messages in the observation from which it wrote them."""
         for message in step.messages:
             named = tags(message.text) if message.sender == decision.report.agent else frozenset()
@@ -83,7 +83,7 @@ class CommunicationTally:
                 self._tagged += 1
                 self._unfounded += not named <= tags(decision.question.whole.text)
 
-    def _answer(self, decision: Decision, step: Step) -> None:
+    def _answer(self, decision: RecordedDecision, step: SideStep) -> None:
         agent = decision.report.agent
         given = frozenset(decision.report.accepted)
         new = given - self._orders.get(agent, frozenset())
@@ -111,7 +111,7 @@ class CommunicationTally:
         )
 
 
-def _read(decision: Decision) -> Iterator[Received]:
+def _read(decision: RecordedDecision) -> Iterator[Received]:
     """Yield the messages of other agents that an answer is the first to; an adviser's name has its role in brackets."""
     for message in decision.question.glance.messages if decision.question else ():
         if not message.again and not message.sender.endswith(")"):
@@ -159,9 +159,9 @@ def _units(seen: Observation | None) -> Iterator[UnitView]:
 
 def _names_type(text: str, word: str) -> bool:
     """Return True if a word is a type of unit, and the text names it, in one word or several, one or many."""
-    return word in knowledge() and _called(word).search(text) is not None
+    return word in knowledge() and _name_pattern(word).search(text) is not None
 
 
 @cache
-def _called(type_: str) -> re.Pattern[str]:
+def _name_pattern(type_: str) -> re.Pattern[str]:
     return re.compile(rf"\b{re.sub(r'(?<=[a-z])(?=[A-Z])', ' ?', type_)}e?s?\b", re.IGNORECASE)

@@ -19,7 +19,7 @@ HALLS = frozenset({"Nexus", "CommandCenter", "Hatchery"})
 
 
 @dataclass(frozen=True, kw_only=True)
-class Economy:
+class EconomyMeasures:
     """Economy of a full game. All None if no agent of the side ever saw a town hall of its own in its counts.
 
     Commanders, developers and builders have these numbers in their observations. What one observation says holds until
@@ -97,13 +97,13 @@ class EconomyTally:
         self._mineral_s += held_s * self._last.minerals
         self._vespene_s += held_s * self._last.vespene
 
-    def total(self, end_s: float) -> Economy:
+    def total(self, end_s: float) -> EconomyMeasures:
         """Return the group of an episode that ended at a time of the game; nothing can be added afterwards."""
         if self._last is None or not self._had_hall:
             return _NONE
         self._until(end_s)
         five, last = self._at_five, self._last
-        return Economy(
+        return EconomyMeasures(
             supply_blocked_s=round(self._blocked_s, 3),
             minerals_mean=self._mineral_s / self._over_s if self._over_s else float(last.minerals),
             vespene_mean=self._vespene_s / self._over_s if self._over_s else float(last.vespene),
@@ -116,7 +116,7 @@ class EconomyTally:
         )
 
 
-_NONE = Economy(
+_NONE = EconomyMeasures(
     supply_blocked_s=None,
     minerals_mean=None,
     vespene_mean=None,

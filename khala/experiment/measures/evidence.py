@@ -109,7 +109,7 @@ def tags(text: str) -> frozenset[str]:
 
 
 @dataclass(frozen=True)
-class Question:
+class RecordedQuestion:
     """An observation that an agent was asked to answer."""
 
     glance: ObservationGlance
@@ -125,11 +125,11 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Decision:
+class RecordedDecision:
     """A decision as it was reported, and the observation that it answers, if it was recorded."""
 
     report: AgentReport
-    question: Question | None
+    question: RecordedQuestion | None
 
     @property
     def is_of_policy(self) -> bool:
@@ -138,11 +138,11 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Step:
+class SideStep:
     """One step of a side."""
 
     report: Report
-    decisions: Sequence[Decision]
+    decisions: Sequence[RecordedDecision]
 
     @cached_property
     def messages(self) -> Sequence[Received]:

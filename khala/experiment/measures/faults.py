@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from khala.experiment.measures.evidence import Step
+    from khala.experiment.measures.evidence import SideStep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class FaultTally:
         self._causes: Counter[str] = Counter()
         self._lag_s = 0.0
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         self._counts["advice"] += len(step.report.advisers)
         self._counts["incidents"] += len(step.report.incidents)

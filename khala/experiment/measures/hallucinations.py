@@ -18,7 +18,7 @@ from khala.experiment.measures.evidence import tags
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from khala.experiment.measures.evidence import Decision, Step
+    from khala.experiment.measures.evidence import RecordedDecision, SideStep
     from khala_protocol.messages import Observation, Rejection, RejectionReason
 
 Kind: TypeAlias = Literal["input_conflicting", "context_conflicting", "fact_conflicting", "not_hallucinated"]
@@ -83,7 +83,7 @@ class HallucinationTally:
         self._kinds: Counter[Kind] = Counter()
         self._calls = self._outdated = 0
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         speakers = {decision.report.agent for decision in step.decisions if decision.is_of_policy}
         self._calls += sum(message.sender in speakers for message in step.messages)
@@ -93,7 +93,7 @@ class HallucinationTally:
                 rejected = sum(rejection.reason not in _OF_MESSAGES for rejection in decision.report.rejections)
                 self._calls += len(decision.report.accepted) + rejected
 
-    def _judge(self, decision: Decision) -> Iterator[Kind]:
+    def _judge(self, decision: RecordedDecision) -> Iterator[Kind]:
         for rejection in decision.report.rejections:
             if not decision.is_of_policy:
                 yield "not_hallucinated"
@@ -118,7 +118,7 @@ _OF_MESSAGES = frozenset({"unknown_recipient", "too_many_messages"})
 """Reasons against messages, which a report has among its messages already, or in one rejection for many."""
 
 
-def is_outdated(rejection: Rejection, decision: Decision) -> bool:
+def is_outdated(rejection: Rejection, decision: RecordedDecision) -> bool:
     """Return True if time made a call wrong: the observation that it answers allowed it.
 
     What an action can be used on hardly changes with time, so `invalid_target` is never outdated; nor is `not_yours`.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
-    from khala.experiment.measures.evidence import Step
+    from khala.experiment.measures.evidence import SideStep
     from khala_protocol.messages import Result, Run
 
 UNFINISHED = "unfinished"
@@ -67,13 +67,13 @@ class Identity:
     """The game's score at the end."""
 
 
-class Progress:
+class EpisodeProgress:
     """How far an episode was played; for one without a result there is nothing else."""
 
     def __init__(self) -> None:
         self._steps = self._loop = 0
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         self._steps += 1
         self._loop = step.report.game_loop

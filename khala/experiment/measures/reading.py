@@ -9,10 +9,17 @@ from khala.experiment.measures.actions import ActionTally
 from khala.experiment.measures.calls import CallCount, CallTally
 from khala.experiment.measures.communication import CommunicationTally
 from khala.experiment.measures.economy import EconomyTally
-from khala.experiment.measures.evidence import CallGlance, Decision, ObservationGlance, Question, Step, evidence
+from khala.experiment.measures.evidence import (
+    CallGlance,
+    ObservationGlance,
+    RecordedDecision,
+    RecordedQuestion,
+    SideStep,
+    evidence,
+)
 from khala.experiment.measures.faults import FaultTally
 from khala.experiment.measures.hallucinations import HallucinationTally
-from khala.experiment.measures.identity import Progress
+from khala.experiment.measures.identity import EpisodeProgress
 from khala.experiment.measures.row import Measures
 from khala.experiment.measures.spending import SpendingTally
 from khala.experiment.measures.timing import Timing
@@ -44,7 +51,7 @@ def measure_with_calls(recording: Recording) -> list[tuple[Measures, list[CallCo
     for sample in recording:
         match evidence(sample):
             case ObservationGlance() as seen:
-                accounts[seen.episode, seen.side].see(Question(seen, sample.payload))
+                accounts[seen.episode, seen.side].see(RecordedQuestion(seen, sample.payload))
             case CallGlance() as call:
                 accounts[call.episode, call.side].spending.call(call)
             case Report() as report:
@@ -60,9 +67,9 @@ class _Account:
     """The running account of one side in one episode."""
 
     def __init__(self) -> None:
-        self._asked: dict[str, Question] = {}
+        self._asked: dict[str, RecordedQuestion] = {}
         """By agent, the last observation that it was sent."""
-        self._progress = Progress()
+        self._progress = EpisodeProgress()
         self._faults = FaultTally()
         self._actions = ActionTally()
         self._hallucinations = HallucinationTally()
@@ -71,14 +78,14 @@ class _Account:
         self.spending = SpendingTally()
         self.calls = CallTally()
 
-    def see(self, question: Question) -> None:
+    def see(self, question: RecordedQuestion) -> None:
         """Take in an observation."""
         self._asked[question.glance.agent] = question
         self._economy.see(question.glance.view)
 
     def add(self, report: Report) -> None:
         """Take in the report of a step."""
-        step = Step(report, [Decision(agent, self._question(report, agent)) for agent in report.agents])
+        step = SideStep(report, [RecordedDecision(agent, self._question(report, agent)) for agent in report.agents])
         for tally in (
             self._progress,
             self._faults,
@@ -90,7 +97,7 @@ class _Account:
         ):
             tally.add(step)
 
-    def _question(self, report: Report, agent: AgentReport) -> Question | None:
+    def _question(self, report: Report, agent: AgentReport) -> RecordedQuestion | None:
         """Return the observation that a decision answers."""
         question = self._asked.get(agent.agent)
         asked = report.step if agent.asked_step is None else agent.asked_step

@@ -11,7 +11,7 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala.experiment.measures.evidence import CallGlance, Step
+    from khala.experiment.measures.evidence import CallGlance, SideStep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class SpendingTally:
         if (most_usd := _most_usd(call.usage)) is not None:
             self._paid_usd[call.agent] += most_usd
 
-    def add(self, step: Step) -> None:
+    def add(self, step: SideStep) -> None:
         """Take in a step."""
         for agent in step.report.agents:
             self._reported[agent.agent] += agent.usage
@@ -77,10 +77,10 @@ class SpendingTally:
         """Return the group."""
         usage = sum(self._reported.values(), Usage())
         return Spending(
-            models=_joined(self._models),
-            answered_by=_joined(self._answered_by),
-            endpoints=_joined(self._endpoints),
-            params=_joined(self._params),
+            models=_join(self._models),
+            answered_by=_join(self._answered_by),
+            endpoints=_join(self._endpoints),
+            params=_join(self._params),
             requests=usage.requests,
             unknown_requests=usage.unknown_requests,
             prompt_tokens=usage.prompt_tokens,
@@ -106,5 +106,5 @@ def _most_usd(usage: Usage) -> float | None:
     return sum(known) if known else None
 
 
-def _joined(texts: Iterable[str]) -> str:
+def _join(texts: Iterable[str]) -> str:
     return "; ".join(sorted(text for text in texts if text))

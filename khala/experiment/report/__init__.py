@@ -9,7 +9,8 @@ tables       summaries as tables
 calls        what became of calls, by agent and action
 figures      summaries as pictures
 document     what a report consists of, in no format
-markdown, html, latex   a document in a format
+writer       the walk through a document, for every format
+markdown, html, latex   writers of one format each
 build        puts a document together, and writes it
 """
 

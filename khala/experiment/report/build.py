@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from khala.experiment.plan import cells as planned_cells
-from khala.experiment.report import html, latex, markdown
 from khala.experiment.report.calls import calls
 from khala.experiment.report.conditions import conditions, warnings
-from khala.experiment.report.document import Document, Section
+from khala.experiment.report.document import ReportDocument, ReportSection
 from khala.experiment.report.figures import figures
+from khala.experiment.report.html import Html
+from khala.experiment.report.latex import Latex
+from khala.experiment.report.markdown import Markdown
 from khala.experiment.report.summary import cells, summary
 from khala.experiment.report.tables import beside, not_counted, overview, tables
 from khala.experiment.selection import factors_of
@@ -17,42 +19,30 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.files import make_private, write_together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.report.summary import CellSummary
+    from khala.experiment.report.writer import DocumentWriter
     from khala.experiment.spec import Experiment
     from khala.experiment.store import Store
 
 
-class Format(NamedTuple):
-    """How a document is written."""
-
-    suffix: str
-    text: Callable[[Document], str]
-    picture: str
-    """Suffix of the pictures beside it; "" if it holds them."""
+FORMATS: dict[str, DocumentWriter] = {"markdown": Markdown(), "latex": Latex(), "html": Html()}
 
 
-FORMATS = {
-    "markdown": Format("md", markdown.text, "png"),
-    "latex": Format("tex", latex.text, "pdf"),
-    "html": Format("html", html.text, ""),
-}
-
-
-class Report(NamedTuple):
+class ExperimentReport(NamedTuple):
     """The report as a document, and the numbers in it."""
 
-    document: Document
-    summaries: list[Summary]
+    document: ReportDocument
+    summaries: list[CellSummary]
 
     def data(self) -> dict[str, Any]:
         """Return the numbers, for JSON."""
         return {"experiment": self.document.title, "warnings": self.document.warnings, "cells": self.summaries}
 
 
-def report(store: Store, by: Sequence[str] = ()) -> Report:
+def report(store: Store, by: Sequence[str] = ()) -> ExperimentReport:
     """Return the report of an experiment.
 
     Args:
@@ -63,67 +53,76 @@ def report(store: Store, by: Sequence[str] = ()) -> Report:
         ConfigError: no match was played, or there is no such factor.
     """
     experiment = store.experiment()
-    known = store.played()
+    known = store.matches()
     if not known:
         raise ConfigError(f"no match of {experiment.name} was played: `khala experiment run` plays them")
     played = list(known.values())
     rows = store.results()
-    done = {one.key for one in played if one.state == "done"}
+    done = {match.key for match in played if match.state == "done"}
     groups = cells(played, rows, by)
-    summaries = sorted((summary(cell) for cell in groups), key=lambda one: _place(experiment, one))
+    summaries = sorted((summary(cell) for cell in groups), key=lambda cell: _place(experiment, cell))
     compared = beside(experiment.published, summaries)
+    of_cells = tables(summaries)
     sections = [
-        Section("Results", tables=_some(overview(summaries), tables(summaries)[0]), figures=tuple(figures(summaries))),
-        Section("Beside what was published", (experiment.differs,) if experiment.differs else (), _some(compared)),
-        Section("More", tables=_some(*tables(summaries)[1:], calls(store.calls(), done))),
-        Section("Not counted", tables=_some(not_counted(summaries))),
-        Section("How it was played", tables=(conditions(store, played, rows),)),
+        ReportSection(
+            "Results",
+            tables=_existing(overview(summaries), of_cells[0]),
+            figures=tuple(figures(summaries)),
+        ),
+        ReportSection(
+            "Beside what was published", (experiment.differs,) if experiment.differs else (), _existing(compared)
+        ),
+        ReportSection("More", tables=_existing(*of_cells[1:], calls(store.calls(), done))),
+        ReportSection("Not counted", tables=_existing(not_counted(summaries))),
+        ReportSection("How it was played", tables=(conditions(store, played, rows),)),
     ]
     sections = [section for section in sections if section.tables or section.figures]
     found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
     paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
-    return Report(Document(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
+    return ExperimentReport(ReportDocument(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
 
 
-def write(document: Document, directory: Path, formats: Sequence[str]) -> list[Path]:
+def write(document: ReportDocument, directory: Path, formats: Sequence[str]) -> list[Path]:
     """Write a document, and its pictures beside it; return the files, the documents first."""
     make_private(directory)
     texts: dict[Path, bytes] = {}
     pictures: dict[Path, bytes] = {}
-    for one in (FORMATS[name] for name in formats):
-        texts[directory / f"report.{one.suffix}"] = one.text(document).encode()
-        if one.picture:
-            found = (figure for section in document.sections for figure in section.figures)
-            pictures |= {directory / f"{figure.name}.{one.picture}": figure.draw(one.picture) for figure in found}
+    figures = [figure for section in document.sections for figure in section.figures]
+    for name in formats:
+        writer = FORMATS[name]
+        texts[directory / f"report.{writer.suffix}"] = writer.text(document).encode()
+        if writer.picture:
+            drawn = {f"{figure.name}.{writer.picture}": figure.draw(writer.picture) for figure in figures}
+            pictures |= {directory / file: picture for file, picture in drawn.items()}
     write_together(texts | pictures)
     return [*texts, *pictures]
 
 
-def _some(*tables: Any) -> tuple[Any, ...]:
+def _existing(*tables: Any) -> tuple[Any, ...]:
     return tuple(table for table in tables if table is not None)
 
 
-def _place(experiment: Experiment, one: Summary) -> list[int]:
+def _place(experiment: Experiment, cell: CellSummary) -> list[int]:
     """Return the place of a cell in the grid: an index that was made again has matches in the order of their keys."""
     names = {factor: [level.name for level in levels] for factor, levels in experiment.factors.items()}
     return [
         names[factor].index(value) if value in names.get(factor, ()) else len(names.get(factor, ()))
-        for factor, value in one.where.items()
+        for factor, value in cell.where.items()
     ]
 
 
-def planned(experiment: Experiment) -> int:
+def count_planned(experiment: Experiment) -> int:
     """Return the number of matches of the whole grid."""
     return len(list(planned_cells(experiment))) * len(experiment.seeds) * experiment.repetitions
 
 
 def _missing(experiment: Experiment, played: int) -> list[str]:
-    count = planned(experiment)
+    count = count_planned(experiment)
     return [f"{count - played} of {count} matches were not played yet"] if played < count else []
 
 
-def _count(experiment: Experiment, summaries: Sequence[Summary], factors: Sequence[str]) -> str:
-    games = sum(one.games for one in summaries)
-    costs = [one.usd * one.games for one in summaries if one.usd is not None]
+def _count(experiment: Experiment, summaries: Sequence[CellSummary], factors: Sequence[str]) -> str:
+    games = sum(cell.games for cell in summaries)
+    costs = [cell.usd * cell.games for cell in summaries if cell.usd is not None]
     money = f" They cost {sum(costs):.2f} USD." if any(costs) else ""
     return f"{games} games in {len(summaries)} cells of {', '.join(factors)}; {len(experiment.seeds)} seeds.{money}"

@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
 from khala.experiment.numbers import share
-from khala.experiment.report.document import Table
+from khala.experiment.report.document import ReportTable
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -16,7 +16,7 @@ MOST_REASONS = 3
 ACCEPTED = "accepted"
 
 
-def calls(rows: Iterable[Mapping[str, Any]], counted: Collection[str]) -> Table | None:
+def calls(rows: Iterable[Mapping[str, Any]], counted: Collection[str]) -> ReportTable | None:
     """Return the actions that were said most often; None if nothing was said.
 
     Args:
@@ -38,7 +38,7 @@ def calls(rows: Iterable[Mapping[str, Any]], counted: Collection[str]) -> Table 
     left = len(often) - len(lines)
     more = f" {left} further pairs of agent and action were said less often." if left else ""
     note = f"In all games together, those that were said most often.{more}"
-    return Table("Calls", ("agent", "action", "said", ACCEPTED, "refused because"), tuple(lines), 2, note)
+    return ReportTable("Calls", ("agent", "action", "said", ACCEPTED, "refused because"), tuple(lines), 2, note)
 
 
 def _cells(became: Counter[str]) -> tuple[str, str, str]:

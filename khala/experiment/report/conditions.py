@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from khala.experiment.likeness import differences
 from khala.experiment.numbers import NONE, number
-from khala.experiment.report.document import Table
+from khala.experiment.report.document import ReportTable
 from khala_orchestrator.console import rule
 from khala_protocol.errors import RecordingError
 from khala_protocol.messages import LOOPS_PER_S, Clock, ModelCall
@@ -19,7 +19,7 @@ from khala_protocol.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from khala.experiment.played import Played
+    from khala.experiment.played import PlayedMatch
     from khala.experiment.report.summary import Cell
     from khala.experiment.selection import Row
     from khala.experiment.store import Store
@@ -36,7 +36,7 @@ NAMED = 4
 """Values that are named; of more, the number is given."""
 
 
-def warnings(cells: Iterable[Cell], played: Sequence[Played]) -> list[str]:
+def warnings(cells: Iterable[Cell], played: Sequence[PlayedMatch]) -> list[str]:
     """Return in what matches differ that should be alike."""
     done = [match for match in played if match.state == "done"]
     found = [str(difference) for difference in differences(done, done, EVERYWHERE)]
@@ -48,7 +48,7 @@ def warnings(cells: Iterable[Cell], played: Sequence[Played]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> Table:
+def conditions(store: Store, played: Sequence[PlayedMatch], rows: Sequence[Row]) -> ReportTable:
     """Return how the matches that count were played; a field with several values has all of them."""
     done = [match for match in played if match.state == "done"]
     keys = {match.key for match in done}
@@ -60,7 +60,7 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("maps", _values((card.get("map") for card in cards), _map)),
         ("opponents", _values(card.get("opponent") for card in cards)),
         ("clock", _values((card.get("clock") for card in cards), _clock)),
-        ("rhythm", f"{_values((card.get('task') or {}).get('rhythm') for card in cards)}; {_measured(rows)}"),
+        ("rhythm", f"{_values((card.get('task') or {}).get('rhythm') for card in cards)}; {_measured_rhythm(rows)}"),
         ("executor", _values(card.get("executor") for card in cards)),
         ("models as asked", _values(call.model for call in calls)),
         ("models as answered", _values(name for row in rows for name in row["models"].split("; "))),
@@ -70,23 +70,23 @@ def conditions(store: Store, played: Sequence[Played], rows: Sequence[Row]) -> T
         ("actions", _values((card.get("actions") for card in cards), _short)),
         ("tasks", _hashes(card.get("task") for card in cards)),
         ("code", _values((card.get("code") for card in cards), _short)),
-        ("versions", _values((card.get("versions") for card in cards), _listed)),
-        ("hardware", _values((card.get("hardware") for card in cards), _listed)),
+        ("versions", _values((card.get("versions") for card in cards), _pairs)),
+        ("hardware", _values((card.get("hardware") for card in cards), _pairs)),
         ("seeds", _seeds(done)),
-        ("human advice", _counted(rows, ("advice",))),
-        ("decisions not the agents' own", _counted(rows, ("undecided",))),
+        ("human advice", _count(rows, ("advice",))),
+        ("decisions not the agents' own", _count(rows, ("undecided",))),
         ("because of", _values(cause for row in rows for cause in row["undecided_because"].split("; "))),
     )  # fmt: skip
-    return Table("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
+    return ReportTable("", ("", ""), tuple(fact for fact in facts if fact[1]), words=2)
 
 
-def _first_calls(store: Store, done: Iterable[Played]) -> list[ModelCall]:
+def _first_calls(store: Store, done: Iterable[PlayedMatch]) -> list[ModelCall]:
     """Return the first requests of one match of each cell: all others of a cell have the same prompts."""
     firsts = {tuple(match.cell.values()): match for match in reversed(list(done)) if match.recording}
     return [call for match in firsts.values() for call in _calls(store, match)]
 
 
-def _calls(store: Store, match: Played) -> list[ModelCall]:
+def _calls(store: Store, match: PlayedMatch) -> list[ModelCall]:
     try:
         recording = Recording.open(store.directory / match.recording)
     except RecordingError:
@@ -131,7 +131,7 @@ def _short(sha256: str) -> str:
     return sha256[:HASH]
 
 
-def _listed(values: dict[str, Any]) -> str:
+def _pairs(values: dict[str, Any]) -> str:
     return ", ".join(f"{name} {value}" for name, value in values.items())
 
 
@@ -140,7 +140,7 @@ def _host(url: str) -> str:
     return urlsplit(url).hostname or url
 
 
-def _measured(rows: Sequence[Row]) -> str:
+def _measured_rhythm(rows: Sequence[Row]) -> str:
     """Return how often agents were asked, as it was."""
     games = [row for row in rows if row["steps"] and row["game_s"]]
     if not games:
@@ -155,12 +155,12 @@ def _measured(rows: Sequence[Row]) -> str:
     )
 
 
-def _seeds(done: Sequence[Played]) -> str:
+def _seeds(done: Sequence[PlayedMatch]) -> str:
     seeds = sorted({match.seed for match in done})
     whole = len(seeds) > 2 and seeds == list(range(seeds[0], seeds[-1] + 1))
     return f"{seeds[0]} to {seeds[-1]}" if whole else _values(map(str, seeds))
 
 
-def _counted(rows: Sequence[Row], names: Sequence[str]) -> str:
+def _count(rows: Sequence[Row], names: Sequence[str]) -> str:
     total = sum(row[name] for row in rows for name in names)
     return f"{total:,} in {sum(any(row[name] for name in names) for row in rows)} games" if total else "none"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.report.summary import CellSummary
     from khala.experiment.statistics import Interval
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -62,24 +62,24 @@ class _Row:
 
     name: str
     y: float
-    dots: tuple[tuple[int, Summary], ...]
+    dots: tuple[tuple[int, CellSummary], ...]
     """Each with the number of its colour."""
     heading: bool = False
 
 
-def figures(summaries: Sequence[Summary]) -> list[Figure]:
+def figures(summaries: Sequence[CellSummary]) -> list[Figure]:
     """Return the pictures of cells that have games."""
     played = [summary for summary in summaries if summary.games]
-    killed = [one for one in played if one.kd.value is not None]
-    wins = Figure("win_rate", WINS_CAPTION, partial(_drawn, played, _win_rate_axis, lambda one: one.won))
-    kd = Figure("kd", KD_CAPTION, partial(_drawn, killed, _kd_axis, lambda one: one.kd))
+    killed = [summary for summary in played if summary.kd.value is not None]
+    wins = Figure("win_rate", WINS_CAPTION, partial(_draw_figure, played, _win_rate_axis, lambda summary: summary.won))
+    kd = Figure("kd", KD_CAPTION, partial(_draw_figure, killed, _kd_axis, lambda summary: summary.kd))
     return [figure for figure, cells in ((wins, played), (kd, killed)) if cells]
 
 
-def _drawn(
-    summaries: Sequence[Summary],
+def _draw_figure(
+    summaries: Sequence[CellSummary],
     axis: Callable[[Axes, Sequence[Interval]], tuple[float, float]],
-    value: Callable[[Summary], Interval],
+    value: Callable[[CellSummary], Interval],
     kind: str,
 ) -> bytes:
     import matplotlib as mpl  # noqa: PLC0415  # half a second, for reports alone
@@ -98,18 +98,18 @@ def _drawn(
         return _bytes(canvas, kind)
 
 
-def _colours(summaries: Sequence[Summary]) -> list[str]:
+def _colours(summaries: Sequence[CellSummary]) -> list[str]:
     """Return the values that have colours: those of the last factor, unless they are the tasks or too many."""
     *first, last = summaries[0].where
     values = list(dict.fromkeys(summary.where[last] for summary in summaries))
     return values if first and 1 < len(values) <= len(COLOURS) else []
 
 
-def _rows(summaries: Sequence[Summary], colours: list[str]) -> list[_Row]:
+def _rows(summaries: Sequence[CellSummary], colours: list[str]) -> list[_Row]:
     """Return rows by task; a task of one row has no heading of its own."""
     keys = list(summaries[0].where)[: -1 if colours else None]
     task = "task" if "task" in keys else keys[0]
-    groups: dict[str, dict[str, list[tuple[int, Summary]]]] = {}
+    groups: dict[str, dict[str, list[tuple[int, CellSummary]]]] = {}
     for summary in summaries:
         rest = ", ".join(summary.where[name] for name in keys if name != task)
         dot = (colours.index(list(summary.where.values())[-1]) if colours else 0, summary)
@@ -127,9 +127,11 @@ def _rows(summaries: Sequence[Summary], colours: list[str]) -> list[_Row]:
     return rows
 
 
-def _draw(axes: Axes, row: _Row, value: Callable[[Summary], Interval], low: float, high: float, colours: int) -> None:
-    for number, one in row.dots:
-        interval = value(one)
+def _draw(
+    axes: Axes, row: _Row, value: Callable[[CellSummary], Interval], low: float, high: float, colours: int
+) -> None:
+    for number, summary in row.dots:
+        interval = value(summary)
         y = row.y + (number - (colours - 1) / 2) * 0.42 if colours else row.y
         left = max(low, interval.low)
         right = min(high, interval.high)

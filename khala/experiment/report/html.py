@@ -7,12 +7,13 @@ import re
 from typing import TYPE_CHECKING
 
 from khala.experiment.report.figures import FAINT, INK
+from khala.experiment.report.writer import DocumentWriter
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Document, Figure, Section, Table
+    from khala.experiment.report.document import Figure, ReportTable
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2430; --faint: #66707f; --line: #e3e6eb; --back: #ffffff; --band: #f6f7f9;
@@ -46,65 +47,60 @@ figure svg { display: block; width: 100%; max-width: 50rem; height: auto; }
 """
 
 
-def text(document: Document) -> str:
-    """Return the document."""
-    return "\n".join(_lines(document)) + "\n"
+class Html(DocumentWriter):
+    """HTML with its style and its pictures inside."""
 
+    suffix = "html"
+    picture = ""
+    end = "</body>\n</html>"
 
-def escaped(words: str) -> str:
-    """Return words of which nothing is markup."""
-    return html.escape(visible_line(words))
+    def _escape(self, words: str) -> str:
+        return html.escape(visible_line(words))
 
+    def _begin(self, title: str) -> str:
+        return (
+            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+            """<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">\n"""
+            f"<title>{self._escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+            f"<h1>{self._escape(title)}</h1>"
+        )
 
-def _lines(document: Document) -> Iterator[str]:
-    yield '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
-    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield """<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">"""
-    yield f"<title>{escaped(document.title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>"
-    yield f"<h1>{escaped(document.title)}</h1>"
-    yield from _paragraphs(document.paragraphs)
-    if document.warnings:
+    def _paragraph(self, words: str) -> str:
+        return f"<p>{self._escape(words)}</p>"
+
+    def _warnings(self, warnings: Sequence[str]) -> Iterator[str]:
         yield '<div class="warnings" role="note"><strong>Mind this</strong><ul>'
-        yield from (f"<li>{escaped(warning)}</li>" for warning in document.warnings)
+        yield from (f"<li>{self._escape(warning)}</li>" for warning in warnings)
         yield "</ul></div>"
-    for section in document.sections:
-        yield f"<section>\n<h2>{escaped(section.title)}</h2>"
-        yield from _section(section)
+
+    def _section(self, title: str, content: Iterable[str]) -> Iterator[str]:
+        yield f"<section>\n<h2>{self._escape(title)}</h2>"
+        yield from content
         yield "</section>"
-    yield "</body>\n</html>"
 
+    def _heading(self, title: str) -> str:
+        return f"<h3>{self._escape(title)}</h3>"
 
-def _paragraphs(paragraphs: Iterable[str]) -> Iterator[str]:
-    yield from (f"<p>{escaped(paragraph)}</p>" for paragraph in paragraphs)
+    def _table(self, table: ReportTable) -> Iterator[str]:
+        if any(table.columns):
+            yield '<div class="scroll"><table>'
+            yield f"<thead><tr>{self._cells('th', table.columns, table.words)}</tr></thead>"
+        else:
+            yield '<div class="scroll"><table class="facts">'
+        yield "<tbody>"
+        for row in table.rows:
+            yield f"<tr>{self._cells('td', row, table.words)}</tr>"
+        yield "</tbody></table></div>"
+        if table.note:
+            yield f'<p class="note">{self._escape(table.note)}</p>'
 
+    def _figure(self, figure: Figure) -> str:
+        return f"<figure>\n{_svg(figure)}\n<figcaption>{self._escape(figure.caption)}</figcaption>\n</figure>"
 
-def _section(section: Section) -> Iterator[str]:
-    yield from _paragraphs(section.paragraphs)
-    for table in section.tables:
-        if table.title not in ("", section.title):
-            yield f"<h3>{escaped(table.title)}</h3>"
-        yield from _table(table)
-    for figure in section.figures:
-        yield f"<figure>\n{_svg(figure)}\n<figcaption>{escaped(figure.caption)}</figcaption>\n</figure>"
-
-
-def _table(table: Table) -> Iterator[str]:
-    named = any(table.columns)
-    yield '<div class="scroll"><table>' if named else '<div class="scroll"><table class="facts">'
-    if named:
-        yield f"<thead><tr>{''.join(_cells('th', table.columns, table.words))}</tr></thead>"
-    yield "<tbody>"
-    for row in table.rows:
-        yield f"<tr>{''.join(_cells('td', row, table.words))}</tr>"
-    yield "</tbody></table></div>"
-    if table.note:
-        yield f'<p class="note">{escaped(table.note)}</p>'
-
-
-def _cells(tag: str, cells: tuple[str, ...], words: int) -> Iterator[str]:
-    for i, cell in enumerate(cells):
-        kind = "" if i < words else ' class="number"'
-        yield f"<{tag}{kind}>{escaped(cell)}</{tag}>"
+    def _cells(self, tag: str, cells: Sequence[str], words: int) -> str:
+        kinds = ("" if i < words else ' class="number"' for i in range(len(cells)))
+        return "".join(f"<{tag}{kind}>{self._escape(cell)}</{tag}>" for kind, cell in zip(kinds, cells, strict=True))
 
 
 def _svg(figure: Figure) -> str:

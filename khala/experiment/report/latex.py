@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from khala.experiment.report.writer import DocumentWriter
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from khala.experiment.report.document import Document, Section, Table
+    from khala.experiment.report.document import Figure, ReportTable
 
 HEAD = r"""\documentclass[10pt,a4paper]{article}
 \usepackage[T1]{fontenc}
@@ -35,69 +36,65 @@ LONG_TEXT = 40
 """Characters; a column with longer words breaks lines."""
 
 
-def text(document: Document) -> str:
-    """Return the document."""
-    return "\n".join([HEAD, *_lines(document), r"\end{document}"]) + "\n"
+class Latex(DocumentWriter):
+    """LaTeX for pdflatex. What its fonts do not have is named by its number."""
 
+    suffix = "tex"
+    picture = "pdf"
+    end = r"\end{document}"
 
-def escaped(words: str) -> str:
-    """Return words of which nothing is markup; what the fonts do not have is named by its number."""
-    return "".join(_character(one) for one in visible_line(words))
+    def _escape(self, words: str) -> str:
+        return "".join(map(_character, visible_line(words)))
 
+    def _begin(self, title: str) -> str:
+        return f"{HEAD}\n" + rf"\section*{{{self._escape(title)}}}"
 
-def _character(one: str) -> str:
-    if one in SPECIAL:
-        return SPECIAL[one]
-    return one if ord(one) < 0x180 else rf"\texttt{{U+{ord(one):04X}}}"
+    def _paragraph(self, words: str) -> str:
+        return f"{self._escape(words)}\n"
 
-
-def _lines(document: Document) -> Iterator[str]:
-    yield rf"\section*{{{escaped(document.title)}}}"
-    for paragraph in document.paragraphs:
-        yield f"{escaped(paragraph)}\n"
-    if document.warnings:
-        yield r"\textbf{Mind this:}" + "\n" + r"\begin{itemize}"
-        yield from (rf"\item {escaped(warning)}" for warning in document.warnings)
+    def _warnings(self, warnings: Sequence[str]) -> Iterator[str]:
+        yield r"\textbf{Mind this:}"
+        yield r"\begin{itemize}"
+        yield from (rf"\item {self._escape(warning)}" for warning in warnings)
         yield r"\end{itemize}"
-    for section in document.sections:
-        yield rf"\subsection*{{{escaped(section.title)}}}"
-        yield from _section(section)
+
+    def _section(self, title: str, content: Iterable[str]) -> Iterator[str]:
+        yield rf"\subsection*{{{self._escape(title)}}}"
+        yield from content
+
+    def _heading(self, title: str) -> str:
+        return rf"\subsubsection*{{{self._escape(title)}}}"
+
+    def _table(self, table: ReportTable) -> Iterator[str]:
+        wide = len(table.columns) > WIDE
+        yield r"\begin{landscape}" if wide else r"\begingroup"
+        yield rf"\small\begin{{longtable}}{{@{{}}{''.join(_columns(table))}@{{}}}}"
+        if any(table.columns):
+            yield rf"\toprule {self._row(table.columns)} \midrule\endhead"
+        else:
+            yield r"\toprule\endhead"
+        yield r"\bottomrule\endlastfoot"
+        yield from map(self._row, table.rows)
+        yield r"\end{longtable}"
+        if table.note:
+            yield rf"{{\footnotesize {self._escape(table.note)}\par}}"
+        yield r"\end{landscape}" if wide else r"\endgroup"
+
+    def _figure(self, figure: Figure) -> str:
+        picture = rf"\begin{{center}}\includegraphics[{SIZE}]{{{figure.name}.pdf}}"
+        return f"{picture}\n" + rf"\\ {{\small {self._escape(figure.caption)}}}\end{{center}}"
+
+    def _row(self, cells: Iterable[str]) -> str:
+        return f"{' & '.join(map(self._escape, cells))} \\\\"
 
 
-def _section(section: Section) -> Iterator[str]:
-    for paragraph in section.paragraphs:
-        yield f"{escaped(paragraph)}\n"
-    for table in section.tables:
-        if table.title not in ("", section.title):
-            yield rf"\subsubsection*{{{escaped(table.title)}}}"
-        yield from _table(table)
-    for figure in section.figures:
-        yield rf"\begin{{center}}\includegraphics[{SIZE}]{{{figure.name}.pdf}}"
-        yield rf"\\ {{\small {escaped(figure.caption)}}}\end{{center}}"
+def _character(character: str) -> str:
+    if character in SPECIAL:
+        return SPECIAL[character]
+    return character if ord(character) < 0x180 else rf"\texttt{{U+{ord(character):04X}}}"
 
 
-def _table(table: Table) -> Iterator[str]:
-    wide = len(table.columns) > WIDE
-    yield r"\begin{landscape}" if wide else r"\begingroup"
-    yield rf"\small\begin{{longtable}}{{@{{}}{''.join(_columns(table))}@{{}}}}"
-    if any(table.columns):
-        yield rf"\toprule {_row(table.columns)} \midrule\endhead"
-    else:
-        yield r"\toprule\endhead"
-    yield r"\bottomrule\endlastfoot"
-    for row in table.rows:
-        yield _row(row)
-    yield r"\end{longtable}"
-    if table.note:
-        yield rf"{{\footnotesize {escaped(table.note)}\par}}"
-    yield r"\end{landscape}" if wide else r"\endgroup"
-
-
-def _columns(table: Table) -> Iterator[str]:
+def _columns(table: ReportTable) -> Iterator[str]:
     for i in range(len(table.columns)):
         long = any(len(row[i]) > LONG_TEXT for row in table.rows)
         yield r"p{0.6\textwidth}" if long else "l" if i < table.words else "r"
-
-
-def _row(cells: tuple[str, ...]) -> str:
-    return f"{' & '.join(map(escaped, cells))} \\\\"

@@ -14,7 +14,7 @@ from khala_protocol.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from khala.experiment.played import Played
+    from khala.experiment.played import PlayedMatch
     from khala.experiment.statistics import Interval
 
 FATES = ("fresh", "stale", "adapted", "refused", "dropped")
@@ -37,12 +37,12 @@ class Cell:
     """Names of the factors' values."""
     rows: list[Row] = field(default_factory=list)
     """Of matches that count."""
-    others: list[Played] = field(default_factory=list)
+    others: list[PlayedMatch] = field(default_factory=list)
     """Matches that are not valid or crashed."""
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class CellSummary:
     """One cell in numbers. Without any game, and where nothing is known, they are None."""
 
     where: dict[str, str]
@@ -90,7 +90,7 @@ class Summary:
     """Matches that are not valid or crashed, by cause."""
 
 
-def cells(played: Iterable[Played], rows: Sequence[Row], by: Sequence[str] = ()) -> list[Cell]:
+def cells(played: Iterable[PlayedMatch], rows: Sequence[Row], by: Sequence[str] = ()) -> list[Cell]:
     """Return the cells in the order in which their first match was played, by all factors unless some are named.
 
     Raises:
@@ -128,24 +128,24 @@ def _in_order(found: list[Cell], names: Sequence[str]) -> list[Cell]:
     return sorted(found, key=lambda cell: [seen[i].index(cell.where[name]) for i, name in enumerate(names)])
 
 
-def _decided(rows: Sequence[Row]) -> float | None:
+def _decided_share(rows: Sequence[Row]) -> float | None:
     asked = sum(row["decisions"] for row in rows)
     return 1 - sum(row["undecided"] for row in rows) / asked if asked else None
 
 
-def summary(cell: Cell) -> Summary:
+def summary(cell: Cell) -> CellSummary:
     """Return the numbers of a cell."""
     rows = cell.rows
     games = len(cell.rows)
     wins = sum(row["outcome"] == "win" for row in rows)
     costs = [cost for row in rows if (cost := _usd(row)) is not None]
     expansions = _known(rows, "expansion_s")
-    return Summary(
+    return CellSummary(
         where=cell.where,
         games=games,
         won=statistics.wilson(wins, games),
         draws=sum(row["outcome"] == "draw" for row in rows),
-        decided=_decided(rows),
+        decided=_decided_share(rows),
         kd=statistics.ratio_of_sums([row["killed_value"] for row in rows], [row["lost_value"] for row in rows]),
         length_s=_median(rows, "game_s"),
         accepted=_mean(rows, "accepted"),

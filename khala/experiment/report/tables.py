@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala.experiment.numbers import NONE, number, ratio, ratio_with, share, share_with
-from khala.experiment.report.document import Table
+from khala.experiment.report.document import ReportTable
 from khala.experiment.report.summary import FATES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala.experiment.report.summary import Summary
+    from khala.experiment.report.summary import CellSummary
     from khala.experiment.spec import Published
 
 
@@ -23,7 +23,7 @@ class Column(NamedTuple):
     """One column."""
 
     title: str
-    value: Callable[[Summary], str]
+    value: Callable[[CellSummary], str]
     always: bool = False
     """Whether it is there without any value."""
 
@@ -40,13 +40,13 @@ KINDS = (
     Kind(
         "By cell",
         (
-            Column("games", lambda one: str(one.games), always=True),
-            Column("won", lambda one: share_with(one.won), always=True),
-            Column("draws", lambda one: str(one.draws or NONE)),
-            Column("decided", lambda one: _some_share(one.decided), always=True),
-            Column("K/D", lambda one: ratio_with(one.kd), always=True),
-            Column("length", lambda one: _clock(one.length_s)),
-            Column("not counted", lambda one: str(sum(one.not_counted.values()) or NONE)),
+            Column("games", lambda summary: str(summary.games), always=True),
+            Column("won", lambda summary: share_with(summary.won), always=True),
+            Column("draws", lambda summary: str(summary.draws or NONE)),
+            Column("decided", lambda summary: _some_share(summary.decided), always=True),
+            Column("K/D", lambda summary: ratio_with(summary.kd), always=True),
+            Column("length", lambda summary: _clock(summary.length_s)),
+            Column("not counted", lambda summary: str(sum(summary.not_counted.values()) or NONE)),
         ),
         "Won: share of games with its Wilson interval of 95 %; a draw is not won. Decided: share of decisions that "
         "agents made themselves, without fallbacks, failures, late, empty or refused answers. K/D: value killed in all "
@@ -55,22 +55,22 @@ KINDS = (
     Kind(
         "Actions",
         (
-            Column("accepted", lambda one: number(one.accepted)),
-            Column("refused", lambda one: number(one.refused)),
-            Column("input-conflicting", lambda one: _hundredth(one.hallucinations["input_conflicting"])),
-            Column("fact-conflicting", lambda one: _hundredth(one.hallucinations["fact_conflicting"])),
-            Column("context-conflicting", lambda one: _hundredth(one.hallucinations["context_conflicting"])),
+            Column("accepted", lambda summary: number(summary.accepted)),
+            Column("refused", lambda summary: number(summary.refused)),
+            Column("input-conflicting", lambda summary: _hundredth(summary.hallucinations["input_conflicting"])),
+            Column("fact-conflicting", lambda summary: _hundredth(summary.hallucinations["fact_conflicting"])),
+            Column("context-conflicting", lambda summary: _hundredth(summary.hallucinations["context_conflicting"])),
         ),
         "Accepted and refused: calls per game. The others: hallucinations of the paper's three kinds, per 100 calls.",
     ),
     Kind(
         "Decisions",
         (
-            *(Column(name, lambda one, name=name: _some_share(one.fates[name])) for name in FATES),  # type: ignore[misc]
-            Column("latency p50", lambda one: _seconds(one.latency_p50_s)),
-            Column("p95", lambda one: _seconds(one.latency_p95_s)),
-            Column("age p50", lambda one: _some(one.age_p50_loops)),
-            Column("age p95", lambda one: _some(one.age_p95_loops)),
+            *(Column(name, lambda summary, name=name: _some_share(summary.fates[name])) for name in FATES),  # type: ignore[misc]
+            Column("latency p50", lambda summary: _seconds(summary.latency_p50_s)),
+            Column("p95", lambda summary: _seconds(summary.latency_p95_s)),
+            Column("age p50", lambda summary: _some_number(summary.age_p50_loops)),
+            Column("age p95", lambda summary: _some_number(summary.age_p95_loops)),
         ),
         "What became of decisions, in shares. Latency: from observation to reply, in seconds of the wall; age: from "
         "observation to effect, in game loops; both are medians over games.",
@@ -78,21 +78,21 @@ KINDS = (
     Kind(
         "Tokens and money",
         (
-            Column("tokens a game", lambda one: _some(one.tokens)),
-            Column("USD a game", lambda one: _usd(one.usd)),
-            Column("USD a win", lambda one: _usd(one.usd_per_win)),
+            Column("tokens a game", lambda summary: _some_number(summary.tokens)),
+            Column("USD a game", lambda summary: _usd(summary.usd)),
+            Column("USD a win", lambda summary: _usd(summary.usd_per_win)),
         ),
         "Tokens: read and written. USD: of requests whose price is known; a win costs what all games cost / games won.",
     ),
     Kind(
         "Messages",
         (
-            Column("sent", lambda one: _some(one.messages["messages_sent"])),
-            Column("undeliverable", lambda one: _some(one.messages["messages_undeliverable"])),
-            Column("unfounded", lambda one: _some(one.messages["messages_unfounded"])),
-            Column("read", lambda one: _some(one.messages["messages_read"])),
-            Column("answered", lambda one: _some(one.messages["messages_answered"])),
-            Column("acted on", lambda one: _some(one.messages["messages_acted_on"])),
+            Column("sent", lambda summary: _some_number(summary.messages["messages_sent"])),
+            Column("undeliverable", lambda summary: _some_number(summary.messages["messages_undeliverable"])),
+            Column("unfounded", lambda summary: _some_number(summary.messages["messages_unfounded"])),
+            Column("read", lambda summary: _some_number(summary.messages["messages_read"])),
+            Column("answered", lambda summary: _some_number(summary.messages["messages_answered"])),
+            Column("acted on", lambda summary: _some_number(summary.messages["messages_acted_on"])),
         ),
         "Per game. Unfounded: name a tag that their sender did not see. Read: pairs of a message and a reader. Acted "
         "on: the reader gave a new order that names what the message names.",
@@ -100,10 +100,10 @@ KINDS = (
     Kind(
         "Economy",
         (
-            Column("supply blocked", lambda one: _seconds(one.supply_blocked_s)),
-            Column("minerals unspent", lambda one: number(one.minerals)),
-            Column("vespene unspent", lambda one: number(one.vespene)),
-            Column("first expansion", lambda one: _expansion(one.expansion_s, one.expanded, one.games)),
+            Column("supply blocked", lambda summary: _seconds(summary.supply_blocked_s)),
+            Column("minerals unspent", lambda summary: number(summary.minerals)),
+            Column("vespene unspent", lambda summary: number(summary.vespene)),
+            Column("first expansion", lambda summary: _expansion(summary.expansion_s, summary.expanded, summary.games)),
         ),
         "Supply blocked: seconds per game. Unspent: mean over time. First expansion: median of the games that had one, "
         "in minutes of the game.",
@@ -111,40 +111,42 @@ KINDS = (
 )  # fmt: skip
 
 
-def tables(summaries: Sequence[Summary]) -> list[Table]:
+def tables(summaries: Sequence[CellSummary]) -> list[ReportTable]:
     """Return the tables of cells, without those that would be empty."""
     return [table for kind in KINDS if (table := _table(kind, summaries)) is not None]
 
 
-def _table(kind: Kind, summaries: Sequence[Summary]) -> Table | None:
+def _table(kind: Kind, summaries: Sequence[CellSummary]) -> ReportTable | None:
     texts = {column: [column.value(summary) for summary in summaries] for column in kind.columns}
     shown = [column for column in kind.columns if column.always or any(text != NONE for text in texts[column])]
     if not shown or not summaries:
         return None
     factors = tuple(summaries[0].where)
-    rows = [(*one.where.values(), *(texts[column][i] for column in shown)) for i, one in enumerate(summaries)]
-    return Table(kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note)
+    rows = [(*summary.where.values(), *(texts[column][i] for column in shown)) for i, summary in enumerate(summaries)]
+    return ReportTable(
+        kind.title, (*factors, *(column.title for column in shown)), tuple(rows), len(factors), kind.note
+    )
 
 
-def overview(summaries: Sequence[Summary]) -> Table | None:
+def overview(summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return wins and K/D with columns for each value of the last factor, as papers print them."""
     if not summaries or len(summaries[0].where) < 2:
         return None
     *first, last = summaries[0].where
     values = list(dict.fromkeys(summary.where[last] for summary in summaries))
-    rows: dict[tuple[str, ...], dict[str, Summary]] = {}
-    for one in summaries:
-        rows.setdefault(tuple(one.where[name] for name in first), {})[one.where[last]] = one
+    rows: dict[tuple[str, ...], dict[str, CellSummary]] = {}
+    for summary in summaries:
+        rows.setdefault(tuple(summary.where[name] for name in first), {})[summary.where[last]] = summary
     if not 2 <= len(values) <= MOST_COLUMNS:
         return None
     columns = (*first, *(f"{value}: {what}" for value in values for what in ("won", "K/D")))
     texts = [
         (*where, *(text for value in values for text in _won_and_kd(found.get(value)))) for where, found in rows.items()
     ]
-    return Table("Overview", columns, tuple(texts), len(first))
+    return ReportTable("Overview", columns, tuple(texts), len(first))
 
 
-def not_counted(summaries: Sequence[Summary]) -> Table | None:
+def not_counted(summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return which matches are in no number, and why; None if there are none."""
     causes = list(dict.fromkeys(cause for summary in summaries for cause in summary.not_counted))
     if not causes:
@@ -158,38 +160,38 @@ def not_counted(summaries: Sequence[Summary]) -> Table | None:
     note = (
         "Invalid: played, and says nothing about its agents. Crashed: not played to its end. `resume` plays them again."
     )
-    return Table("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
+    return ReportTable("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
 
 
-def beside(published: Sequence[Published], summaries: Sequence[Summary]) -> Table | None:
+def beside(published: Sequence[Published], summaries: Sequence[CellSummary]) -> ReportTable | None:
     """Return published numbers beside ours; None if none was published."""
-    rows = [_row(one, ours) for one in published for ours in _matching(one, summaries)]
+    rows = [_row(result, ours) for result in published for ours in _matching(result, summaries)]
     columns = ("published of", "source", "ours", "won there", "won here", "K/D there", "K/D here", "games here")
-    return Table("Beside what was published", columns, tuple(rows), 3) if rows else None
+    return ReportTable("Beside what was published", columns, tuple(rows), 3) if rows else None
 
 
-def _matching(one: Published, summaries: Sequence[Summary]) -> list[Summary | None]:
+def _matching(result: Published, summaries: Sequence[CellSummary]) -> list[CellSummary | None]:
     """Return the cells that a published number belongs to; `model` may be one that was not played."""
     ours = [other for other in summaries if all(other.where.get(name, value) == value or name == "model"
-            for name, value in one.where.items()) and _names_a_factor(one, other)]  # fmt: skip
-    exact = [other for other in ours if other.where.get("model") == one.where.get("model")]
+            for name, value in result.where.items()) and _names_a_factor(result, other)]  # fmt: skip
+    exact = [other for other in ours if other.where.get("model") == result.where.get("model")]
     return list(exact or ours) or [None]
 
 
-def _names_a_factor(one: Published, summary: Summary) -> bool:
-    return any(name in summary.where for name in one.where)
+def _names_a_factor(result: Published, summary: CellSummary) -> bool:
+    return any(name in summary.where for name in result.where)
 
 
-def _row(one: Published, ours: Summary | None) -> tuple[str, ...]:
-    there = (", ".join(one.where.values()), one.source)
+def _row(result: Published, ours: CellSummary | None) -> tuple[str, ...]:
+    there = (", ".join(result.where.values()), result.source)
     if ours is None:
-        return (*there, "not played", share(one.win_rate), NONE, ratio(one.kd), NONE, NONE)
-    rates = (share(one.win_rate), share_with(ours.won), ratio(one.kd), ratio_with(ours.kd))
+        return (*there, "not played", share(result.win_rate), NONE, ratio(result.kd), NONE, NONE)
+    rates = (share(result.win_rate), share_with(ours.won), ratio(result.kd), ratio_with(ours.kd))
     return (*there, ", ".join(ours.where.values()), *rates, str(ours.games))
 
 
-def _won_and_kd(one: Summary | None) -> tuple[str, str]:
-    return (share_with(one.won), ratio(one.kd.value)) if one is not None else (NONE, NONE)
+def _won_and_kd(summary: CellSummary | None) -> tuple[str, str]:
+    return (share_with(summary.won), ratio(summary.kd.value)) if summary is not None else (NONE, NONE)
 
 
 def _clock(seconds: float | None) -> str:
@@ -204,7 +206,7 @@ def _seconds(value: float | None) -> str:
     return NONE if value is None else f"{value:.2f} s"
 
 
-def _some(value: float | None) -> str:
+def _some_number(value: float | None) -> str:
     """Return a number that is worth a column only if it is not 0 everywhere."""
     return number(value) if value else NONE
 

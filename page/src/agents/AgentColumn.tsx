@@ -6,7 +6,7 @@ import { keyOf, type Match } from "../match";
 import { agent } from "../stage";
 import { Tabs } from "../Tabs";
 import { capital, dollars, seconds, short, spaced } from "../words";
-import type { AgentLine, Asked, Decision } from "../wire";
+import type { AgentLine, DecisionTexts, SeenDecision } from "../wire";
 import { DecisionView } from "./DecisionView";
 import { Observation } from "./Observation";
 import { Requests } from "./Requests";
@@ -50,7 +50,7 @@ export function AgentColumn({ match, line, open, toggle }: { match: Match; line:
   );
 }
 
-function Header({ line, decision, step, toggle }: { line: AgentLine; decision: Decision | undefined; step: number; toggle: () => void }) {
+function Header({ line, decision, step, toggle }: { line: AgentLine; decision: SeenDecision | undefined; step: number; toggle: () => void }) {
   const key = keyOf(line);
   const late = decision && decision.step < step ? ` · asked ${step - decision.step} steps ago` : "";
   return (
@@ -80,7 +80,7 @@ function Header({ line, decision, step, toggle }: { line: AgentLine; decision: D
   );
 }
 
-function Status({ decision }: { decision: Decision }) {
+function Status({ decision }: { decision: SeenDecision }) {
   const { status, fate, age_loops, detail } = decision;
   const bad = status !== null && status !== "ok";
   const words = status === null ? "thinking" : bad ? `${status}${detail ? `: ${detail}` : ""}` : (fate ?? "ok");
@@ -100,8 +100,8 @@ function unasked(match: Match, key: string): string {
 }
 
 /** What is asked of the server only when somebody wants to read it. */
-function Long({ match, decision, tab }: { match: Match; decision: Decision; tab: string }) {
-  const [asked, setAsked] = useState<Asked | null>(null);
+function Long({ match, decision, tab }: { match: Match; decision: SeenDecision; tab: string }) {
+  const [asked, setAsked] = useState<DecisionTexts | null>(null);
   const [trouble, setTrouble] = useState("");
   useEffect(() => {
     let current = true;

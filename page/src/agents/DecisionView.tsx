@@ -2,10 +2,10 @@
 
 import type { ComponentChildren } from "preact";
 import { capital, spaced } from "../words";
-import type { Decision, Deed, Letter } from "../wire";
+import type { SeenDecision, Deed, Letter } from "../wire";
 import { Words, pointAt, pointAway } from "./Words";
 
-export function DecisionView({ decision }: { decision: Decision }) {
+export function DecisionView({ decision }: { decision: SeenDecision }) {
   const { read, thought, deeds, sent, teams } = decision;
   return (
     <>
@@ -56,7 +56,7 @@ function Part({ name, children }: { name: string; children: ComponentChildren })
 
 const SIGNS = { true: ["✓", "accepted"], false: ["✗", "refused"], null: ["…", "not carried out yet"] } as const;
 
-function DeedView({ deed, decision }: { deed: Deed; decision: Decision }) {
+function DeedView({ deed, decision }: { deed: Deed; decision: SeenDecision }) {
   const [sign, meaning] = SIGNS[String(deed.accepted) as keyof typeof SIGNS];
   const point = () => pointAt(deed.tags, deed.at ? [deed.at] : []);
   const stale = decision.fate === "stale" || decision.fate === "adapted";

@@ -4,13 +4,13 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { picture } from "../api";
 import { diffLines, type Line } from "../diff";
-import type { Asked, ImageRef, TeamMark } from "../wire";
+import type { DecisionTexts, ImageRef, SeenTeam } from "../wire";
 import { Words, alongReferences } from "./Words";
 
 /** Lines around a change that are shown with it. */
 const AROUND = 2;
 
-export function Observation({ run, asked, screens }: { run: string; asked: Asked; screens: readonly TeamMark[] }) {
+export function Observation({ run, asked, screens }: { run: string; asked: DecisionTexts; screens: readonly SeenTeam[] }) {
   const changes = useSignal(false);
   return (
     <>
@@ -45,7 +45,7 @@ export function Picture({ run, image }: { run: string; image: ImageRef }) {
 
 const MARKS = { same: "  ", added: "+ ", removed: "− " } as const;
 
-function Changes({ before, after, screens }: { before: string; after: string; screens: readonly TeamMark[] }) {
+function Changes({ before, after, screens }: { before: string; after: string; screens: readonly SeenTeam[] }) {
   const lines = useMemo(() => nearChanges(diffLines(before, after)), [before, after]);
   if (!lines.length) return <>Nothing has changed.</>;
   return (

@@ -2,7 +2,7 @@
 
 import { keyOf, type Match } from "../match";
 import { agent } from "../stage";
-import type { Decision } from "../wire";
+import type { SeenDecision } from "../wire";
 
 export function Strip({ match, open }: { match: Match; open: (key: string) => void }) {
   return (
@@ -25,7 +25,7 @@ export function Strip({ match, open }: { match: Match; open: (key: string) => vo
   );
 }
 
-function Fates({ decision }: { decision: Decision | undefined }) {
+function Fates({ decision }: { decision: SeenDecision | undefined }) {
   const [accepted, refused] = counts(decision);
   return (
     <>
@@ -36,9 +36,9 @@ function Fates({ decision }: { decision: Decision | undefined }) {
   );
 }
 
-const counts = (decision: Decision | undefined) => [true, false].map((accepted) => (decision?.deeds ?? []).filter((deed) => deed.accepted === accepted).length);
+const counts = (decision: SeenDecision | undefined) => [true, false].map((accepted) => (decision?.deeds ?? []).filter((deed) => deed.accepted === accepted).length);
 
-function told(decision: Decision | undefined): string {
+function told(decision: SeenDecision | undefined): string {
   if (!decision) return "It has not been asked yet";
   const [accepted, refused] = counts(decision);
   return `Of its last decision ${accepted} actions were accepted and ${refused} refused`;

@@ -2,7 +2,7 @@
 
 import type { Match } from "../match";
 import { CHARTS } from "../curves/series";
-import type { Decision, Timeline } from "../wire";
+import type { SeenDecision, Timeline } from "../wire";
 
 /** A value of both matches at the moment. */
 export interface Difference {
@@ -36,7 +36,7 @@ export function divergence(a: Timeline, b: Timeline): number | null {
 }
 
 /** Whether two decisions ask for the same; texts around the calls do not matter. */
-export function sameDeeds(a: Decision | undefined, b: Decision | undefined): boolean {
-  const calls = (d: Decision | undefined) => (d?.deeds ?? []).map((deed) => `${deed.team} ${deed.text} ${deed.accepted}`).join("\n");
+export function sameDeeds(a: SeenDecision | undefined, b: SeenDecision | undefined): boolean {
+  const calls = (d: SeenDecision | undefined) => (d?.deeds ?? []).map((deed) => `${deed.team} ${deed.text} ${deed.accepted}`).join("\n");
   return calls(a) === calls(b);
 }

@@ -7,7 +7,7 @@ import "uplot/dist/uPlot.min.css";
 import * as clock from "../clock";
 import type { Match } from "../match";
 import { palette } from "../theme";
-import { GUTTER, MARGIN } from "../timeline/Plots";
+import { GUTTER, MARGIN } from "../timeline/measure";
 import { capital } from "../words";
 import { CHARTS, charts, linesOf, type Chart, type Line } from "./series";
 

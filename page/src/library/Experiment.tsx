@@ -4,7 +4,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "../api";
 import { still } from "../theme";
-import type { Cell, ExperimentView, Row } from "../wire";
+import type { TableCell, ExperimentView, TableRow } from "../wire";
 import { RunTable } from "./RunTable";
 
 export function Experiment({ id }: { id: string }) {
@@ -52,7 +52,7 @@ export function Experiment({ id }: { id: string }) {
   );
 }
 
-function RowView({ row, ranges, chosen, choose }: { row: Row; ranges: readonly Range[]; chosen: boolean; choose: () => void }) {
+function RowView({ row, ranges, chosen, choose }: { row: TableRow; ranges: readonly Range[]; chosen: boolean; choose: () => void }) {
   return (
     <tr class={chosen ? "is-chosen" : ""}>
       {row.names.map((name, i) => (
@@ -82,13 +82,13 @@ type Range = readonly [number, number];
 const SHOWN = 0.9;
 
 /** Return the range that the bars of a column show, from 0 on. */
-function rangeOf(cells: readonly Cell[]): Range {
+function rangeOf(cells: readonly TableCell[]): Range {
   const ends = cells.flatMap((c) => [c?.low, c?.value, c?.high]).filter((v): v is number => typeof v === "number");
   const sorted = ends.sort((a, b) => a - b);
   return [Math.min(0, ...ends), Math.max(1e-9, sorted[Math.floor((sorted.length - 1) * SHOWN)] ?? 0)];
 }
 
-function Interval({ cell, range }: { cell: Cell; range: Range }) {
+function Interval({ cell, range }: { cell: TableCell; range: Range }) {
   if (cell.value === null) return null;
   const part = (value: number) => ((value - range[0]) / (range[1] - range[0])) * 100;
   const [low, high] = [cell.low ?? cell.value, cell.high ?? cell.value];

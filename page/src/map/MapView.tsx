@@ -9,18 +9,10 @@ import { palette } from "../theme";
 import { around, camera, type View } from "./camera";
 import { Minimap } from "./Minimap";
 import { Painter } from "./painter";
-import { nextUnit, unitAt, unitsIn } from "./pick";
+import { nextUnit, unitAt, unitsIn, type Pointed } from "./pick";
 import { listen, zoom, type Target } from "./pointer";
 import { Chosen, Tip } from "./Selection";
-import type { Spot } from "./spots";
 import { Tools } from "./Tools";
-
-/** A unit that is pointed at, and where on the canvas. */
-export interface Pointed {
-  spot: Spot;
-  x: number;
-  y: number;
-}
 
 export function MapView({ match, name = "" }: { match: Match; name?: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);

@@ -4,8 +4,8 @@ import { keyOf, type Match } from "../match";
 import { is, type Unit } from "../scenes";
 import { chosen, hovered } from "../stage";
 import { capital, hex, whole } from "../words";
-import type { Pointed } from "./MapView";
 import type { Painter } from "./painter";
+import type { Pointed } from "./pick";
 import type { Spot } from "./spots";
 
 /** Rows of the list; a box around an army may hold hundreds. */

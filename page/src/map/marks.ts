@@ -2,7 +2,7 @@
 
 import { is, type Frame, type Unit } from "../scenes";
 import type { Colours } from "../theme";
-import type { Decision } from "../wire";
+import type { SeenDecision } from "../wire";
 import type { View } from "./camera";
 import type { Spot } from "./spots";
 
@@ -138,7 +138,7 @@ export function drawEffects(context: Context, frame: Frame, tint: Tint, view: Vi
 }
 
 /** Draw the screens of teams, with their names. */
-export function drawScreens(context: Context, decision: Decision, colour: string, view: View, colours: Colours): void {
+export function drawScreens(context: Context, decision: SeenDecision, colour: string, view: View, colours: Colours): void {
   context.font = "600 11px system-ui, sans-serif";
   context.textAlign = "left";
   context.lineWidth = 1.2;
@@ -154,7 +154,7 @@ export function drawScreens(context: Context, decision: Decision, colour: string
 }
 
 /** Draw what an agent asked for: a ring where it was accepted, a cross where it was refused. */
-export function drawDeeds(context: Context, decision: Decision, byTag: ReadonlyMap<number, Spot>, view: View, colours: Colours): void {
+export function drawDeeds(context: Context, decision: SeenDecision, byTag: ReadonlyMap<number, Spot>, view: View, colours: Colours): void {
   for (const deed of decision.deeds) {
     const team = decision.teams.find((t) => t.name === deed.team)?.minimap;
     const target = deed.at ?? targetOf(deed.tags, byTag);

@@ -7,6 +7,13 @@ import { radius, role } from "./units";
 /** Pixels around a unit that still mean it. */
 const NEAR = 6;
 
+/** A unit that is pointed at, and where on the canvas. */
+export interface Pointed {
+  spot: Spot;
+  x: number;
+  y: number;
+}
+
 /** Return the unit under a pixel: of several the smallest one, which others would hide. */
 export function unitAt(spots: readonly Spot[], view: View, px: number, py: number): Spot | undefined {
   const [x, y] = placeAt(view, px, py);

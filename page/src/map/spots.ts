@@ -2,7 +2,7 @@
 
 import { OPPONENT, type Match } from "../match";
 import { type Frame, type Unit } from "../scenes";
-import type { TeamMark } from "../wire";
+import type { SeenTeam } from "../wire";
 
 /** A unit as it is drawn: its place and health between two scenes. */
 export interface Spot {
@@ -52,7 +52,7 @@ export function tints(frame: Frame, sides: readonly string[]): (player: number) 
 export interface Sight {
   side: string;
   sees(unit: Unit): boolean;
-  screens: readonly TeamMark[];
+  screens: readonly SeenTeam[];
 }
 
 /** Return what the chosen eyes see of a scene; an observer sees all that was recorded. */
@@ -67,7 +67,7 @@ export function sightOf(match: Match, frame: Frame, eyes: string): Sight {
   return { side, sees: (unit) => sideSees(unit) && screens.some((screen) => onScreen(screen, unit.x, unit.y)), screens };
 }
 
-function onScreen(team: TeamMark, x: number, y: number): boolean {
+function onScreen(team: SeenTeam, x: number, y: number): boolean {
   const half = team.screen / 2;
   return team.minimap !== null && Math.abs(x - team.minimap[0]) <= half && Math.abs(y - team.minimap[1]) <= half;
 }

@@ -8,10 +8,8 @@ import type { Match } from "../match";
 import { clockText } from "../time";
 import { TimeLine } from "./TimeLine";
 import { momentAt, type Scale } from "./lanes";
+import { GUTTER, MARGIN } from "./measure";
 
-/** Pixels left of the axis for names and numbers, and right of it; the style has the same. */
-export const GUTTER = 78;
-export const MARGIN = 14;
 /** Least part of an episode that the time line shows: a second. */
 const LEAST_S = 1;
 

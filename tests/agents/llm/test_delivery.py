@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 from pydantic import SecretStr
 
-from khala_agents.llm.client import Delivery, Unreachable
+from khala_agents.llm.client import Departure, Unreachable
 from khala_agents.llm.http import HttpEndpoint
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def silent() -> Iterator[socket.socket]:
 
 
 async def test_a_request_that_was_written_has_left(silent: socket.socket) -> None:
-    endpoint, delivery = HttpEndpoint(f"http://127.0.0.1:{silent.getsockname()[1]}/v1", key=KEY), Delivery()
+    endpoint, delivery = HttpEndpoint(f"http://127.0.0.1:{silent.getsockname()[1]}/v1", key=KEY), Departure()
     asking = asyncio.create_task(endpoint.post("/chat/completions", b"{}", delivery))
     taken, _ = await asyncio.to_thread(silent.accept)
     with taken:
@@ -43,7 +43,7 @@ async def test_a_request_that_was_written_has_left(silent: socket.socket) -> Non
 async def test_a_request_without_a_connection_has_not_left() -> None:
     with socket.socket() as taken:  # bound, and nobody listens
         taken.bind(("127.0.0.1", 0))
-        endpoint, delivery = HttpEndpoint(f"http://127.0.0.1:{taken.getsockname()[1]}/v1"), Delivery()
+        endpoint, delivery = HttpEndpoint(f"http://127.0.0.1:{taken.getsockname()[1]}/v1"), Departure()
         with pytest.raises(Unreachable) as caught:
             await endpoint.post("/chat/completions", b"{}", delivery)
     assert not caught.value.may_be_billed

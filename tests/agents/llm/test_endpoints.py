@@ -31,7 +31,7 @@ from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES, Profile
 from khala_agents.scripted.canned import Canned, Given
 from khala_agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
-from khala_agents.scripted.faults import Faults
+from khala_agents.scripted.faults import InjectedFaults
 from khala_protocol.messages import ChatMessage, Usage
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ FAULTS = [
 
 @pytest.mark.parametrize(("fault", "kind", "status"), FAULTS, ids=[fault for fault, _, _ in FAULTS])
 async def test_a_fault_of_the_endpoint_is_this_error(fault: str, kind: type[LLMError], status: str) -> None:
-    async with Endpoint(Behaviour(faults=Faults({fault: 1.0}), drip_s=0.2)) as endpoint:
+    async with Endpoint(Behaviour(faults=InjectedFaults({fault: 1.0}), drip_s=0.2)) as endpoint:
         with pytest.raises(LLMError) as caught:
             await ask(client(endpoint.base_url), timeout_s=0.3)
     assert (type(caught.value), caught.value.status) == (kind, status)
@@ -143,13 +143,13 @@ async def test_a_fault_of_the_endpoint_is_this_error(fault: str, kind: type[LLME
 
 
 async def test_nonsense_is_a_completion_like_any_other() -> None:
-    async with Endpoint(Behaviour(faults=Faults({"nonsense": 1.0}))) as endpoint:
+    async with Endpoint(Behaviour(faults=InjectedFaults({"nonsense": 1.0}))) as endpoint:
         assert (await ask(client(endpoint.base_url))).text == NONSENSE
 
 
 @pytest.mark.parametrize(("status", "asked_s"), [("429", 7.5), ("503", 7.5), ("500", None)])
 async def test_retry_after_reaches_the_error(status: str, asked_s: float | None) -> None:
-    async with Endpoint(Behaviour(faults=Faults({status: 1.0}), retry_after_s=7.5)) as endpoint:
+    async with Endpoint(Behaviour(faults=InjectedFaults({status: 1.0}), retry_after_s=7.5)) as endpoint:
         with pytest.raises(EndpointUnavailable) as caught:
             await ask(client(endpoint.base_url))
     assert caught.value.retry_after_s == asked_s

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_agents.llm.client import LimitExceeded
-from khala_agents.llm.money import Budget, Ledger
-from khala_agents.llm.pricing import Prices, check_priced, listed, price_of
+from khala_agents.llm.money import MoneyLedger, SharedBudget
+from khala_agents.llm.pricing import Prices, check_priced, list_prices, price_of
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ ENDPOINT = "https://api.openai.com/v1"
 
 
 async def test_a_request_of_known_cost_gives_the_rest_back() -> None:
-    budget = Budget(1.0)
+    budget = SharedBudget(1.0)
     async with budget.holding(0.8) as bill:
         assert budget.booked_usd == pytest.approx(0.8)
         bill.settle(0.1)
@@ -30,7 +30,7 @@ async def test_a_request_of_known_cost_gives_the_rest_back() -> None:
 
 
 async def test_a_request_that_was_cancelled_is_booked_at_the_most_that_it_may_cost() -> None:
-    budget, begun = Budget(1.0), asyncio.Event()
+    budget, begun = SharedBudget(1.0), asyncio.Event()
 
     async def ask() -> None:
         async with budget.holding(0.8):
@@ -50,7 +50,7 @@ async def test_a_request_that_was_cancelled_is_booked_at_the_most_that_it_may_co
     )
 
 
-async def spend(budget: Budget, most_usd: float, usd: float | None = None, deadline: float | None = None) -> None:
+async def spend(budget: SharedBudget, most_usd: float, usd: float | None = None, deadline: float | None = None) -> None:
     """Make a request of a known cost, or an unknown one."""
     async with budget.holding(most_usd, deadline) as bill:
         if usd is not None:
@@ -58,7 +58,7 @@ async def spend(budget: Budget, most_usd: float, usd: float | None = None, deadl
 
 
 async def test_a_request_waits_for_money_that_others_hold_and_give_back() -> None:
-    budget, answer = Budget(1.0), asyncio.Event()
+    budget, answer = SharedBudget(1.0), asyncio.Event()
 
     async def ask() -> None:
         async with budget.holding(0.8) as bill:
@@ -77,14 +77,14 @@ async def test_a_request_waits_for_money_that_others_hold_and_give_back() -> Non
 
 
 async def test_a_request_that_may_cost_more_than_is_left_is_not_made() -> None:
-    budget = Budget(1.0)
+    budget = SharedBudget(1.0)
     await spend(budget, 0.6)
     with pytest.raises(LimitExceeded):
         await spend(budget, 0.5)
 
 
 async def test_a_model_that_costs_nothing_is_asked_under_any_budget() -> None:
-    await spend(Budget(0.0), 0.0)
+    await spend(SharedBudget(0.0), 0.0)
 
 
 SPENDING = """
@@ -115,20 +115,20 @@ def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: 
     path = tmp_path / "match.ledger"
     processes = [start(SPENDING, path) for _ in range(2)]
     assert [process.wait(60) for process in processes] == [0, 0]
-    assert Ledger(path).booked_usd() == pytest.approx(1.0)
+    assert MoneyLedger(path).booked_usd() == pytest.approx(1.0)
 
 
 async def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
     assert start(DYING, path).wait(60) == -signal.SIGKILL
-    assert Ledger(path).booked_usd() == pytest.approx(0.25)
+    assert MoneyLedger(path).booked_usd() == pytest.approx(0.25)
     with pytest.raises(LimitExceeded):
-        await spend(Budget(1.0, ledger=Ledger(path)), 0.8)
+        await spend(SharedBudget(1.0, ledger=MoneyLedger(path)), 0.8)
 
 
 async def test_sides_have_accounts_of_their_own_in_one_ledger(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path / "match.ledger")
-    blue, red = (Budget(0.5, ledger=ledger, account=side) for side in ("blue", "red"))
+    ledger = MoneyLedger(tmp_path / "match.ledger")
+    blue, red = (SharedBudget(0.5, ledger=ledger, account=side) for side in ("blue", "red"))
     await spend(blue, 0.5, 0.4)
     await spend(red, 0.5)
     assert (blue.booked_usd, red.booked_usd, ledger.booked_usd()) == pytest.approx((0.4, 0.5, 0.9))
@@ -136,7 +136,7 @@ async def test_sides_have_accounts_of_their_own_in_one_ledger(tmp_path: Path) ->
 
 def test_a_ledger_is_a_file_of_its_owner_and_made_when_something_is_booked(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
-    ledger = Ledger(path)
+    ledger = MoneyLedger(path)
     assert (ledger.booked_usd(), path.exists()) == (0.0, False)
     ledger.pay("blue", 0.1)
     assert path.stat().st_mode & 0o777 == 0o600
@@ -147,7 +147,7 @@ async def test_nothing_is_spent_where_it_cannot_be_noted(tmp_path: Path, content
     path = tmp_path / "match.ledger"
     path.write_bytes(content)
     with pytest.raises(ConfigError, match="cannot be kept, and no model is asked without it"):
-        await spend(Budget(1.0, ledger=Ledger(path)), 0.1)
+        await spend(SharedBudget(1.0, ledger=MoneyLedger(path)), 0.1)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_a_list_price_goes_by_the_models_own_name_at_its_providers_own_address(
 
 
 def test_all_list_prices_are_known_and_say_where_they_come_from() -> None:
-    for provider in listed().values():
+    for provider in list_prices().values():
         assert provider.source.startswith("https://")
         assert all(prices.known for prices in provider.models.values())
 

@@ -16,11 +16,11 @@ import pytest
 from khala_agents.llm.address import checked_address, is_loopback, sends_openly
 from khala_agents.llm.client import LLMError, MalformedCompletion, Request, RequestRefused, Unreachable
 from khala_agents.llm.http import HttpEndpoint
-from khala_agents.llm.network import proxy_for, trusted
+from khala_agents.llm.network import find_trust, proxy_for
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
-from khala_agents.llm.retry import RetryRule, retried
+from khala_agents.llm.retry import RetryRule, with_retries
 from khala_agents.scripted.canned import Canned, Given, completion
 from khala_protocol.certificates import make_authority
 from khala_protocol.errors import ConfigError
@@ -292,7 +292,7 @@ async def test_a_connection_that_was_dropped_while_idle_is_made_again() -> None:
         at_once = RetryRule(base_s=0, jitter_s=0)
         for _ in range(3):
             request = Request((ChatMessage(role="user", content="Game"),), timeout_s=5.0)
-            tried = await retried(partial(model.complete, request), at_once, deadline=None, rng=random.Random(1))
+            tried = await with_retries(partial(model.complete, request), at_once, deadline=None, rng=random.Random(1))
             assert tried.text == "go"
         await model.close()
     assert len(heard) == 3
@@ -304,11 +304,11 @@ async def test_a_connection_that_was_dropped_while_idle_is_made_again() -> None:
 @pytest.mark.parametrize("variable", CERTIFICATES)
 def test_certificates_are_taken_from_the_first_variable_that_is_set(variable: str, tmp_path: Path) -> None:
     named = {name: str(tmp_path) for name in CERTIFICATES[CERTIFICATES.index(variable) :]}
-    assert str(trusted(named)) == f"{variable}={tmp_path}"
+    assert str(find_trust(named)) == f"{variable}={tmp_path}"
 
 
 def test_no_variable_means_the_certificates_that_httpx_brings() -> None:
-    assert trusted({}) is None
+    assert find_trust({}) is None
 
 
 @pytest.mark.parametrize("variable", CERTIFICATES)

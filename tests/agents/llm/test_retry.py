@@ -22,7 +22,7 @@ from khala_agents.llm.client import (
     Unreachable,
 )
 from khala_agents.llm.faults import error_for, retry_after_s
-from khala_agents.llm.retry import RetryRule, retried
+from khala_agents.llm.retry import RetryRule, with_retries
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +37,7 @@ def failing(model: Any) -> Callable[[], Any]:
 
 
 async def run(model: Any, rule: RetryRule = EXACT, deadline: float | None = None, seed: int = 0) -> Completion:
-    return await retried(failing(model), rule, deadline=deadline, rng=random.Random(seed))
+    return await with_retries(failing(model), rule, deadline=deadline, rng=random.Random(seed))
 
 
 # status → error, retried; the list of `khala_agents.llm.retry` and `khala_agents.llm.http`, as a table
@@ -98,10 +98,10 @@ async def test_an_error_is_tried_again_if_it_may_pass(error: BaseException, agai
         return "good"
 
     if again:
-        assert await retried(attempt, EXACT, deadline=None, rng=random.Random(0)) == "good"
+        assert await with_retries(attempt, EXACT, deadline=None, rng=random.Random(0)) == "good"
     else:
         with pytest.raises(type(error)):
-            await retried(attempt, EXACT, deadline=None, rng=random.Random(0))
+            await with_retries(attempt, EXACT, deadline=None, rng=random.Random(0))
     assert tries == 1 + again
 
 

@@ -11,7 +11,7 @@ import aiohttp
 import pytest
 
 from khala_agents.scripted.endpoint import Behaviour, Endpoint, count_tokens
-from khala_agents.scripted.faults import Faults, parse_faults
+from khala_agents.scripted.faults import InjectedFaults, parse_faults
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def prompts(count: int) -> list[str]:
 
 
 def test_faults_come_at_their_rates() -> None:
-    faults = Faults({"429": 0.2, "stall": 0.05})
+    faults = InjectedFaults({"429": 0.2, "stall": 0.05})
     picked = [faults.pick(prompt) for prompt in prompts(4000)]
     assert picked.count("429") / 4000 == pytest.approx(0.2, abs=0.02)
     assert picked.count("stall") / 4000 == pytest.approx(0.05, abs=0.01)
@@ -123,7 +123,7 @@ def test_faults_come_at_their_rates() -> None:
 
 def test_the_same_seed_hits_the_same_requests_in_whatever_order_they_come() -> None:
     def hit(order: list[str], seed: int) -> dict[str, str | None]:
-        faults = Faults({"500": 0.3}, seed=seed)
+        faults = InjectedFaults({"500": 0.3}, seed=seed)
         return {prompt: faults.pick(prompt) for prompt in order}
 
     asked = prompts(100)
@@ -132,7 +132,7 @@ def test_the_same_seed_hits_the_same_requests_in_whatever_order_they_come() -> N
 
 
 def test_a_repeated_request_may_fare_better() -> None:
-    faults = Faults({"500": 0.5})
+    faults = InjectedFaults({"500": 0.5})
     assert {faults.pick("prompt") for _ in range(20)} == {None, "500"}
 
 

@@ -10,7 +10,7 @@ import pytest
 from khala.dataset.card import Recipe
 from khala.dataset.export import export
 from khala.playing import games
-from khala.playing.hosting import hosted
+from khala.playing.hosting import host_match
 from khala_agents.build import Workshop, load_policy
 from khala_agents.config import WorkerSpec
 from khala_agents.scripted.endpoint import Endpoint
@@ -44,7 +44,7 @@ def battle(run: str, record: Path) -> MatchConfig:
 async def play(config: MatchConfig, policies: Mapping[str, Policy]) -> Result:
     broker, (sc2path, _) = MemoryBroker(), games.find("simulator")
     workers = asyncio.create_task(run_workers(broker.session(), config.run, "blue", policies))
-    (result,) = await hosted(config, sc2path, broker.session())
+    (result,) = await host_match(config, sc2path, broker.session())
     await workers
     return result
 

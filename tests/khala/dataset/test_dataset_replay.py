@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.dataset.files import Form
+from khala.dataset.files import RowForm
 from khala.dataset.replay import FromDataset, replies_of
 from khala_agents.build import load_policy
 from khala_agents.policy import Context, Decision
@@ -51,9 +51,9 @@ def check_same(again: Recording, recording: Recording) -> None:
 @pytest.mark.parametrize(
     "form",
     [
-        Form.PARQUET,
-        pytest.param(Form.SHAREGPT, marks=pytest.mark.slow),
-        pytest.param(Form.OPENAI, marks=pytest.mark.slow),
+        RowForm.PARQUET,
+        pytest.param(RowForm.SHAREGPT, marks=pytest.mark.slow),
+        pytest.param(RowForm.OPENAI, marks=pytest.mark.slow),
     ],
 )
 async def test_a_match_from_a_data_set_ends_as_the_recorded_one(
@@ -62,7 +62,7 @@ async def test_a_match_from_a_data_set_ends_as_the_recorded_one(
     play_again: PlayAgain,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
-    form: Form,
+    form: RowForm,
 ) -> None:
     monkeypatch.setenv("KHALA_DATASET", str(data_set / form))
     again = await play_again("again", both())
@@ -70,11 +70,11 @@ async def test_a_match_from_a_data_set_ends_as_the_recorded_one(
     check_same(again, recording)
 
 
-@pytest.mark.parametrize("form", Form)
-def test_every_form_has_every_reply(recording: Recording, data_set: Path, form: Form) -> None:
+@pytest.mark.parametrize("form", RowForm)
+def test_every_form_has_every_reply(recording: Recording, data_set: Path, form: RowForm) -> None:
     replies = replies_of(data_set / form)
     said = {f"first/blue/{one.agent}/0/{one.step}": one.text for one in recording.of(Reply)}
-    if form is Form.OPENAI:
+    if form is RowForm.OPENAI:
         assert replies.only_run is None
         assert {reply.text for reply in replies.by_prompt.values()} == set(said.values())
     else:

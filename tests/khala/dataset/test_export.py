@@ -16,9 +16,9 @@ from PIL import Image
 
 from khala.cli import main
 from khala.dataset.card import Recipe
-from khala.dataset.choose import FILTERS, Choice, Only, Split
+from khala.dataset.choose import FILTERS, Only, RowChoice, Split
 from khala.dataset.export import export
-from khala.dataset.files import Form
+from khala.dataset.files import RowForm
 from khala.dataset.rows import Rows
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
@@ -96,7 +96,7 @@ def test_pictures_are_those_that_the_model_was_sent_byte_for_byte(recording: Rec
 
 
 def test_without_pictures_a_chat_is_plain_text(recording: Recording, tmp_path: Path) -> None:
-    export([recording.path], tmp_path / "out", Recipe((Form.OPENAI,), images=False))
+    export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,), images=False))
     for chat, row in zip(lines(tmp_path / "out" / "openai" / "train.jsonl"), rows_of(recording), strict=True):
         plain = [{"role": message.role, "content": message.content} for message in row.prompt]
         assert chat == {"messages": [*plain, {"role": "assistant", "content": row.reply}]}
@@ -143,7 +143,7 @@ def test_a_number_that_parquet_cannot_hold_is_said(rewritten: Rewrite, tmp_path:
         return [sample.message.but(seed=10**30)] if isinstance(sample.message, Run) else [sample.message]
 
     with pytest.raises(RecordingError, match="a number in these recordings is too large for Parquet"):
-        export([rewritten(change).path], tmp_path / "out", Recipe((Form.PARQUET,)))
+        export([rewritten(change).path], tmp_path / "out", Recipe((RowForm.PARQUET,)))
 
 
 def test_the_card_says_what_is_in_it(data_set: Path, recording: Recording) -> None:
@@ -171,7 +171,7 @@ def test_each_filter_leaves_what_it_names(recording: Recording, tmp_path: Path) 
     contents = export(
         [recording.path],
         tmp_path / "out",
-        Recipe((Form.SHAREGPT,), Choice((Only.ACCEPTED, Only.OK), ("blue/Zealots",))),
+        Recipe((RowForm.SHAREGPT,), RowChoice((Only.ACCEPTED, Only.OK), ("blue/Zealots",))),
     )
     found = lines(tmp_path / "out" / "sharegpt" / "train.jsonl")
     assert [chat["id"] for chat in found] == [row.id for row in accepted] != []
@@ -214,7 +214,7 @@ def test_seeds_of_two_recordings_go_into_their_splits(
 
     rewritten(seven, "runs/7.mcap")
     rewritten(lambda sample: [sample.message], "runs/3.mcap")
-    recipe = Recipe((Form.PARQUET, Form.OPENAI), split=Split.of("0.5,0.5", "seed"))
+    recipe = Recipe((RowForm.PARQUET, RowForm.OPENAI), split=Split.of("0.5,0.5", "seed"))
     export([tmp_path / "runs", tmp_path / "runs" / "3.mcap"], tmp_path / "out", recipe)
     found = load(tmp_path / "out" / "parquet")
     seeds = {name: set(found[name]["seed"]) for name in ("train", "test")}
@@ -239,7 +239,7 @@ def test_what_stands_in_the_way_is_named(recording: Recording, tmp_path: Path, d
     with pytest.raises(ConfigError, match="Not a directory"):
         export([recording.path], recording.path / "out", Recipe())
     with pytest.raises(ConfigError, match=r"no decision is left to export .*another agent: "):
-        export([recording.path], tmp_path / "out", Recipe(choice=Choice(agents=("Nobody",))))
+        export([recording.path], tmp_path / "out", Recipe(choice=RowChoice(agents=("Nobody",))))
     assert not (tmp_path / "out").exists()
 
 
@@ -248,8 +248,8 @@ def test_without_pyarrow_the_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ConfigError, match=r'pip install "khala\[data\]"'):
-        export([recording.path], tmp_path / "out", Recipe((Form.PARQUET,)))
-    assert export([recording.path], tmp_path / "out", Recipe((Form.OPENAI,))).rows["train"]
+        export([recording.path], tmp_path / "out", Recipe((RowForm.PARQUET,)))
+    assert export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,))).rows["train"]
 
 
 def test_files_that_are_no_recordings_and_parts_of_lost_games_are_left_out(
@@ -261,7 +261,7 @@ def test_files_that_are_no_recordings_and_parts_of_lost_games_are_left_out(
     (tmp_path / "runs" / "a.lost-1.mcap").write_bytes(whole)
     (tmp_path / "runs" / "empty.mcap").touch()
     (tmp_path / "runs" / "torn.mcap").write_bytes(whole[: len(whole) * 2 // 3])
-    contents = export([tmp_path / "runs"], tmp_path / "out", Recipe((Form.OPENAI,)))
+    contents = export([tmp_path / "runs"], tmp_path / "out", Recipe((RowForm.OPENAI,)))
     assert (contents.recordings, contents.unread) == (2, 1)
     assert contents.outcomes["unfinished"] > 5
     assert "no recordings of a match: 1." in (tmp_path / "out" / "openai" / "README.md").read_text()

@@ -48,7 +48,7 @@ async def test_agents_read_and_write_what_they_do_over_the_bus(pair: TextParalle
     config = MatchConfig(
         task=change(load_task("2s3z_pair"), max_steps=6), run="words", seed=3, record=tmp_path / "words.mcap"
     )
-    (result,) = await one_process.play(config, {"blue": Minds().named("skilled")}, game="simulator")
+    (result,) = await one_process.play(config, {"blue": Minds().with_name("skilled")}, game="simulator")
     recorded = [one.text for one in Recording.open(tmp_path / "words.mcap").of(Observation)]
 
     skilled, read, worth = PLAYERS["skilled"], list[str](), 0.0

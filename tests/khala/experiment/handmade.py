@@ -6,7 +6,7 @@ import random
 from typing import TYPE_CHECKING, Any
 
 from khala.experiment.measures import Measures
-from khala.experiment.played import Played
+from khala.experiment.played import PlayedMatch
 from khala.experiment.store import Store
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class HandMade:
         """Add a match; `card` has fields that are other than those of `CARD`."""
         key = f"{'-'.join(cell.values())}-{seed}-{values.get('episode', 0)}"
         task = values.pop("task", cell.get("task", "2s3z"))
-        played = Played(key, cell, seed, 0, state, cause, 1, "", 4.0, None, 0, CARD | (card or {}))
+        played = PlayedMatch(key, cell, seed, 0, state, cause, 1, "", 4.0, None, 0, CARD | (card or {}))
         numbers = {"killed_value": 500.0, "lost_value": 250.0, "kd": 2.0, "steps": 20, "game_s": 20.0} | values
         rows = [measures(task=task, side="blue", seed=seed, outcome=outcome, **numbers)] if state != "crashed" else []
         self.store.add(played, [(row, []) for row in rows])
@@ -88,7 +88,9 @@ class HandMade:
             measures(task=cell["task"], side=side, outcome="win" if side == winner else "loss", **numbers)
             for side in ("blue", "red")
         ]
-        self.store.add(Played(key, cell, seed, 0, "done", "", 1, "", 4.0, None, 0, CARD), [(row, []) for row in rows])
+        self.store.add(
+            PlayedMatch(key, cell, seed, 0, "done", "", 1, "", 4.0, None, 0, CARD), [(row, []) for row in rows]
+        )
 
     def fill(self, wins: dict[str, set[int]], seeds: int = 20, *, task: str = "2s3z", **values: Any) -> None:
         """Add matches of players in a task; `wins` has the seeds with which each wins."""

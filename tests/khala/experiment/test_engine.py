@@ -103,4 +103,4 @@ def test_a_wrong_name_of_an_experiment_says_which_there_are(tmp_path: Path) -> N
     told = CliRunner().invoke(app, ["experiment", "status", "nothing", "--out", str(tmp_path)])
     assert told.exception is not None
     assert "there is no experiment in" in str(told.exception)
-    assert not Store(tmp_path / "nothing").played()
+    assert not Store(tmp_path / "nothing").matches()

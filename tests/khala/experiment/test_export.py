@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from khala.cli import app
-from khala.experiment.commands import shipped
+from khala.experiment.commands import shipped_experiments
 from khala.experiment.measures import Measures
 from khala.experiment.plan import plan
 from khala.experiment.spec import Experiment
@@ -90,12 +90,12 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 def planned(name: str, monkeypatch: pytest.MonkeyPatch) -> list[PlannedMatch]:
     for key in ("OPENAI_API_KEY", "DEEPSEEK_API_KEY"):
         monkeypatch.setenv(key, "none")
-    return plan(load(shipped()[name], Experiment))
+    return plan(load(shipped_experiments()[name], Experiment))
 
 
 def test_the_shipped_experiments_are_these() -> None:
-    assert sorted(shipped()) == sorted(PLANNED)
-    for name, path in shipped().items():
+    assert sorted(shipped_experiments()) == sorted(PLANNED)
+    for name, path in shipped_experiments().items():
         assert load(path, Experiment).name == name
 
 

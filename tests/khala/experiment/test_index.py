@@ -16,7 +16,7 @@ from khala import indexes
 from khala.experiment import index as rows
 from khala.experiment.plan import plan
 from khala.experiment.runner import Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import INDEX, MATCHES, Store
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.made import MadeEngine, record
@@ -52,7 +52,7 @@ def matches() -> list[PlannedMatch]:
 
 def known(directory: Path) -> tuple[Any, ...]:
     store = Store(directory)
-    rows = store.results(), store.calls(), list(store.played().values())
+    rows = store.results(), store.calls(), list(store.matches().values())
     return tuple(sorted(map(repr, found)) for found in rows)
 
 
@@ -147,7 +147,7 @@ def test_while_another_process_plays_it_is_made_in_memory(directory: Path, caplo
     before = known(directory)
     DAMAGES["torn"](directory / INDEX)
     torn = (directory / INDEX).read_bytes()
-    with Store(directory).locked():
+    with Store(directory).lock():
         assert known(directory) == before
         assert (directory / INDEX).read_bytes() == torn
         with pytest.raises(ConfigError, match="another process plays the experiment"):
@@ -183,7 +183,7 @@ def test_a_match_that_the_disk_has_no_room_for_is_an_error_of_the_disk(directory
     before, store = known(directory), Store(directory)
     (pages,) = store._index.execute("pragma page_count").fetchone()
     store._index.execute(f"pragma max_page_count = {pages}")
-    match = next(iter(store.played().values()))
+    match = next(iter(store.matches().values()))
     with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)) as error:
         store.add(replace(match, cause="c" * 100_000), [])
     assert str(error.value.filename).endswith(INDEX)
@@ -193,8 +193,8 @@ def test_a_match_that_the_disk_has_no_room_for_is_an_error_of_the_disk(directory
 async def test_the_runner_goes_on_with_one_that_is_broken(directory: Path, caplog: pytest.LogCaptureFixture) -> None:
     DAMAGES["torn"](directory / INDEX)
     engine, store = MadeEngine(), Store(directory)
-    with store.locked():
-        runner = Runner(FOUND, store, engine, Budget())
+    with store.lock():
+        runner = Runner(FOUND, store, engine, ExperimentBudget())
         await runner.play(matches())
     assert engine.jobs == []
     assert len(caplog.records) == 1
@@ -208,8 +208,8 @@ def test_a_finished_try_is_known_although_a_crashed_one_was_copied_last(director
         finished = crashed.with_name("recording.mcap")
         os.utime(finished, (0, 0))
     Store(directory).rebuild()
-    assert {one.state for one in Store(directory).played().values()} == {"done"}
-    assert {one.attempts for one in Store(directory).played().values()} == {2}
+    assert {one.state for one in Store(directory).matches().values()} == {"done"}
+    assert {one.attempts for one in Store(directory).matches().values()} == {2}
     assert known(directory)[0] == before[0]
 
 
@@ -221,7 +221,7 @@ def test_of_tries_that_all_crashed_the_one_with_the_largest_number_counts(direct
         record(path, matches()[0].config, result=False)
         os.utime(path, (1000 - number, 1000 - number))
     Store(directory).rebuild()
-    assert Store(directory).played()[key].recording == f"{MATCHES}/{key}/recording-11.mcap"
+    assert Store(directory).matches()[key].recording == f"{MATCHES}/{key}/recording-11.mcap"
 
 
 def test_a_recording_with_a_number_that_no_index_holds_is_left_out(

@@ -16,8 +16,8 @@ from khala.cli import main
 from khala.experiment.plan import plan
 from khala.experiment.played import unread
 from khala.experiment.progress import Watcher
-from khala.experiment.runner import Event, Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.runner import Runner, RunnerEvent
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import MATCHES, Store
 from khala_orchestrator.console import stderr_console
 from tests.khala.experiment.made import MadeEngine, record
@@ -71,7 +71,7 @@ def contents(directory: Path) -> dict[str, bytes]:
 
 
 def test_other_users_may_read_nothing_that_commands_write(store: Store) -> None:
-    with store.locked():
+    with store.lock():
         pass
     assert run("export", store.directory, "--csv", store.directory / "x.csv") == 0
     assert run("index", store.directory) == 0
@@ -189,8 +189,8 @@ async def test_words_of_a_match_do_nothing_to_the_terminal(store: Store, capsys:
     found = Experiment.model_validate({"name": "e", "fixed": {"model": "scripted"}, "factors": {
         "task": [{"name": EVIL, "task": "3s5z"}]}})  # fmt: skip
     matches: list[PlannedMatch] = plan(found)
-    runner = Runner(found, store, MadeEngine(), Budget())
+    runner = Runner(found, store, MadeEngine(), ExperimentBudget())
     with Watcher(stderr_console(), runner, matches, EVIL) as watcher:
-        watcher(Event("begins", matches[0]))
-        watcher(Event("ends", matches[0], unread(matches[0], 1, EVIL, None), EVIL))
+        watcher(RunnerEvent("begins", matches[0]))
+        watcher(RunnerEvent("ends", matches[0], unread(matches[0], 1, EVIL, None), EVIL))
     assert visible(capsys).count("owned") >= 2

@@ -14,8 +14,8 @@ import yaml
 
 from khala.experiment.engine import MATCH_MB, Local
 from khala.experiment.plan import plan
-from khala.experiment.runner import Event, Runner
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.runner import Runner, RunnerEvent
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_protocol.errors import ConfigError
@@ -77,11 +77,11 @@ def ray(cluster: Any, **options: Any) -> Any:
 
 
 async def run(
-    directory: Path, engine: Engine, found: Experiment, see: Callable[[Event], None] = lambda _: None
+    directory: Path, engine: Engine, found: Experiment, see: Callable[[RunnerEvent], None] = lambda _: None
 ) -> Store:
     store = Store(directory / found.name)
     async with engine:
-        runner = Runner(found, store, engine, Budget(), see=see)
+        runner = Runner(found, store, engine, ExperimentBudget(), see=see)
         await runner.play(plan(found))
     return store
 
@@ -123,7 +123,7 @@ async def test_matches_on_two_nodes_ask_a_model_together_no_more_often_than_its_
         found = experiment(factors={"player": [{"name": "limited", "model": str(file)}]}, seeds=2)
         store = await run(tmp_path, engine := ray(cluster, recordings=f"file://{shared}"), found)
     assert engine.slots == 2
-    assert [played.state for played in store.played().values()] == ["done"] * 2
+    assert [played.state for played in store.matches().values()] == ["done"] * 2
 
     assert endpoint.most_at_once == 1
     first, *_ = times = sorted(endpoint.times)
@@ -131,7 +131,7 @@ async def test_matches_on_two_nodes_ask_a_model_together_no_more_often_than_its_
     for number, at in enumerate(times, 1):
         assert number <= PER_MINUTE * (1 + (at - first) / 60) + 1, "one for how late the first one arrived"
 
-    for key, played in store.played().items():
+    for key, played in store.matches().items():
         assert (shared / key / "recording.mcap").read_bytes() == (store.directory / played.recording).read_bytes()
 
 
@@ -140,15 +140,15 @@ async def test_when_a_node_is_killed_every_match_is_played_once_with_the_results
 ) -> None:
     found = experiment(seeds=6)
     doomed = [node(cluster, cores=2)]
-    seen: list[Event] = []
+    seen: list[RunnerEvent] = []
 
-    def see(event: Event) -> None:
+    def see(event: RunnerEvent) -> None:
         seen.append(event)
         if event.what == "ends" and doomed:  # three of four are being played, so that one at least is on this node
             cluster.remove_node(doomed.pop(), allow_graceful=False)
 
     store = await run(tmp_path / "ray", ray(cluster, slots=4), found, see)
-    played = store.played()
+    played = store.matches()
     assert (len(played), {one.state for one in played.values()}) == (12, {"done"})
     assert sorted(event.match.key for event in seen if event.what == "ends") == sorted(played)
     lost = [event for event in seen if event.what == "again"]
@@ -176,7 +176,7 @@ async def test_ctrl_c_ends_ray_on_this_machine_and_keeps_what_was_played(tmp_pat
     said.append(await process.stderr.read())
     assert await process.wait() == 128 + signal.SIGINT
     assert b"interrupted: " in said[1]
-    assert {played.state for played in Store(tmp_path / "many").played().values()} == {"done"}
+    assert {played.state for played in Store(tmp_path / "many").matches().values()} == {"done"}
 
 
 @pytest.mark.parametrize(

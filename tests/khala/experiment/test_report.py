@@ -13,11 +13,8 @@ from typer.testing import CliRunner
 from khala.cli import app
 from khala.experiment.plan import plan
 from khala.experiment.report import FORMATS, report, write
-from khala.experiment.report import html as as_html
-from khala.experiment.report import latex as as_latex
-from khala.experiment.report import markdown as as_markdown
 from khala.experiment.report.calls import calls
-from khala.experiment.report.document import Document, Section, Table
+from khala.experiment.report.document import ReportDocument, ReportSection, ReportTable
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.handmade import CARD, HandMade
 from tests.khala.experiment.made import record
@@ -36,13 +33,13 @@ def made(tmp_path: Path) -> HandMade:
     return made
 
 
-def table(made: HandMade, title: str, **given: Any) -> Table:
+def table(made: HandMade, title: str, **given: Any) -> ReportTable:
     tables = (table for section in report(made.store, **given).document.sections for table in section.tables)
     found = {table.title: table for table in tables}
     return found[title]
 
 
-def row(table: Table, *where: str) -> dict[str, str]:
+def row(table: ReportTable, *where: str) -> dict[str, str]:
     texts = next(row for row in table.rows if row[: len(where)] == where)
     return dict(zip(table.columns, texts, strict=True))
 
@@ -218,14 +215,14 @@ class Page(HTMLParser):
 
 
 @pytest.fixture
-def hostile(made: HandMade) -> Document:
+def hostile(made: HandMade) -> ReportDocument:
     made.add({"task": HOSTILE, "player": "skilled"}, 1, card={"game": HOSTILE})
     made.add({"task": HOSTILE, "player": "focus"}, 2, state="crashed", cause=HOSTILE)
     return report(made.store).document
 
 
-def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
-    text = as_html.text(hostile)
+def test_html_is_one_page_that_loads_nothing(hostile: ReportDocument) -> None:
+    text = FORMATS["html"].text(hostile)
     page = Page()
     page.feed(text)
     page.close()
@@ -239,8 +236,8 @@ def test_html_is_one_page_that_loads_nothing(hostile: Document) -> None:
     assert "\u202e" not in text
 
 
-def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
-    text = as_latex.text(hostile)
+def test_latex_is_balanced_and_escaped(hostile: ReportDocument) -> None:
+    text = FORMATS["latex"].text(hostile)
     bare = re.sub(r"\\[\\{}$&#_%]", "", text)
     assert bare.count("{") == bare.count("}")
     assert bare.count("$") % 2 == 0
@@ -256,8 +253,8 @@ def test_latex_is_balanced_and_escaped(hostile: Document) -> None:
     assert rows
 
 
-def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> None:
-    text = as_markdown.text(hostile)
+def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: ReportDocument) -> None:
+    text = FORMATS["markdown"].text(hostile)
     tables = [part for part in text.split("\n\n") if part.startswith("|")]
     widths = [{len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()} for table in tables]
     assert len(widths) > 3
@@ -266,8 +263,10 @@ def test_markdown_has_rows_of_as_many_cells_as_columns(hostile: Document) -> Non
 
 
 def test_documents_are_plain_until_a_format_writes_them() -> None:
-    document = Document("a_b", (), ("50 % & more",), (Section("c", tables=(Table("t", ("x",), (("<1",),), 1),)),))
-    texts = [one.text(document) for one in FORMATS.values()]
+    document = ReportDocument(
+        "a_b", (), ("50 % & more",), (ReportSection("c", tables=(ReportTable("t", ("x",), (("<1",),), 1),)),)
+    )
+    texts = [writer.text(document) for writer in FORMATS.values()]
     escaped = (("a\\_b", "50 % \\& more", "\\<1"), (r"a\_b", r"50 \% \& more", r"\textless{}1"),
                ("a_b", "50 % &amp; more", "&lt;1"))  # fmt: skip
     for text, words in zip(texts, escaped, strict=True):
@@ -281,7 +280,7 @@ def test_pictures_stand_beside_markdown_and_latex_and_are_the_same_each_time(mad
         "report.md", "report.tex", "report.html", "win_rate.png", "kd.png", "win_rate.pdf", "kd.pdf",
     ]  # fmt: skip
     assert (tmp_path / "out" / "kd.png").read_bytes().startswith(b"\x89PNG")
-    assert as_html.text(document) == as_html.text(report(made.store).document)
+    assert FORMATS["html"].text(document) == FORMATS["html"].text(report(made.store).document)
 
 
 def test_the_command_writes_the_formats_and_prints_numbers(made: HandMade, tmp_path: Path) -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.experiment.plan import plan
-from khala.experiment.runner import Event, Runner, pilot_of
-from khala.experiment.spec import Budget, Experiment
+from khala.experiment.runner import Runner, RunnerEvent, pilot_of
+from khala.experiment.spec import Experiment, ExperimentBudget
 from khala.experiment.store import Store
-from khala_agents.llm.money import Ledger
+from khala_agents.llm.money import MoneyLedger
 from khala_protocol.errors import ConfigError
 from tests.khala.experiment.made import MadeEngine, record
 
@@ -34,13 +34,13 @@ def store(tmp_path: Path) -> Store:
 
 async def run(store: Store, engine: MadeEngine, found: Experiment | None = None, **budget: Any) -> Runner:
     found = found or experiment()
-    runner = Runner(found, store, engine, Budget(**budget))
+    runner = Runner(found, store, engine, ExperimentBudget(**budget))
     await runner.play(plan(found))
     return runner
 
 
 def states(store: Store) -> list[str]:
-    return [played.state for played in store.played().values()]
+    return [played.state for played in store.matches().values()]
 
 
 async def test_every_match_is_played_once_and_a_second_run_plays_nothing(store: Store) -> None:
@@ -60,7 +60,7 @@ async def test_a_grown_grid_plays_only_what_is_new(store: Store) -> None:
 
 
 async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(store: Store) -> None:
-    seen: list[Event] = []
+    seen: list[RunnerEvent] = []
     always, once = (match.key for match in plan(experiment())[:2])
 
     def ends(job: Job, attempt: int) -> str:
@@ -68,9 +68,9 @@ async def test_a_crashed_match_is_played_again_and_counted_apart_in_the_end(stor
         return "lost" if key == always or (key == once and attempt == 1) else "done"
 
     found = experiment()
-    runner = Runner(found, store, MadeEngine(ends=ends), Budget(), see=seen.append)
+    runner = Runner(found, store, MadeEngine(ends=ends), ExperimentBudget(), see=seen.append)
     await runner.play(plan(found))
-    played = store.played()
+    played = store.matches()
     assert (played[always].state, played[always].cause, played[always].attempts) == ("crashed", "crash", 3)
     assert (played[once].state, played[once].attempts) == ("done", 2)
     assert [event.what for event in seen if event.match.key == always and event.what != "begins"] == [
@@ -90,19 +90,19 @@ async def test_matches_of_a_model_that_is_refused_for_good_are_not_begun_any_mor
 async def test_a_match_whose_recording_is_lost_has_cost_what_its_ledger_says(store: Store) -> None:
     def ends(job: Job, _: int) -> str:
         assert job.config.record is not None
-        with Ledger(job.config.record.with_suffix(".ledger")) as ledger:
+        with MoneyLedger(job.config.record.with_suffix(".ledger")) as ledger:
             ledger.pay("blue", 0.25)
             ledger.hold("blue", 0.125, None)
         return "nothing"
 
     runner = await run(store, MadeEngine(ends=ends), experiment(seeds=1, retries=0), usd=9.0)
     assert runner.spent.usd == pytest.approx(2 * 0.375)
-    assert Runner(experiment(), store, MadeEngine(), Budget(usd=9.0)).spent.usd == pytest.approx(2 * 0.375)
+    assert Runner(experiment(), store, MadeEngine(), ExperimentBudget(usd=9.0)).spent.usd == pytest.approx(2 * 0.375)
 
 
 async def test_a_match_without_any_recording_is_known_as_crashed(store: Store) -> None:
     await run(store, MadeEngine(ends=lambda _job, _try: "nothing"), experiment(seeds=1, retries=0))
-    assert [(one.state, one.recording) for one in store.played().values()] == [("crashed", "")] * 2
+    assert [(one.state, one.recording) for one in store.matches().values()] == [("crashed", "")] * 2
 
 
 async def test_a_lost_match_is_a_result_and_one_without_a_model_is_not(store: Store) -> None:
@@ -110,7 +110,7 @@ async def test_a_lost_match_is_a_result_and_one_without_a_model_is_not(store: St
         return "invalid" if job.config.seed == 1 else "done"
 
     await run(store, MadeEngine(ends=ends))
-    assert [(one.seed, one.state, one.cause) for one in store.played().values()] == [
+    assert [(one.seed, one.state, one.cause) for one in store.matches().values()] == [
         (1, "invalid", "A never decided"), (1, "invalid", "A never decided"), *[(s, "done", "") for s in (2, 2, 3, 3)],
     ]  # fmt: skip
     assert {row["outcome"] for row in store.results() if row["state"] == "done"} == {"win", "loss"}
@@ -120,15 +120,15 @@ async def test_a_lost_match_is_a_result_and_one_without_a_model_is_not(store: St
 async def test_the_budget_is_never_exceeded(store: Store, slots: int, price: float) -> None:
     engine = MadeEngine(slots=slots, cost_usd=lambda job: price * (1 + job.config.seed % 3))
     runner = await run(store, engine, usd=1.9)
-    assert 0 < sum(one.cost_usd or 0.0 for one in store.played().values()) <= 1.9 + 1e-9
-    assert runner.spent.usd == pytest.approx(sum(one.cost_usd or 0.0 for one in store.played().values()))
+    assert 0 < sum(one.cost_usd or 0.0 for one in store.matches().values()) <= 1.9 + 1e-9
+    assert runner.spent.usd == pytest.approx(sum(one.cost_usd or 0.0 for one in store.matches().values()))
     assert runner.spent.held_usd == pytest.approx(0.0)
     assert not runner.stopped or "USD" in runner.stopped
 
 
 async def test_a_match_whose_money_went_is_not_valid(store: Store) -> None:
     await run(store, MadeEngine(slots=1, cost_usd=lambda _: 1.0), experiment(seeds=1), usd=0.5)
-    assert [(one.state, one.cause) for one in store.played().values()] == [("invalid", "budget")]
+    assert [(one.state, one.cause) for one in store.matches().values()] == [("invalid", "budget")]
 
 
 async def test_no_further_match_is_begun_with_less_than_was_not_enough(store: Store) -> None:
@@ -181,28 +181,31 @@ async def test_what_crashed_tries_have_cost_counts(store: Store) -> None:
 
     runner = await run(store, MadeEngine(ends=ends, cost_usd=lambda _: 0.25), experiment(seeds=1))
     assert runner.spent.usd == pytest.approx(2 * 3 * 0.25)
-    assert Runner(experiment(), store, MadeEngine(), Budget()).spent.usd == pytest.approx(1.5)
+    assert Runner(experiment(), store, MadeEngine(), ExperimentBudget()).spent.usd == pytest.approx(1.5)
 
 
 async def test_the_money_of_a_runner_that_was_killed_counts(store: Store) -> None:
     match = plan(experiment())[0]
     path = store.recording_for(match.key)
     record(path, match.config, cost_usd=0.5, result=False)
-    runner = Runner(experiment(), store, MadeEngine(), Budget())
+    runner = Runner(experiment(), store, MadeEngine(), ExperimentBudget())
     assert runner.spent.usd == 0.5
-    assert [(one.state, one.cause) for one in store.played().values()] == [("crashed", "interrupted")]
+    assert [(one.state, one.cause) for one in store.matches().values()] == [("crashed", "interrupted")]
 
 
 async def test_budgets_of_tokens_and_of_time(store: Store) -> None:
     runner = await run(store, MadeEngine(slots=1), tokens=3_500)
-    assert (len(store.played()), "3500 tokens" in runner.stopped) == (3, True)
+    assert (len(store.matches()), "3500 tokens" in runner.stopped) == (3, True)
 
 
 async def test_the_pilot_estimates_the_rest(store: Store) -> None:
     found = experiment(seeds=20)
     matches = plan(found)
     runner = Runner(
-        found, store, MadeEngine(cost_usd=lambda job: 0.1 if job.config.task.name == "3s5z" else 0.3), Budget()
+        found,
+        store,
+        MadeEngine(cost_usd=lambda job: 0.1 if job.config.task.name == "3s5z" else 0.3),
+        ExperimentBudget(),
     )
     await runner.play(pilot_of(matches, 2))
     estimate = runner.estimate(matches)
@@ -217,16 +220,16 @@ async def test_the_index_is_made_again_of_the_recordings(store: Store) -> None:
 
     found = experiment()
     await run(store, MadeEngine(ends=ends), found)
-    before, rows = store.played(), store.results()
+    before, rows = store.matches(), store.results()
     assert store.rebuild() == len(before)
-    assert store.played() == before
+    assert store.matches() == before
     assert sorted(store.results(), key=str) == sorted(rows, key=str)
 
 
 async def test_two_runners_do_not_share_a_directory(store: Store) -> None:
     store.directory.mkdir()
-    other = Store(store.directory).locked()
-    with store.locked(), pytest.raises(ConfigError, match="another process plays the experiment"):
+    other = Store(store.directory).lock()
+    with store.lock(), pytest.raises(ConfigError, match="another process plays the experiment"):
         other.__enter__()
 
 
@@ -238,10 +241,10 @@ def test_the_pilot_has_some_of_each_cell() -> None:
 
 
 async def test_who_is_cancelled_leaves_what_was_played(store: Store) -> None:
-    found, seen = experiment(), asyncio.Queue[Event]()
-    runner = Runner(found, store, MadeEngine(slots=1), Budget(), see=seen.put_nowait)
+    found, seen = experiment(), asyncio.Queue[RunnerEvent]()
+    runner = Runner(found, store, MadeEngine(slots=1), ExperimentBudget(), see=seen.put_nowait)
     playing = asyncio.create_task(runner.play(plan(found)))
-    while len(store.played()) < 2:
+    while len(store.matches()) < 2:
         await seen.get()
     playing.cancel()
     await asyncio.gather(playing, return_exceptions=True)

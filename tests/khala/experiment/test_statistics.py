@@ -21,6 +21,7 @@ from statsmodels.stats.proportion import (  # type: ignore[import-untyped]
 from bench.matches.intervals import average_coverage, bootstrap_coverage, difference_coverage, type_one_errors
 from khala.experiment.statistics import (
     Interval,
+    common_values,
     compare_paired_ratios,
     compare_paired_values,
     compare_paired_wins,
@@ -28,7 +29,6 @@ from khala.experiment.statistics import (
     compare_wins,
     difference_of_shares,
     holm,
-    matched,
     mean,
     ratio_of_sums,
     wilson,
@@ -189,7 +189,7 @@ def test_tests_that_were_not_made_are_not_counted() -> None:
 
 
 def test_games_are_matched_by_the_keys_that_both_have() -> None:
-    assert matched({1: 10.0, 2: 20.0, 3: None}, {3: 3.0, 2: 2.0, 4: 4.0}) == ([20.0, None], [2.0, 3.0])
+    assert common_values({1: 10.0, 2: 20.0, 3: None}, {3: 3.0, 2: 2.0, 4: 4.0}) == ([20.0, None], [2.0, 3.0])
 
 
 @pytest.mark.parametrize(

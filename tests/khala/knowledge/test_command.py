@@ -27,7 +27,7 @@ def said(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int,
 
 
 def test_the_files_of_facts_are_what_would_be_written_now(version: str) -> None:
-    assert files.outdated(version) == []
+    assert files.outdated_files(version) == []
 
 
 @pytest.mark.parametrize(

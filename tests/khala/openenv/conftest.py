@@ -15,7 +15,7 @@ from khala.openenv.server import app_of, server_config
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from khala.openenv.settings import Settings
+    from khala.openenv.settings import ServerSettings
 
 
 class _Server(uvicorn.Server):
@@ -25,7 +25,7 @@ class _Server(uvicorn.Server):
 
 
 @contextlib.asynccontextmanager
-async def _serving(settings: Settings | None = None, **options: Any) -> AsyncIterator[str]:
+async def _serving(settings: ServerSettings | None = None, **options: Any) -> AsyncIterator[str]:
     """Yield the address of a server; sessions that are open at its end are closed."""
     app = app_of(settings, **options)
     with socket.create_server(("127.0.0.1", 0)) as listening:

@@ -19,7 +19,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from khala.openenv.client import KhalaAction, KhalaEnv
-from khala.openenv.places import OVER_YIELD_S, YIELD_S, Places
+from khala.openenv.places import OVER_YIELD_S, YIELD_S, ServerPlaces
 from khala.openenv.server import (
     MOST_BODY_BYTES,
     MOST_WAITING,
@@ -29,7 +29,7 @@ from khala.openenv.server import (
     openenv_door,
     server_config,
 )
-from khala.openenv.settings import Settings
+from khala.openenv.settings import ServerSettings
 from khala_bridge.game.processes import IdleGames
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ async def test_episodes_over_http_that_their_clients_left_do_not_fill_the_server
 ) -> None:
     monkeypatch.setattr("khala.openenv.server.MOST_WAITING", 2)
     server = _Server(
-        Settings(), IdleGames(1), Places(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
+        ServerSettings(), IdleGames(1), ServerPlaces(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
     )
     made = [(await server._create_session())[0] for _ in range(20)]
     assert list(server._sessions) == made[-3:]
@@ -225,7 +225,7 @@ class Clock:
 
 async def test_a_place_is_lost_only_when_it_is_needed_and_only_by_a_session_that_is_idle() -> None:
     clock = Clock()
-    places = Places(2, clock)
+    places = ServerPlaces(2, clock)
     first, second, third = Session(), Session(), Session()
     await places.take(first)
     clock.now_s = 1
@@ -250,7 +250,7 @@ async def test_a_place_is_lost_only_when_it_is_needed_and_only_by_a_session_that
 
 async def test_a_session_whose_episode_is_over_makes_room_sooner() -> None:
     clock = Clock()
-    places = Places(2, clock)
+    places = ServerPlaces(2, clock)
     playing, over, new = Session(), Session(), Session()
     over.is_over = True
     await places.take(playing)

@@ -14,7 +14,7 @@ import uvicorn
 from openenv.core.rubrics import Rubric
 
 from khala.openenv.server import app_of
-from khala.openenv.settings import Settings
+from khala.openenv.settings import ServerSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +42,7 @@ class Letters(Rubric):
 @pytest.fixture
 def address() -> Iterator[str]:
     """Serve 2s3z in a thread."""
-    app = app_of(Settings(task="2s3z", rubric=Letters), sessions=4)
+    app = app_of(ServerSettings(task="2s3z", rubric=Letters), sessions=4)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         server = uvicorn.Server(uvicorn.Config(app, log_config=None, ws="websockets-sansio"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})

@@ -16,12 +16,12 @@ from openenv.cli.commands.validate import validate
 from openenv.core.rubrics import Rubric
 
 from khala.env.rewards import battle
-from khala.openenv.commands import Wanted, rubric_of, run_openenv, settings_of
+from khala.openenv.commands import WantedServer, rubric_of, run_openenv, settings_of
 from khala.openenv.environment import KhalaEnvironment
 from khala.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
 from khala.openenv.rubrics import Battle
 from khala.openenv.server import app_of
-from khala.openenv.settings import Settings
+from khala.openenv.settings import ServerSettings
 from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Casualties, Report, Result
@@ -67,7 +67,7 @@ async def test_there_is_no_step_before_a_reset_and_nothing_after_the_end() -> No
 
 
 def test_a_session_plays_the_first_side_unless_it_names_another_agent() -> None:
-    settings = Settings(task="duel_3m", allowed=("openai",))
+    settings = ServerSettings(task="duel_3m", allowed=("openai",))
     assert settings.match(ResetOptions()).match.seats == (Seat("blue", "Captain"),)
     red = ResetOptions(agents=["red/Captain"], others="focus-fire", max_steps=7, seed=9)
     match, config = settings.match(red)
@@ -167,12 +167,12 @@ def test_a_user_gives_a_rubric_by_name(rewards: str) -> None:
 # --- the command --------------------------------------------------------------------------------------
 
 
-def wanted(**changes: Any) -> Wanted:
+def wanted(**changes: Any) -> WantedServer:
     plain: dict[str, Any] = {
         "task": "2s3z_pair", "host": "127.0.0.1", "port": 0, "sessions": 8, "idle_s": 60.0, "others": "skilled",
         "allow": (), "rubric": None, "game": "simulator", "out": None,
     }  # fmt: skip
-    return Wanted(**plain | changes)
+    return WantedServer(**plain | changes)
 
 
 def test_the_command_finds_what_is_wrong_before_it_serves() -> None:

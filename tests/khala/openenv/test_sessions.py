@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from khala.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
-from khala.openenv.settings import Settings
+from khala.openenv.settings import ServerSettings
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.messages import Observation, Reply
 from khala_protocol.recording import Recording
@@ -49,7 +49,7 @@ def untimed(seen: list[KhalaObservation]) -> list[KhalaObservation]:
 
 
 async def test_a_team_plays_over_a_websocket_what_the_host_recorded(serving: Serving, tmp_path: Path) -> None:
-    async with serving(Settings(out=tmp_path)) as address, KhalaEnv(address) as env:
+    async with serving(ServerSettings(out=tmp_path)) as address, KhalaEnv(address) as env:
         seen = await played(env, seed=3, max_steps=3, images="screen", episode_id="first")
         state = await env.state()
         then = (await env.reset(max_steps=3, images="screen")).observation

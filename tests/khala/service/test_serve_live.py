@@ -113,7 +113,7 @@ async def test_matches_are_played_side_by_side_and_survive_a_worker_and_the_end(
         (worker,) = [p for p in service.below("khala.playing.worker") if _is_playing(p)]
         worker.kill()
         await service.step("long")
-        card = client.find(await client.listed(service.bus), "long")
+        card = client.find(await client.list_matches(service.bus), "long")
         assert (card.state, card.starts) == ("running", 2)
         stopped = await client.stop(service.bus, Stop(run="long", number=client.new_number()), within_s=WITHIN_S)
         assert stopped.state == "stopped"
@@ -158,7 +158,7 @@ async def test_with_tls_a_host_orders_and_an_observer_only_looks_on(tmp_path: Pa
         with pytest.raises(client.NoService, match="only the certificate of a host may give orders"):
             await client.submit(onlooker, order("theirs", 3), within_s=3)
         await service.submit("ours", 3)
-        assert [card.run for card in (await client.listed(onlooker)).matches] == ["ours"]
+        assert [card.run for card in (await client.list_matches(onlooker)).matches] == ["ours"]
         seen: list[Wire] = []
         async with asyncio.timeout(WITHIN_S):
             card = await client.watch(onlooker, "ours", seen.append)

@@ -115,7 +115,7 @@ class Stage:
 
     async def card(self, run: str) -> MatchCard:
         await asyncio.sleep(1)
-        return client.find(await client.listed(self.bus), run)
+        return client.find(await client.list_matches(self.bus), run)
 
     async def report(self, run: str, step: int) -> None:
         usage = Usage(requests=1, cost_usd=0.25)
@@ -155,7 +155,7 @@ async def test_the_same_order_twice_is_one_match(stage: Stage) -> None:
     await client.submit(stage.bus, wanted)
     stage.playing["first"].end("done")
     assert (await client.submit(stage.bus, wanted)).number == wanted.number
-    assert len((await client.listed(stage.bus)).matches) == len(stage.begun) == 1
+    assert len((await client.list_matches(stage.bus)).matches) == len(stage.begun) == 1
 
 
 async def test_owners_take_turns(stage: Stage) -> None:
@@ -235,7 +235,7 @@ async def test_a_name_that_cannot_be_one_is_refused_and_not_listed_at_length(sta
     wanted = order("first").model_copy(update={"run": "x/" * 10_000})
     with pytest.raises(Refused, match="cannot stand in a key"):
         await client.submit(stage.bus, wanted)
-    assert len((await client.listed(stage.bus)).matches[0].run) == 64
+    assert len((await client.list_matches(stage.bus)).matches[0].run) == 64
 
 
 async def test_an_order_that_breaks_the_reader_is_refused_and_the_service_goes_on(
@@ -289,7 +289,7 @@ async def test_refused_orders_do_not_push_out_what_was_played(tmp_path: Path) ->
         for number in range(2 * KEPT):
             stage.service.book.refuse(order(f"flood-{number}"), "no place")
         assert (await stage.card("played")).state == "done"
-        assert len((await client.listed(stage.bus)).matches) == KEPT + 1
+        assert len((await client.list_matches(stage.bus)).matches) == KEPT + 1
 
 
 async def test_a_name_that_is_in_use_and_a_full_queue_are_refused(tmp_path: Path) -> None:
@@ -306,7 +306,7 @@ async def test_bytes_that_are_no_order_change_nothing(stage: Stage) -> None:
     for payload in (b"", b"{}", b"x" * (MAX_ORDER_BYTES + 1), encode(Stop(run="first", number="other"))):
         publisher = await stage.bus.publisher("khala/service/order/mine", Delivery.SPEECH)
         await publisher.put(payload)
-    assert (await client.listed(stage.bus)).matches == ()
+    assert (await client.list_matches(stage.bus)).matches == ()
 
 
 async def test_a_match_is_stopped_while_it_waits_and_while_it_plays(stage: Stage) -> None:
@@ -399,4 +399,4 @@ async def test_who_watches_sees_the_reports_until_the_match_is_over(stage: Stage
 
 async def test_without_a_service_the_client_says_so() -> None:
     with pytest.raises(NoService, match="no service answers here within 15 s: `khala serve` starts one"):
-        await client.listed(MemoryBroker().session())
+        await client.list_matches(MemoryBroker().session())

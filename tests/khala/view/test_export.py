@@ -49,7 +49,7 @@ def test_it_has_the_answers_of_the_server(tmp_path: Path) -> None:
     assert answers[f"{run}/episodes/0/scenes?from=16&to=31"] == json.loads(server.scenes(0, 16, 31))
     for step in (0, STEPS - 1):
         assert answers[f"{run}/episodes/0/steps/{step}"] == json.loads(server.moment(0, step))
-        asked = json.loads(server.asked(0, step, "blue", AGENT))
+        asked = json.loads(server.texts(0, step, "blue", AGENT))
         assert answers[f"{run}/episodes/0/steps/{step}/agents/blue/{AGENT}"] == asked
     (picture,) = (answer for name, answer in answers.items() if "/images/" in name)
     assert picture.startswith("data:image/png;base64,")

@@ -168,7 +168,7 @@ def test_a_torn_recording_is_indexed_up_to_the_tear(path: Path) -> None:
     assert readable == 20
     assert found.index.rows("select count(*) from sample where topic = 'observation'") == [(readable,)]
     assert found.line().complete is False
-    assert found.indexed() == 1.0
+    assert found.indexed_share() == 1.0
 
 
 def test_a_damaged_recording_is_indexed_up_to_the_damage(path: Path) -> None:
@@ -179,7 +179,7 @@ def test_a_damaged_recording_is_indexed_up_to_the_damage(path: Path) -> None:
     index_path(path).unlink()
     found = opened(path)
     assert found.index.meta("broken")
-    assert found.indexed() == 1.0
+    assert found.indexed_share() == 1.0
     assert 0 < len(found.index.rows("select * from step")) < STEPS
 
 

@@ -13,7 +13,7 @@ import pytest
 from khala.view import library, serve
 from khala.view.cli import view
 from khala.view.library import found_in, lines, read_head, run_id
-from khala.view.serve import PASSWORD, Look, door_of, is_near, password_of
+from khala.view.serve import PASSWORD, ViewOptions, door_of, is_near, password_of
 from khala.view.sources import Sources, find
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording, summary
@@ -136,7 +136,7 @@ def test_without_runs_the_command_says_what_to_do(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_only_this_machine_may_look_without_a_password(host: str, near: bool) -> None:
     assert is_near(host) is near
-    look = Look(given=(), host=host)
+    look = ViewOptions(given=(), host=host)
     if near:
         assert door_of(look).is_near
     else:
@@ -149,12 +149,12 @@ def test_a_password_comes_from_a_file_or_the_environment_or_is_asked_for(
 ) -> None:
     file = tmp_path / "password"
     file.write_text("from a file\nnot this\n")
-    assert password_of(Look(given=())) == ""
-    assert password_of(Look(given=(), password_file=file)) == "from a file"
+    assert password_of(ViewOptions(given=())) == ""
+    assert password_of(ViewOptions(given=(), password_file=file)) == "from a file"
     monkeypatch.setenv(PASSWORD, "from the environment")
-    assert password_of(Look(given=())) == "from the environment"
+    assert password_of(ViewOptions(given=())) == "from the environment"
     monkeypatch.setattr(serve, "getpass", lambda prompt: f"typed at {prompt}")
-    assert password_of(Look(given=(), asks_password=True)) == "typed at Password: "
+    assert password_of(ViewOptions(given=(), asks_password=True)) == "typed at Password: "
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_password_file_that_holds_none_is_refused(tmp_path: Path, written: byt
     if written is not None:
         file.write_bytes(written)
     with pytest.raises(ConfigError, match=f"^--password-file: .*{says}"):
-        password_of(Look(given=(), password_file=file))
+        password_of(ViewOptions(given=(), password_file=file))
 
 
 def test_no_option_holds_a_password_that_others_could_read_in_the_list_of_processes() -> None:

@@ -15,7 +15,7 @@ from khala.view.guard import policy_of, view_door
 from khala.view.library import run_id
 from khala.view.server import NO_PAGE, Server
 from khala.view.sources import Sources
-from khala.view.wire import MOST_SCENES, Asked, Library, Moment, Progress, RunView, Scenes, Timeline
+from khala.view.wire import MOST_SCENES, DecisionTexts, Library, RecordingProgress, RunView, Scenes, StepView, Timeline
 from khala_protocol.codec import encode
 from khala_protocol.messages import Scene, Terrain
 from khala_protocol.recording import Recorder
@@ -49,7 +49,7 @@ class Browser:
         """Wait until the recording is indexed."""
         async with self.session.ws_connect(f"{self.base}/api/runs/{self.run}/live", origin=self.base) as socket:
             async for message in socket:
-                if Progress.model_validate_json(message.data).indexed >= 1.0:
+                if RecordingProgress.model_validate_json(message.data).indexed >= 1.0:
                     return
 
 
@@ -88,7 +88,7 @@ async def test_every_answer_is_what_its_model_says(path: Path) -> None:
         models: dict[str, type[BaseModel]] = {
             "/api/library": Library, run: RunView, f"{run}/episodes/0/timeline": Timeline,
             f"{run}/episodes/0/terrain": Terrain, f"{run}/episodes/0/scenes?from=0&to=15": Scenes,
-            f"{run}/episodes/0/steps/7": Moment, f"{run}/episodes/0/steps/7/agents/blue/{AGENT}": Asked,
+            f"{run}/episodes/0/steps/7": StepView, f"{run}/episodes/0/steps/7/agents/blue/{AGENT}": DecisionTexts,
         }  # fmt: skip
         for name, model in models.items():
             status, text = await page.get(name)
@@ -280,13 +280,13 @@ async def test_a_growing_recording_says_that_there_is_more(tmp_path: Path) -> No
         async with browser(growing) as page:
             await page.enter()
             async with page.session.ws_connect(f"{page.base}/api/runs/{page.run}/live", origin=page.base) as socket:
-                first = Progress.model_validate_json((await socket.receive(timeout=10)).data)
+                first = RecordingProgress.model_validate_json((await socket.receive(timeout=10)).data)
                 assert first.live
                 for step in (1, 2):
                     put(recorder, *step_of(step))
                     said = first
                     while said.steps < step + 1:
-                        said = Progress.model_validate_json((await socket.receive(timeout=10)).data)
+                        said = RecordingProgress.model_validate_json((await socket.receive(timeout=10)).data)
                     assert said.lag_s is not None
                     assert (await page.get(f"/api/runs/{page.run}/episodes/0/steps/{step}"))[0] == 200
 

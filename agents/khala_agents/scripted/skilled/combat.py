@@ -163,7 +163,7 @@ def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> N
     hurt = [
         unit
         for unit in plan.team.own
-        if unit.share < HURT and (unit.tag in hit or _caught(unit, foes)) and _pressed(unit, foes)
+        if unit.share < HURT and (unit.tag in hit or _caught(unit, foes)) and _is_pressed(unit, foes)
     ]
     if len(plan.team.own) > 1 and len(hurt) == len(plan.team.own):
         return  # no unit would be left to fight
@@ -208,7 +208,7 @@ def _caught(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
     return any(kind_of(foe).melee and _gap(foe, unit) < 1.0 for foe in foes)
 
 
-def _pressed(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
+def _is_pressed(unit: TextUnit, foes: Sequence[TextUnit]) -> bool:
     foe = nearest(unit, foes)
     return foe is not None and distance(unit, foe) < max(IN_DANGER, kind_of(foe).reach + 1.5)
 

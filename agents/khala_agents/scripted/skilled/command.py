@@ -16,7 +16,7 @@ from khala_agents.scripted.writing import point
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_agents.scripted.reading import ArmyPart, Point, Situation
+    from khala_agents.scripted.reading import ArmyGroup, Point, Situation
     from khala_agents.scripted.skilled.plan import ReplyPlan
 
 STRONG = 40.0
@@ -77,7 +77,7 @@ def marching_orders(situation: Situation) -> list[tuple[str, str]]:
     out = math.dist(army, target or MAP_MIDDLE) < math.dist(army, home)
     names = list(dict.fromkeys(group.agent for group in groups if group.agent in situation.correspondents))
     if attacks(situation, out=out):
-        hidden = _unwatched(situation) or [MAP_MIDDLE]
+        hidden = _hiding_places(situation) or [MAP_MIDDLE]
         first = int(situation.time_s / HUNT_S)
         goals = [target or hidden[(first + number) % len(hidden)] for number in range(len(names))]
         form = "Attack {}."
@@ -105,7 +105,7 @@ def _is_due(situation: Situation, agent: str, goal: Point) -> bool:
     return (astray > 0 or not obey) and situation.time_s % often < 2
 
 
-def _obeys(part: ArmyPart, goal: Point) -> bool:
+def _obeys(part: ArmyGroup, goal: Point) -> bool:
     """Return whether a part of the army is at a place, on its way there, or fights what is in its way."""
     if math.dist(part.at, goal) <= AROUND:
         return True
@@ -129,7 +129,7 @@ def _target(situation: Situation, army: Point) -> Point | None:
     return None if situation.places else (2 * MAP_MIDDLE[0] - army[0], 2 * MAP_MIDDLE[1] - army[1])
 
 
-def _unwatched(situation: Situation) -> list[Point]:
+def _hiding_places(situation: Situation) -> list[Point]:
     """Return where the last structures may be hidden: places out of sight, and points all over the map."""
     named = [place.at for place in situation.places if not re.search("yours|in sight", place.about)]
     x0, y0, x1, y1 = situation.playable

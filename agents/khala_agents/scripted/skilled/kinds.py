@@ -18,7 +18,7 @@ NONE = -1.0
 """Range of a missing weapon."""
 
 
-class Kind(NamedTuple):
+class UnitKind(NamedTuple):
     """A unit type; ranges in world units from edge to edge, damage and speed per second."""
 
     ground: float = 5.0
@@ -36,7 +36,7 @@ class Kind(NamedTuple):
         """The longest range."""
         return max(self.ground, self.air)
 
-    def hits(self, other: Kind) -> bool:
+    def hits(self, other: UnitKind) -> bool:
         """Return whether its weapon can be aimed at another type."""
         return (self.air if other.flying else self.ground) >= 0
 
@@ -47,82 +47,82 @@ class Kind(NamedTuple):
 
 
 _GROUND = {
-    "Zealot": Kind(0.1, NONE, 18, 3.15),
-    "Stalker": Kind(6, 6, 10, 4.13),
-    "Sentry": Kind(5, 5, 8, 3.15),
-    "Adept": Kind(4, NONE, 8, 3.5),
-    "AdeptPhaseShift": Kind(NONE, NONE, 0, 3.5, role="support"),
-    "HighTemplar": Kind(6, NONE, 40, 2.8),
-    "DarkTemplar": Kind(0.1, NONE, 37, 3.9),
-    "Archon": Kind(3, 3, 20, 3.9),
-    "Immortal": Kind(6, NONE, 35, 3.15),
-    "Colossus": Kind(7, NONE, 30, 3.15),
-    "Disruptor": Kind(NONE, NONE, 40, 3.15),
-    "Marine": Kind(5, 5, 10, 3.15),
-    "Marauder": Kind(6, NONE, 12, 3.15),
-    "Reaper": Kind(5, NONE, 10, 5.2),
-    "Ghost": Kind(6, 6, 20, 3.9),
-    "Hellion": Kind(5, NONE, 8, 5.9),
-    "Hellbat": Kind(2, NONE, 13, 3.15),
-    "WidowMine": Kind(NONE, NONE, 20, 3.9),
-    "WidowMineBurrowed": Kind(5, 5, 60, 0),
-    "SiegeTank": Kind(7, NONE, 25, 3.15),
-    "SiegeTankSieged": Kind(13, NONE, 40, 0),
-    "Cyclone": Kind(5, 5, 18, 4.7),
-    "Thor": Kind(7, 11, 60, 2.6),
-    "ThorHighImpactMode": Kind(7, 11, 60, 2.6),
-    "VikingAssault": Kind(6, NONE, 17, 3.15),
-    "Zergling": Kind(0.1, NONE, 10, 4.1),
-    "Baneling": Kind(0.1, NONE, 25, 3.5),
-    "Roach": Kind(4, NONE, 11, 3.15),
-    "Ravager": Kind(6, NONE, 16, 3.85),
-    "Hydralisk": Kind(5, 5, 22, 3.15),
-    "LurkerBurrowed": Kind(8, NONE, 30, 0),
-    "Lurker": Kind(NONE, NONE, 25, 4.1),
-    "Queen": Kind(5, 7, 11, 1.3),
-    "Infestor": Kind(NONE, NONE, 30, 3.15),
-    "SwarmHost": Kind(NONE, NONE, 20, 3.15),
-    "Locust": Kind(3, NONE, 12, 2.6),
-    "Ultralisk": Kind(1, NONE, 55, 4.1),
-    "Broodling": Kind(0.1, NONE, 5, 5.4),
+    "Zealot": UnitKind(0.1, NONE, 18, 3.15),
+    "Stalker": UnitKind(6, 6, 10, 4.13),
+    "Sentry": UnitKind(5, 5, 8, 3.15),
+    "Adept": UnitKind(4, NONE, 8, 3.5),
+    "AdeptPhaseShift": UnitKind(NONE, NONE, 0, 3.5, role="support"),
+    "HighTemplar": UnitKind(6, NONE, 40, 2.8),
+    "DarkTemplar": UnitKind(0.1, NONE, 37, 3.9),
+    "Archon": UnitKind(3, 3, 20, 3.9),
+    "Immortal": UnitKind(6, NONE, 35, 3.15),
+    "Colossus": UnitKind(7, NONE, 30, 3.15),
+    "Disruptor": UnitKind(NONE, NONE, 40, 3.15),
+    "Marine": UnitKind(5, 5, 10, 3.15),
+    "Marauder": UnitKind(6, NONE, 12, 3.15),
+    "Reaper": UnitKind(5, NONE, 10, 5.2),
+    "Ghost": UnitKind(6, 6, 20, 3.9),
+    "Hellion": UnitKind(5, NONE, 8, 5.9),
+    "Hellbat": UnitKind(2, NONE, 13, 3.15),
+    "WidowMine": UnitKind(NONE, NONE, 20, 3.9),
+    "WidowMineBurrowed": UnitKind(5, 5, 60, 0),
+    "SiegeTank": UnitKind(7, NONE, 25, 3.15),
+    "SiegeTankSieged": UnitKind(13, NONE, 40, 0),
+    "Cyclone": UnitKind(5, 5, 18, 4.7),
+    "Thor": UnitKind(7, 11, 60, 2.6),
+    "ThorHighImpactMode": UnitKind(7, 11, 60, 2.6),
+    "VikingAssault": UnitKind(6, NONE, 17, 3.15),
+    "Zergling": UnitKind(0.1, NONE, 10, 4.1),
+    "Baneling": UnitKind(0.1, NONE, 25, 3.5),
+    "Roach": UnitKind(4, NONE, 11, 3.15),
+    "Ravager": UnitKind(6, NONE, 16, 3.85),
+    "Hydralisk": UnitKind(5, 5, 22, 3.15),
+    "LurkerBurrowed": UnitKind(8, NONE, 30, 0),
+    "Lurker": UnitKind(NONE, NONE, 25, 4.1),
+    "Queen": UnitKind(5, 7, 11, 1.3),
+    "Infestor": UnitKind(NONE, NONE, 30, 3.15),
+    "SwarmHost": UnitKind(NONE, NONE, 20, 3.15),
+    "Locust": UnitKind(3, NONE, 12, 2.6),
+    "Ultralisk": UnitKind(1, NONE, 55, 4.1),
+    "Broodling": UnitKind(0.1, NONE, 5, 5.4),
 }
 _AIR = {
-    "Phoenix": Kind(NONE, 5, 13, 5.9),
-    "VoidRay": Kind(6, 6, 17, 3.8),
-    "Oracle": Kind(4, NONE, 24, 5.6),
-    "Carrier": Kind(8, 8, 35, 2.6),
-    "Tempest": Kind(10, 13, 17, 3.1),
-    "Mothership": Kind(7, 7, 25, 2.6),
-    "VikingFighter": Kind(NONE, 9, 14, 3.8),
-    "Liberator": Kind(NONE, 5, 8, 4.7),
-    "LiberatorAG": Kind(10, NONE, 60, 0),
-    "Banshee": Kind(6, NONE, 27, 3.8),
-    "Battlecruiser": Kind(6, 6, 50, 2.6),
-    "Mutalisk": Kind(3, 3, 12, 5.6),
-    "Corruptor": Kind(NONE, 6, 10, 4.7),
-    "BroodLord": Kind(10, NONE, 35, 2.0),
-    "Viper": Kind(NONE, NONE, 35, 4.1),
+    "Phoenix": UnitKind(NONE, 5, 13, 5.9),
+    "VoidRay": UnitKind(6, 6, 17, 3.8),
+    "Oracle": UnitKind(4, NONE, 24, 5.6),
+    "Carrier": UnitKind(8, 8, 35, 2.6),
+    "Tempest": UnitKind(10, 13, 17, 3.1),
+    "Mothership": UnitKind(7, 7, 25, 2.6),
+    "VikingFighter": UnitKind(NONE, 9, 14, 3.8),
+    "Liberator": UnitKind(NONE, 5, 8, 4.7),
+    "LiberatorAG": UnitKind(10, NONE, 60, 0),
+    "Banshee": UnitKind(6, NONE, 27, 3.8),
+    "Battlecruiser": UnitKind(6, 6, 50, 2.6),
+    "Mutalisk": UnitKind(3, 3, 12, 5.6),
+    "Corruptor": UnitKind(NONE, 6, 10, 4.7),
+    "BroodLord": UnitKind(10, NONE, 35, 2.0),
+    "Viper": UnitKind(NONE, NONE, 35, 4.1),
 }
 _SUPPORT = {
-    "WarpPrism": Kind(NONE, NONE, 8, 4.1, role="support"),
-    "WarpPrismPhasing": Kind(NONE, NONE, 8, 0, role="support"),
-    "Observer": Kind(NONE, NONE, 3, 2.6, role="support"),
-    "ObserverSurveillanceMode": Kind(NONE, NONE, 3, 0, role="support"),
-    "Medivac": Kind(NONE, NONE, 12, 3.5, role="support"),
-    "Raven": Kind(NONE, NONE, 15, 3.8, role="support"),
-    "Overlord": Kind(NONE, NONE, 1, 0.9, role="support"),
-    "OverlordTransport": Kind(NONE, NONE, 60, 1.3, role="support"),
-    "Overseer": Kind(NONE, NONE, 3, 2.6, role="support"),
-    "Interceptor": Kind(NONE, NONE, 1, 10, role="support"),
+    "WarpPrism": UnitKind(NONE, NONE, 8, 4.1, role="support"),
+    "WarpPrismPhasing": UnitKind(NONE, NONE, 8, 0, role="support"),
+    "Observer": UnitKind(NONE, NONE, 3, 2.6, role="support"),
+    "ObserverSurveillanceMode": UnitKind(NONE, NONE, 3, 0, role="support"),
+    "Medivac": UnitKind(NONE, NONE, 12, 3.5, role="support"),
+    "Raven": UnitKind(NONE, NONE, 15, 3.8, role="support"),
+    "Overlord": UnitKind(NONE, NONE, 1, 0.9, role="support"),
+    "OverlordTransport": UnitKind(NONE, NONE, 60, 1.3, role="support"),
+    "Overseer": UnitKind(NONE, NONE, 3, 2.6, role="support"),
+    "Interceptor": UnitKind(NONE, NONE, 1, 10, role="support"),
 }
-_WORKERS = {name: Kind(0.1, NONE, 5, 2.8, role="worker") for name in ("Probe", "SCV", "Drone", "MULE")}
+_WORKERS = {name: UnitKind(0.1, NONE, 5, 2.8, role="worker") for name in ("Probe", "SCV", "Drone", "MULE")}
 _GUNS = {
-    "SpineCrawler": Kind(7, NONE, 19, 0),
-    "SporeCrawler": Kind(NONE, 7, 30, 0),
-    "PhotonCannon": Kind(7, 7, 22, 0),
-    "Bunker": Kind(6, 6, 30, 0),
-    "MissileTurret": Kind(NONE, 7, 39, 0),
-    "PlanetaryFortress": Kind(6, NONE, 28, 0),
+    "SpineCrawler": UnitKind(7, NONE, 19, 0),
+    "SporeCrawler": UnitKind(NONE, 7, 30, 0),
+    "PhotonCannon": UnitKind(7, 7, 22, 0),
+    "Bunker": UnitKind(6, 6, 30, 0),
+    "MissileTurret": UnitKind(NONE, 7, 39, 0),
+    "PlanetaryFortress": UnitKind(6, NONE, 28, 0),
 }
 _PLAIN = (
     "Nexus Pylon Assimilator Gateway WarpGate Forge CyberneticsCore TwilightCouncil RoboticsFacility "
@@ -133,21 +133,21 @@ _PLAIN = (
     "SpawningPool EvolutionChamber RoachWarren BanelingNest HydraliskDen LurkerDen InfestationPit Spire "
     "GreaterSpire UltraliskCavern NydusNetwork NydusCanal CreepTumor CreepTumorBurrowed CreepTumorQueen"
 )
-STRUCTURE = Kind(NONE, NONE, 1, 0, role="structure", structure=True)
+STRUCTURE = UnitKind(NONE, NONE, 1, 0, role="structure", structure=True)
 TOWN_HALLS = frozenset(
     {"Nexus", "CommandCenter", "OrbitalCommand", "PlanetaryFortress", "Hatchery", "Lair", "Hive"},
 )
 IGNORED = frozenset({"Larva", "Egg", "BroodlingEscort", "ForceField", "KD8Charge", "ParasiticBombDummy", "Interceptor"})
 """Not targets."""
 
-KINDS: dict[str, Kind] = {
+KINDS: dict[str, UnitKind] = {
     **_GROUND,
     **{name: kind._replace(flying=True) for name, kind in (_AIR | _SUPPORT).items()},
     **_WORKERS,
     **{name: kind._replace(structure=True) for name, kind in _GUNS.items()},
     **dict.fromkeys(_PLAIN.split(), STRUCTURE),
 }
-UNKNOWN = Kind()
+UNKNOWN = UnitKind()
 SUPPLIES = {
     **dict.fromkeys(("Zergling", "Baneling"), 0.5),
     **dict.fromkeys(("Marine", "Reaper"), 1.0),
@@ -173,7 +173,7 @@ def fights(kind: str) -> bool:
     return known.role == "army" and not known.structure and kind != "Queen"
 
 
-def kind_of(unit: TextUnit) -> Kind:
+def kind_of(unit: TextUnit) -> UnitKind:
     """Return the kind of a unit's type; a unit in the graviton beam flies."""
     kind = KINDS.get(unit.type, UNKNOWN)
     return kind._replace(flying=True) if "GravitonBeam" in unit.effects else kind

@@ -36,7 +36,7 @@ def skilled(observation: str, rng: random.Random) -> str:
         _lead(plan)
         if plan.calls:
             orders[team.name] = plan.calls
-    return reply(_analysis(situation), orders, _said(situation, rng))
+    return reply(_analysis(situation), orders, _messages(situation, rng))
 
 
 def _lead(plan: ReplyPlan) -> None:
@@ -137,7 +137,7 @@ def _survey(situation: Situation) -> str:
     return f"We have {workers} workers and an army of {mine:g} supply; of the enemy's we know {theirs:g}.{attacked}"
 
 
-def _said(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
+def _messages(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     """Return what an agent writes: a commander orders, a team in a fight says what it sees, others pass that on.
 
     A message says what stands in the observation, or orders something; it promises nothing.

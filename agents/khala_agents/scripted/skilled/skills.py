@@ -80,7 +80,7 @@ def nova(plan: ReplyPlan) -> None:
         pool = [unit for unit in pool if distance(unit, target) > 4.0]
 
 
-def _one(unit: TextUnit) -> float:
+def _count_each(unit: TextUnit) -> float:
     del unit
     return 1.0
 
@@ -157,7 +157,7 @@ def prismatic_alignment(plan: ReplyPlan) -> None:
 
 def time_warp(plan: ReplyPlan) -> None:
     """Warp time over the largest advancing crowd."""
-    found = crowd([unit for unit in _bodies(plan) if not kind_of(unit).flying], 3.5, _one)
+    found = crowd([unit for unit in _bodies(plan) if not kind_of(unit).flying], 3.5, _count_each)
     if found is not None and found[0] >= 6:
         for caster in _rich(plan, 100):
             if distance(caster, found[1]) < 11:
