@@ -105,14 +105,14 @@ BAD = [
         "no router answered",
         marks=pytest.mark.slow,
     ),
-    ("agent Stalkers --run r --connect nonsense --policy silent", "'nonsense' is no endpoint"),
+    ("agent Stalkers --run r --connect nonsense --policy silent", "'nonsense' is not an endpoint"),
     ("llm --port {taken}", "in use"),
     ("llm --fault teapot=2", "teapot"),
     ("replay missing.mcap", "missing.mcap: there is no such file"),
-    ("replay bad.yaml", "bad.yaml is no recording"),
+    ("replay bad.yaml", "bad.yaml is not a recording"),
     ("view nosuch", "there is no nosuch, nor runs/nosuch: name a recording, a directory or a run"),
     ("view --host 0.0.0.0", "give --password, or --https CERT KEY"),
-    ("replay missing.mcap --steps soon", "'soon' names no steps"),
+    ("replay missing.mcap --steps soon", "'soon' does not name steps"),
     ("sc2 install file/below", "file"),
 ]
 

@@ -245,7 +245,7 @@ BAD = [
     ("golden.mcap --at 51 --policy silent", "it cannot be forked at step 51"),
     ("golden.mcap --at 3 --episode 2", "has no complete step of episode 2"),
     ("real.mcap --at 3", "was played on StarCraft II, which does not play the same game twice"),
-    ("timed.mcap --at 3 --policy silent", "play it with --clock token, which counts tokens instead"),
+    ("timed.mcap --at 3 --policy silent", "play the match with --clock token, which counts tokens instead"),
     ("golden.mcap --at 3 --model nope", "there is no model file 'nope'"),
     ("golden.mcap --at 3 --model openai", "no key: set the environment variable OPENAI_API_KEY"),
     ("golden.mcap --at 3 --policy silent --budget-usd 1 --agent Stalkers=vllm", "a budget needs the price of Qwen"),
@@ -257,8 +257,8 @@ BAD = [
     ("golden.mcap --at 3 --advise everyone:go", "nobody decides for blue/Stalkers, blue/Zealots after the step"),
     ("golden.mcap --at 3 --memory notes=2 --policy silent", "notes would change what agents saw before the step"),
     ("golden.mcap --at 3 --base-url http://localhost:1/v1", "--base-url is for a model: name the model with --model"),
-    ("golden.mcap --at 3 --model recorded --memory 2", "nothing but what was recorded: leave out --memory"),
-    ("golden.mcap --scan --model recorded", "nothing but what was recorded: leave out --scan, or say --model"),
+    ("golden.mcap --at 3 --model recorded --memory 2", "the recorded future cannot be changed: leave out --memory"),
+    ("golden.mcap --scan --model recorded", "the recorded future cannot be changed: leave out --scan, or say --model"),
     ("golden.mcap --scan", "nobody decides for blue/Stalkers, blue/Zealots after the step"),
 ]
 

@@ -202,7 +202,7 @@ async def test_what_does_not_play_the_same_twice_cannot_be_forked(record: Callab
     timed = with_card(
         whole, tmp_path / "timed.mcap", lambda card: card.replace(b'"rule":"frozen"', b'"rule":"realtime"')
     )
-    with pytest.raises(RecordingError, match="clock realtime, where it matters when a reply arrives"):
+    with pytest.raises(RecordingError, match="clock realtime, where the time of a reply matters"):
         trunk_of(timed)
     with pytest.raises(RecordingError, match="has no complete step of episode 7"):
         trunk_of(whole, 7)

@@ -49,7 +49,7 @@ SENTENCES = [
     (MERGED, "there are more than 10000 values, those of aliases included"),
     ("r: &r [*r, *r]", "nested too deep"),
     (HEAD + "points: {[1, 2]: [3, 4]}\n", "h.yaml:6: points: write the name of a field here, not a list or fields"),
-    (HEAD + "title: twice\n", "h.yaml:6: title: stands here a second time"),
+    (HEAD + "title: twice\n", "h.yaml:6: title: is given a second time"),
     (HEAD + 'melee: !!int ""\n', "h.yaml:6: melee:  is no int; put it in quotes if it is a text"),
     (HEAD + "melee: 2026-02-31\n", "h.yaml:6: melee: 2026-02-31 is no timestamp"),
     (HEAD + f"melee: {'9' * 5000}\n", "is longer than 2000 characters"),

@@ -136,7 +136,7 @@ def _fields(node: yaml.MappingNode, field: str) -> list[tuple[str, yaml.Node]]:
         if key.tag != _MERGE:
             _check_scalar(key, field)
         if key.value in found:
-            raise wrong(key, f"{shown(f'{field}.{key.value}'.lstrip('.'))}: stands here a second time")
+            raise wrong(key, f"{shown(f'{field}.{key.value}'.lstrip('.'))}: is given a second time")
         found[key.value] = value
     return list(found.items())
 

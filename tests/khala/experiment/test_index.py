@@ -121,7 +121,7 @@ def test_a_broken_one_is_made_again_with_one_sentence(
     before = known(directory)
     DAMAGES[name](directory / INDEX)
     assert known(directory) == before
-    assert [record.getMessage().count("is made again of the recordings") for record in caplog.records] == [1]
+    assert [record.getMessage().count("is rebuilt from the recordings") for record in caplog.records] == [1]
     caplog.clear()
     assert known(directory) == before
     assert not caplog.records

@@ -120,7 +120,7 @@ def test_what_is_not_there_is_said(
 
 def test_a_file_that_is_no_recording_is_refused_at_once(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"no recording at all")
-    with pytest.raises(RecordingError, match="no recording"):
+    with pytest.raises(RecordingError, match="is not a recording"):
         find([str(tmp_path / "no.mcap")], tmp_path)
 
 
