@@ -1,11 +1,10 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.combat cimport targets
+from khala_simulator.combat cimport census, targets
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
-from khala_simulator.world cimport census
 
 cdef int64_t NOBODY
 cdef int64_t AIR_PLANE

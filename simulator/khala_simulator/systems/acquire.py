@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat import targets
+from khala_simulator.combat import census, targets
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
-from khala_simulator.world import census
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 

@@ -1,12 +1,11 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.combat cimport targets
+from khala_simulator.combat cimport census, targets
+from khala_simulator.combat.census cimport Census
 from khala_simulator.economy cimport touching
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
-from khala_simulator.world cimport census
-from khala_simulator.world.census cimport Census
 
 cdef int64_t NOBODY
 cdef double EDGE_TOLERANCE

@@ -9,20 +9,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import casting
-from khala_simulator.combat import targets
+from khala_simulator.combat import census, targets
 from khala_simulator.economy import touching
 from khala_simulator.economy.harvesting import Phase
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
-from khala_simulator.world import census
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
+    from khala_simulator.combat.census import Census
     from khala_simulator.native.columns import Columns
     from khala_simulator.native.memory import Cells
-    from khala_simulator.world.census import Census
     from khala_simulator.world.world import World
 
 EDGE_TOLERANCE: Final = 1e-9

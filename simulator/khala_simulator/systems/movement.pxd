@@ -2,11 +2,11 @@ cimport cython
 from libc cimport math
 from libc.stdint cimport int64_t
 
+from khala_simulator.combat cimport census
 from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point, boolean
-from khala_simulator.world cimport census
 
 cdef double TURNING_CIRCLES
 cdef double NO_DISTANCE

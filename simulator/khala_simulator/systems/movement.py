@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from khala_simulator.combat import census
 from khala_simulator.movement import turning
 from khala_simulator.native import columns, memory
-from khala_simulator.world import census
 
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns

@@ -1,11 +1,11 @@
 cimport cython
 from libc.stdint cimport int64_t
 
+from khala_simulator.combat cimport census
 from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
-from khala_simulator.world cimport census, shots
-from khala_simulator.world.shots cimport PendingHit
+from khala_simulator.world.shots cimport PendingHit, Shot
 
 cdef double NOT_STARTED
 cdef int64_t NOBODY
@@ -24,3 +24,5 @@ cdef _take_effect(object world, list attackers)
 @cython.locals(row=int64_t, slot=int64_t, target=int64_t, at=int64_t, delay=double, is_kamikaze=bint, pending=list,
                loop=int64_t)
 cdef _lay(object world, object weapon, Py_ssize_t index, list attackers)
+@cython.locals(shot=Shot)
+cdef Shot _shoot(Columns c, int64_t slot, int64_t at, int64_t weapon, int64_t hit)

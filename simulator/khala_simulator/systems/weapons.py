@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from khala_simulator.combat import census
 from khala_simulator.combat.launchers import LAUNCHERS
 from khala_simulator.movement import turning
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.stats import GROUND_PLANE
-from khala_simulator.world import census, shots
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.shots import PendingHit
+from khala_simulator.world.shots import PendingHit, Shot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -166,8 +166,24 @@ def _lay(world: World, weapon: Weapon, index: int, attackers: list[int]) -> None
     for slot in attackers:
         target = c.target[slot]
         at = slot if is_kamikaze or target == NOBODY else target  # a suicide attacker is the middle of it
-        shot = shots.shot_of(slot, c.owner[slot], target, row, index, c.pos[slot], c.pos[at])
+        shot = _shoot(c, slot, at, row, index)
         pending.append(PendingHit(shot, (loop + c.windup[slot]) + delay))
+
+
+def _shoot(c: Columns, slot: int, at: int, weapon: int, hit: int) -> Shot:
+    """Return the shot of one hit of an attack from a unit's place to that of the unit ``at``."""
+    shot = Shot.__new__(Shot)
+    shot.source = slot
+    shot.owner = c.owner[slot]
+    shot.target = c.target[slot]
+    shot.prior = NOBODY
+    shot.weapon = weapon
+    shot.hit = hit
+    shot.start_x = c.pos[slot].x
+    shot.start_y = c.pos[slot].y
+    shot.goal_x = c.pos[at].x
+    shot.goal_y = c.pos[at].y
+    return shot
 
 
 # branches of the game's own switches ----------------------------------------------------------------------------------

@@ -1,11 +1,6 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.native cimport memory
-from khala_simulator.native.memory cimport Point
-
-cdef int64_t NOBODY
-
 
 cdef class Shot:
     cdef public int64_t source
@@ -20,10 +15,6 @@ cdef class Shot:
     cdef public double goal_y
     @cython.locals(shot=Shot)
     cpdef Shot at(self, int64_t target)
-
-
-@cython.locals(shot=Shot)
-cdef Shot shot_of(int64_t source, int64_t owner, int64_t target, int64_t weapon, int64_t hit, Point start, Point goal)
 
 
 cdef class Missile:

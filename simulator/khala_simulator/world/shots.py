@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from khala_simulator.native import memory
-
 NOBODY: Final = -1
 _SHOT: Final = "<6q4d"
 
@@ -96,24 +94,6 @@ class Shot:
             self.target = NOBODY
         if self.prior == slot:
             self.prior = NOBODY
-
-
-def shot_of(
-    source: int, owner: int, target: int, weapon: int, hit: int, start: memory.Point, goal: memory.Point
-) -> Shot:
-    """Return a shot that did not bounce."""
-    shot = Shot.__new__(Shot)
-    shot.source = source
-    shot.owner = owner
-    shot.target = target
-    shot.prior = NOBODY
-    shot.weapon = weapon
-    shot.hit = hit
-    shot.start_x = start.x
-    shot.start_y = start.y
-    shot.goal_x = goal.x
-    shot.goal_y = goal.y
-    return shot
 
 
 class Missile:
