@@ -250,7 +250,7 @@ BAD = [
     ("golden.mcap --at 3 --model openai", "no key: set the environment variable OPENAI_API_KEY"),
     ("golden.mcap --at 3 --policy silent --budget-usd 1 --agent Stalkers=vllm", "a budget needs the price of Qwen"),
     ("golden.mcap --at 3 --agent Stalkers=silent", "nobody decides for blue/Zealots after the step"),
-    ("golden.mcap --at 3 --agent Stalkers", "--agent: 'Stalkers' names no agent and its model"),
+    ("golden.mcap --at 3 --agent Stalkers", "--agent: 'Stalkers' names no agent with its model"),
     ("golden.mcap --at 3 --model silent --agent Who=silent", "there are blue/Stalkers, blue/Zealots"),
     ("golden.mcap --at 3 --policy silent --red silent", "the task has no side red: its only side is blue"),
     ("golden.mcap --at 3 --advise Who:go --policy silent", "--advise: there is no single 'Who' to advise"),
