@@ -23,7 +23,7 @@ POINTS = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class ForkPoint:
     """A step, and what became of the forks there, of the first side.
 
     Attributes:
@@ -57,19 +57,19 @@ def steps_of(trunk: Trunk, every: int | None, *, advised: bool = False) -> list[
     return [step for step in range(0, steps, every) if step or not advised]
 
 
-def rank(trunk: Trunk, futures: Sequence[Future]) -> list[Point]:
+def rank(trunk: Trunk, futures: Sequence[Future]) -> list[ForkPoint]:
     """Return the steps of forks, those first at which most changes: the win rate, then the value."""
     steps = dict.fromkeys(future.fork.step for future in futures)
     points = [_point(trunk, step, [future for future in futures if future.fork.step == step]) for step in steps]
     return sorted(points, key=lambda point: (-abs(point.more_won), -abs(point.more_value), point.step))
 
 
-def _point(trunk: Trunk, step: int, futures: Sequence[Future]) -> Point:
+def _point(trunk: Trunk, step: int, futures: Sequence[Future]) -> ForkPoint:
     side = trunk.config.task.per_side()[0].side
     recorded = recorded_figures(trunk, side, step)
     assert recorded is not None, "steps_of has looked"
     found = figures(of_side(futures, side), from_loop=trunk.loop_at(step))
-    return Point(
+    return ForkPoint(
         step=step,
         game_s=trunk.loop_at(step) / LOOPS_PER_S,
         futures=futures,
@@ -79,7 +79,7 @@ def _point(trunk: Trunk, step: int, futures: Sequence[Future]) -> Point:
     )
 
 
-def table(points: Sequence[Point]) -> Table:
+def table(points: Sequence[ForkPoint]) -> Table:
     """Return the steps in their order of rank."""
     shown = Table(box=None, pad_edge=False)
     for column in ("step", "game s", "futures", "win rate (95 %)", "than recorded", "killed - lost", "than recorded"):
@@ -92,7 +92,7 @@ def table(points: Sequence[Point]) -> Table:
     return shown
 
 
-def plain_points(trunk: Trunk, points: Sequence[Point]) -> list[dict[str, Any]]:
+def plain_points(trunk: Trunk, points: Sequence[ForkPoint]) -> list[dict[str, Any]]:
     """Return the steps in their order of rank, for JSON."""
     return [
         {"more_won": point.more_won, "more_value": point.more_value} | plain(trunk, point.step, point.futures)

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
     """Return one record for each type that PySC2 has a name for, by that name, in alphabetical order."""
     known = [unit for unit in catalog.units if not unit.like and unit.name in unit_names()]
-    return {
-        unit_name(unit.name): sparse(_unit(unit, catalog))
-        for unit in sorted(known, key=lambda unit: unit_name(unit.name))
-    }
+    known.sort(key=lambda unit: unit_name(unit.name))
+    return {unit_name(unit.name): sparse(_unit(unit, catalog)) for unit in known}
 
 
 def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:

@@ -28,10 +28,8 @@ BONUS: Final = "AttributeBonus["
 def upgrade_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
     """Return one record for each upgrade that PySC2 has a name for or a player can research, by its name."""
     known = [u for u in catalog.upgrades if u.name in upgrade_names() or u.researchable]
-    return {
-        upgrade_name(u.name): sparse(_upgrade(u, catalog))
-        for u in sorted(known, key=lambda upgrade: upgrade_name(upgrade.name))
-    }
+    known.sort(key=lambda upgrade: upgrade_name(upgrade.name))
+    return {upgrade_name(upgrade.name): sparse(_upgrade(upgrade, catalog)) for upgrade in known}
 
 
 def _upgrade(upgrade: Upgrade, catalog: Catalog) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from khala_protocol.messages import LOOPS_PER_S
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala.openenv.settings import Chosen
+    from khala.openenv.settings import ChosenMatch
     from khala.playing.seats import Seat, SeatedMatch
 
 CLOSE_S: Final = 30.0
@@ -215,7 +215,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
 
     # the match ----------------------------------------------------------------------------------------------------
 
-    async def _enter(self, chosen: Chosen) -> None:
+    async def _enter(self, chosen: ChosenMatch) -> None:
         match, config = chosen
         self._seats = {seat.agent: seat for seat in match.seats}
         self._loop = asyncio.get_running_loop()

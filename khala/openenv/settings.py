@@ -35,7 +35,7 @@ FREE: Final = frozenset({SILENT, SCRIPTED, *PLAYERS, *(f"{SCRIPTED}/{name}" for 
 _MOST_SEED: Final = 2**30
 
 
-class Chosen(NamedTuple):
+class ChosenMatch(NamedTuple):
     """A match that a client chose, not begun."""
 
     match: SeatedMatch
@@ -62,7 +62,7 @@ class ServerSettings:
     game: str = "simulator"
     out: Path | None = None
 
-    def match(self, options: ResetOptions, processes: Processes | None = None) -> Chosen:
+    def match(self, options: ResetOptions, processes: Processes | None = None) -> ChosenMatch:
         """Return the match that a client chose.
 
         Args:
@@ -82,7 +82,7 @@ class ServerSettings:
                 source="others",
             )
         minds = minds_of([side.side for side in config.task.per_side()], Minds().with_name(others), {})
-        return Chosen(SeatedMatch(config, seats, minds, game=self.game, processes=processes), config)
+        return ChosenMatch(SeatedMatch(config, seats, minds, game=self.game, processes=processes), config)
 
     def _config(self, options: ResetOptions) -> MatchConfig:
         name = options.task or self.task

@@ -17,7 +17,6 @@ import os
 import sys
 from dataclasses import replace
 from io import FileIO
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from khala.playing import environment, games, local, logs, one_process
@@ -159,8 +158,9 @@ def _cause(error: Exception) -> Exception:
 def _take_stdout() -> FileIO:
     """Return the pipe to the parent; what a policy or a game prints leads nowhere from now on."""
     pipe = FileIO(os.dup(sys.stdout.fileno()), "w")
-    with Path(os.devnull).open("wb") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
     return pipe
 
 

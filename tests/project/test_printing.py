@@ -19,6 +19,7 @@ PACKAGES = ("agents/khala_agents", "bridge/khala_bridge", "orchestrator/khala_or
 WRITERS = {"typer.echo", "typer.secho", "click.echo", "print", "sys.stdout.write", "sys.stderr.write", "rich.print"}
 HINT = re.compile(r"echo\(|\bprint\(|std(out|err)\.write|Console\(|from_markup|TextColumn|rich\.markup")
 PLACES = {
+    "khala/commands/front_page.py": "draws `khala --help`, whose texts are our own",
     "simulator/khala_simulator/cli.py": "stands alone, and has a `_say` of its own",
     "simulator/khala_simulator/process/lan.py": "stands alone, and prints one sentence in ASCII",
 }

@@ -90,8 +90,8 @@ async def test_a_model_that_costs_nothing_is_asked_under_any_budget() -> None:
 SPENDING = """
 import sys
 from pathlib import Path
-from khala_agents.llm.money import Ledger, Overdrawn
-ledger = Ledger(Path(sys.argv[1]))
+from khala_agents.llm.money import MoneyLedger, Overdrawn
+ledger = MoneyLedger(Path(sys.argv[1]))
 try:
     for _ in range(70):
         ledger.settle(ledger.hold("", 0.01, 1.0), 0.01)
@@ -101,8 +101,8 @@ except Overdrawn:
 DYING = """
 import os, signal, sys
 from pathlib import Path
-from khala_agents.llm.money import Ledger
-Ledger(Path(sys.argv[1])).hold("", 0.25, 1.0)
+from khala_agents.llm.money import MoneyLedger
+MoneyLedger(Path(sys.argv[1])).hold("", 0.25, 1.0)
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
