@@ -31,7 +31,7 @@ MB = 2**20
 
 
 class Metrics:
-    """A `khala.service.daemon.Listener` with a registry of its own."""
+    """A `khala.service.daemon.MatchListener` with a registry of its own."""
 
     def __init__(self) -> None:
         self.registry = registry = CollectorRegistry()

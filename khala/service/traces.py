@@ -50,7 +50,7 @@ class TracedCall(NamedTuple):
 
 
 class Traces:
-    """A `khala.service.daemon.Listener` that makes spans."""
+    """A `khala.service.daemon.MatchListener` that makes spans."""
 
     def __init__(self, processor: SpanProcessor) -> None:
         self._provider = TracerProvider(resource=Resource.create({"service.name": "khala"}))
