@@ -75,10 +75,6 @@ class Damage:
     amount: float
     bonus: tuple[tuple[int, float], ...]
 
-    def against(self, attributes: int) -> float:
-        """Return the damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
-        return self.amount + max((value for bit, value in self.bonus if attributes & bit), default=0.0)
-
 
 def bit_set(names: Iterable[str], order: tuple[str, ...]) -> int:
     """Return the bit set of ``names``, bit i for ``order[i]``."""
