@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -50,6 +51,13 @@ async def start_process(
             start_new_session=True,
             limit=LONGEST_LINE,
         )
+
+
+def redirect(number: int, path: Path | str, flags: int) -> None:
+    """Have a number of this process, such as that of stdout, lead to a file."""
+    opened = os.open(path, flags, 0o600)
+    os.dup2(opened, number)
+    os.close(opened)
 
 
 async def end_process(process: asyncio.subprocess.Process, within_s: float) -> None:

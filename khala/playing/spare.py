@@ -16,16 +16,16 @@ import os
 import runpy
 import sys
 from collections import deque
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from khala.playing import environment
 from khala.playing.children import END_S, spawn
-from khala.playing.processes import end_process, start_process
+from khala.playing.processes import end_process, redirect, start_process
 from khala_protocol.parent_watch import end_with_parent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
     from types import TracebackType
 
 NEEDED = ("khala.cli", "khala_agents.commands", "khala_agents.llm.transport")
@@ -86,18 +86,11 @@ def main() -> None:
     job = json.loads(line)
     os.environ.clear()
     os.environ.update(job["environ"])
-    _redirect(Path(job["log"]))
+    redirect(0, os.devnull, os.O_RDONLY)
+    redirect(1, os.devnull, os.O_WRONLY)
+    redirect(2, job["log"], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     sys.argv = ["khala", *job["arguments"]]
     runpy.run_module("khala", run_name="__main__")
-
-
-def _redirect(log: Path) -> None:
-    nothing = Path(os.devnull)
-    ends = ((nothing, os.O_RDONLY, 0), (nothing, os.O_WRONLY, 1), (log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 2))
-    for path, flags, number in ends:
-        opened = os.open(path, flags, 0o600)
-        os.dup2(opened, number)
-        os.close(opened)
 
 
 if __name__ == "__main__":

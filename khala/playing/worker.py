@@ -23,7 +23,7 @@ from khala.playing import environment, games, local, logs, one_process
 from khala.playing.jobs import Ended, Job
 from khala.playing.local import Supplies
 from khala.playing.matches import newest_recording
-from khala.playing.processes import LONGEST_LINE
+from khala.playing.processes import LONGEST_LINE, redirect
 from khala.playing.spare import Spares
 from khala_agents.llm.limits import own_turns
 from khala_bridge.game.processes import IdleGames, Launched
@@ -109,7 +109,7 @@ async def _work(answers: FileIO, *, game: str, live: bool, spares: int) -> None:
             if live:
                 await asyncio.to_thread(lambda: Observer(load_task(USUAL_TASK)))
                 await stock.ready()
-            watch = _log_step if live else _ignore
+            watch = _log_step if live else lambda _: None
             supplies = Supplies(spawn=stock, processes=processes)
             jobs = await _read_stdin()
             while line := await jobs.readline():
@@ -138,10 +138,6 @@ def _log_step(message: Wire) -> None:
                 log.warning("%s: %s", agent.status, agent.detail, extra={"agent": f"{agent.side}/{agent.agent}"})
 
 
-def _ignore(message: Wire) -> None:
-    """Do nothing."""
-
-
 def _cause(error: Exception) -> Exception:
     """Return the first error of nested groups; raise a group that holds a fault of ours."""
     if not isinstance(error, ExceptionGroup):
@@ -158,9 +154,7 @@ def _cause(error: Exception) -> Exception:
 def _take_stdout() -> FileIO:
     """Return the pipe to the parent; what a policy or a game prints leads nowhere from now on."""
     pipe = FileIO(os.dup(sys.stdout.fileno()), "w")
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    redirect(sys.stdout.fileno(), os.devnull, os.O_WRONLY)
     return pipe
 
 
