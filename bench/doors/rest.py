@@ -250,7 +250,7 @@ def _compare(path: Path, directory: Path) -> str:
         said, through = capture(partial(calibrating.show_comparison, *pair, as_json=False))
         if through:
             return through
-        if "no file of `khala calibrate`" not in said and "cannot be read" not in said:
+        if "not a file of `khala calibrate`" not in said and "cannot be read" not in said:
             return f"it was compared: {said[:200]!r}"
     return ""
 
