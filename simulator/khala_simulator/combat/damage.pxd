@@ -28,7 +28,7 @@ cdef _give_life(object world, int64_t slot)
 @cython.locals(attributes=int64_t, amount=double)
 cpdef strike(object world, int64_t source, int64_t owner, int64_t victim, object damage, double fraction=*)
 @cython.locals(bit=int64_t, value=double, most=double)
-cdef double _against(object damage, int64_t attributes) except? -1.0
+cpdef double amount_against(object damage, int64_t attributes) except? -1.0
 @cython.locals(side=int64_t, answer=double, held=double, at=int64_t, shield_armor=double, armor=double, least=double,
                absorbed=double, rest=double, reduced=double, wounded=double)
 cpdef apply_damage(object world, int64_t source, int64_t owner, int64_t victim, double amount, str kind=*,

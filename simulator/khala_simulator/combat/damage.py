@@ -81,7 +81,7 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
     """Take one hit's damage from one unit and count it in both players' scores."""
     c = columns.columns_of(world)
     attributes = memory.ints(world.stats.attribute_bits)[c.type[victim]]
-    amount = _against(damage, attributes) * fraction
+    amount = amount_against(damage, attributes) * fraction
     if source != NOBODY:
         if c.bonus_bits[source] & attributes:
             amount += c.bonus_add[source] * fraction
@@ -90,7 +90,7 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
     apply_damage(world, source, owner, victim, amount, kind=kind, ignores_armor=damage.hit.ignores_armor)
 
 
-def _against(damage: Damage, attributes: int) -> float:
+def amount_against(damage: Damage, attributes: int) -> float:
     """Return the damage before armor on a unit with these attribute bits; only the largest fitting bonus counts."""
     if not damage.bonus:
         return damage.amount

@@ -75,7 +75,7 @@ def _is_under_way(c: Columns, slot: int) -> bool:
 
 def _takes_effect(c: Columns, slot: int) -> bool:
     """Return whether the damage point of an attack has come."""
-    return c.windup[slot] <= 0.0 and c.windup[slot] > NOT_STARTED
+    return _is_under_way(c, slot) and c.windup[slot] <= 0.0
 
 
 def _start_attacks(world: World, c: Columns) -> None:
@@ -126,11 +126,7 @@ def _take_effect(world: World, attackers: list[int]) -> None:
     c = columns.columns_of(world)
     users: dict[int, list[int]] = {}
     for slot in attackers:
-        row = c.weapon[slot]
-        if row in users:
-            users[row].append(slot)
-        else:
-            users[row] = [slot]
+        users.setdefault(c.weapon[slot], []).append(slot)
     for row, slots in users.items():
         weapon = world.catalog.weapons[row]
         is_beam = bool(world.stats.beam[row])

@@ -110,7 +110,7 @@ def test_weapon_upgrades_add_their_step_per_level(
         assert all(n in names for n in levels)
         stats.apply(1, [catalog.upgrade(n).id for n in levels])
         row = next(d for d in stats.damage[1][weapon.row] if d.hit.damage == weapon.shown_damage)
-        assert row.against(bit_set(against, ATTRIBUTES)) == expected
+        assert damage.amount_against(row, bit_set(against, ATTRIBUTES)) == expected
 
 
 def test_armor_upgrades_count_for_units_that_already_stand_there(field: Any) -> None:
@@ -140,7 +140,7 @@ def test_damage_is_never_lost_or_made_up(
     lost_life, lost_shields = life - world.life[v], shields - world.shields[v]
     assert 0 <= lost_life <= life
     assert 0 <= lost_shields <= shields
-    most = hit.against(int(world.stats.attribute_bits[world.type[v]]))
+    most = damage.amount_against(hit, int(world.stats.attribute_bits[world.type[v]]))
     assert 0 < lost_life + lost_shields <= most + 0.5  # the rest that shields leave is at least a half, too
     taken, dealt = world.players[2].score.damage_taken, world.players[1].score.damage_dealt
     assert (taken.life, taken.shields) == pytest.approx((lost_life, lost_shields))

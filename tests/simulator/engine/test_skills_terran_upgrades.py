@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from khala_simulator.combat import damage
+
 VERSIONS = ("4.10", "5.0.13")
 
 
@@ -65,7 +67,7 @@ def test_reactors_let_casters_start_with_more_energy(make_field: Any, version: s
 def test_infernal_flames_burn_light_units_more(field: Any) -> None:
     world = field.world
     row = next(w.row for w in world.catalog.weapons if w.id == "InfernalFlameThrower")
-    before = world.stats.damage[1][row][0].against(1)
+    before = damage.amount_against(world.stats.damage[1][row][0], 1)
     field.research(1, "HighCapacityBarrels")
     change = next(c for c in world.catalog.upgrade("HighCapacityBarrels").changes if c.entry == "InfernalFlameThrower")
-    assert world.stats.damage[1][row][0].against(1) == before + float(change.value)
+    assert damage.amount_against(world.stats.damage[1][row][0], 1) == before + float(change.value)
