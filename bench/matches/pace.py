@@ -5,7 +5,7 @@ again with four agents of 0.2 s. By agent, and for the steps of the host:
 
     decisions     answers that took effect                 over     median time of an answer beyond the agent's sleep
     age           game loops from observation to effect    steps    steps that the game made meanwhile, median
-    late          answers that came past the deadline      past     how late steps began, in ms, median
+    late          answers that missed the deadline         past     how late steps began, in ms, median
 
 The exit code is not 0 if an answer of the agent that is quick in both matches, or a step, takes more than 1 ms longer
 at the median with slow agents beside it.
@@ -111,7 +111,7 @@ def _figures(name: str, sleep_s: float, reports: Sequence[Report]) -> AgentFigur
         age_p50_loops=statistics.median(ages),
         age_p95_loops=ages[int(0.95 * len(ages))],
         steps_later=statistics.median(step - _step_of(step, agent) for step, agent in taken),
-        late=len(found) - len(taken),
+        late=sum(agent.status == "late" and agent.fate != "dropped" for _, agent in found),
     )
 
 
