@@ -23,7 +23,7 @@ from khala.commands.actions import EPILOG as ACTIONS_EPILOG
 from khala.commands.actions import actions
 from khala.commands.help import Commands
 from khala.commands.keys import app as keys
-from khala.commands.options import (
+from khala.commands.run_options import (
     Game,
     MatchOptions,
     MindOptions,

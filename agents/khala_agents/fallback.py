@@ -1,7 +1,8 @@
 """A policy that decides where a model cannot: its endpoint is away, its money is used up, its answer is late.
 
 The reply is marked `fallback`, with the reason and the name of the policy (`endpoint away: skilled`), so that a result
-says in how many steps the model did not decide. Above it is `khala_agents.build`; below it are two policies of any
+says in how many steps the model did not decide. Without a fallback, the host takes the default reply of the task
+(`khala_orchestrator.match.replies`). Above it is `khala_agents.build`; below it are two policies of any
 kind.
 """
 

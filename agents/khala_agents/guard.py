@@ -2,7 +2,7 @@
 
 A policy is the user's code: it may raise, return nonsense, take too long, or ignore its cancellation.
 Each of these becomes a `Decision` without a text, whose status says what happened; the host then takes the default
-reply of the task. Above it: `khala_agents.worker`.
+reply of the task (`khala_orchestrator.match.replies`). Above it: `khala_agents.worker`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from s2clientprotocol import debug_pb2
 from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.tables import print_table
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.game.game import GameConfig
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.knowledge import knowledge

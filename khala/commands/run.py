@@ -2,7 +2,8 @@
 
 To import what a match needs takes this process a second and a half, that of the agents one second, and the game half a
 second. So the others are started first, with what is known by then: agents as a process that waits to be told which
-ones to be, the game as one that has no map yet. `khala.cli` is above; `khala.playing.local` plays the match.
+ones to be, the game as one that has no map yet. `khala.cli` is above, and `khala.commands.run_options` declares the
+options; `khala.playing.local` plays the match.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from khala.commands.options import MindOptions
+    from khala.commands.run_options import MindOptions
     from khala_bridge.game.processes import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Result

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from khala.commands.options import Game
+from khala.commands.run_options import Game
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 

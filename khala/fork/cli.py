@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from khala.commands.options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
+from khala.commands.run_options import BaseUrl, Fallback, Game, Latency, Mind, ModelName, PolicyName, SideModel
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 from khala_protocol.errors import ConfigError

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from khala.commands.options import (
+from khala.commands.run_options import (
     BudgetUsd,
     Episodes,
     Game,

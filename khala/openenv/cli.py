@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from khala.commands.options import Game
+from khala.commands.run_options import Game
 from khala_agents.cli import Trust
 
 OPENENV_EPILOG = """

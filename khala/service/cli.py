@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from khala.commands.options import Game, MatchOptions, MindOptions, Out, RunName, Task, with_options
+from khala.commands.run_options import Game, MatchOptions, MindOptions, Out, RunName, Task, with_options
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Insecure, Json, Listen, Tls
 from khala_protocol.commandline import say

@@ -8,7 +8,7 @@ import pytest
 
 from khala_bridge.act import Actor, JointAction
 from khala_bridge.act.actor import fate
-from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.screen_executor import ScreenExecutor
 from khala_bridge.act.targets import Targets
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint

@@ -11,8 +11,8 @@ from s2clientprotocol import common_pb2, error_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.act import Actor, JointAction, executor_of
-from khala_bridge.act.raw import RawExecutor
-from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.raw_executor import RawExecutor
+from khala_bridge.act.screen_executor import ScreenExecutor
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.compat import actions as pysc2
 from khala_bridge.frames import WorldPoint

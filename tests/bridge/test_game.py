@@ -14,7 +14,7 @@ import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.act import JointAction, PlanResult, PlanStep
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.errors import GameError, GameHangs, GameMissing
 from khala_bridge.game import pysc2_game
 from khala_bridge.game.game import GameConfig, GameIdentity, GamePatience, GameThread, Sides, StepResult, find_sc2

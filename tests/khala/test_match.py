@@ -10,7 +10,7 @@ import pytest_asyncio
 
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.game.game import GameConfig, GameThread, Sides
 from khala_bridge.game.pysc2_game import PySC2Game
 from khala_orchestrator.config import MatchConfig, change, load_task

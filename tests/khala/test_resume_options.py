@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from khala.cli import app
-from khala.commands.options import MatchOptions
+from khala.commands.run_options import MatchOptions
 from khala.playing.matches import new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.match.cards import run_card

@@ -12,8 +12,8 @@ import pytest
 import typer
 
 from khala.commands.exit_codes import SIGNALLED
-from khala.commands.options import MindOptions
 from khala.commands.run import WantedRun, _game_for, run
+from khala.commands.run_options import MindOptions
 
 
 def wanted(task: str | None, **match: Any) -> WantedRun:

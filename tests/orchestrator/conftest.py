@@ -13,7 +13,7 @@ from rich.console import Console
 from s2clientprotocol import error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.errors import GameError
 from khala_bridge.game.game import GameIdentity, GameThread, Sides, StepResult
 from khala_bridge.knowledge import knowledge

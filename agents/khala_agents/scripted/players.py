@@ -1,6 +1,7 @@
 """Players that answer a prompt with a script: text in, reply in the form of the paper out.
 
-The same prompt gives the same reply. They know the prompt and nothing else: no game, no state, no clock.
+`PLAYERS` lists them; `configs/models/scripted.yaml` says which plays by default. The same prompt gives the same reply.
+They know the prompt and nothing else: no game, no state, no clock.
 """
 
 from __future__ import annotations

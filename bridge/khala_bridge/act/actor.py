@@ -18,10 +18,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act.addressee import Addressees
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.act.recognise import recognise
 from khala_bridge.act.rejected import CallRejected, reject
-from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.screen_executor import ScreenExecutor
 from khala_bridge.act.standing import StandingOrders
 from khala_bridge.act.translate import Translator
 from khala_bridge.act.until import read_until

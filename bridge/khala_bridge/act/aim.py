@@ -1,8 +1,8 @@
 """Where to click on the real screen to hit a unit or a place, by one snapshot.
 
-A click hits the topmost unit. So a unit is clicked where nothing else covers it, or where the feature layers show
-it all the same; a unit that is covered completely cannot be hit. Geometry and reading only: `khala_bridge.act.screen`
-decides which unit to click, and why.
+A click hits the topmost unit. So a unit is clicked where nothing else covers it, or where the feature layers show it
+all the same; a unit that is covered completely cannot be hit. Geometry and reading only:
+`khala_bridge.act.screen_executor` decides which unit to click, and why.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The hand that selects units on the screen: by the shortest way that fits, checked against the game's selection.
 
-Above it is the tour of `khala_bridge.act.screen`, which provides the camera and the functions; below it is
+Above it is the tour of `khala_bridge.act.screen_executor`, which provides the camera and the functions; below it is
 `khala_bridge.act.aim`, which says where to click. The hand selects own units only, and gives no orders.
 """
 

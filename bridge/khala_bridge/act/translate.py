@@ -1,7 +1,7 @@
 """Recognised actions → commands to the game, checked against the present state, also if they were meant earlier.
 
 A command holds units, a function, a unit or a world point as its target, and whether it waits behind earlier orders.
-It has no frame: the two executors play the same commands.
+It has no frame: `raw_executor` and `screen_executor` beside it make the calls of the game from the same commands.
 
     units     those that the team had when it was seen, as far as they exist; those that are named; or those that a
               rule of `khala_bridge.auto` finds

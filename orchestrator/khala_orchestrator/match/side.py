@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from khala_bridge.act import Actor
 from khala_bridge.observe import Feedback, Observer, shorten
 from khala_bridge.observe.triggers import triggers, vitals
+from khala_orchestrator.match import replies
 from khala_orchestrator.match.turn import Question
 from khala_orchestrator.roster import Seat
 from khala_orchestrator.words.letters import Letters
@@ -21,7 +22,6 @@ from khala_orchestrator.words.mailbox import Mailbox, newest
 from khala_orchestrator.words.notebook import Notebook
 from khala_orchestrator.words.repeats import Repeats
 from khala_protocol.messages import LOOPS_PER_S, AgentReport, Message, Observation, Received, Rejection, Report
-from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -33,10 +33,8 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.schedule import Decision, StepId
-    from khala_orchestrator.match.turn import Answer
     from khala_orchestrator.words.mailbox import Post
     from khala_protocol.messages import Advice, Fate, Timings, Trigger, Unasked
-    from khala_protocol.speech import Speech
 
 
 class SideTurn(NamedTuple):
@@ -195,8 +193,8 @@ class MatchSide:
             advice: of all sides, since the step before.
         """
         own = [decision for decision in decisions if decision.seat.side == self.name]
-        replies = {decision.seat.agent: self._speech(decision) for decision in own}
-        speeches = {agent: speech for agent, speech in replies.items() if speech is not None}
+        words = {decision.seat.agent: replies.read(decision, self.task) for decision in own}
+        speeches = {agent: speech for agent, speech in words.items() if speech is not None}
         seen = {name: member.seen for name, member in self._members.items() if member.seen is not None}
         joint = self._actor.joint(self._now, speeches, seen)
         messages = [
@@ -228,26 +226,6 @@ class MatchSide:
             text=text,
             human=human,
         )
-
-    def _speech(self, decision: Decision) -> Speech | None:
-        """Return the words of an agent, None if it failed and nothing stands in; only here is a reply parsed."""
-        text = self._reply_or_default(decision.answer)
-        speech = None if text is None else parse(text)
-        if speech is None or not self._is_too_old(decision):
-            return speech
-        faults = [_too_late(decision, call.name, call.start) for call in speech.calls[:1]]
-        return replace(speech, calls=(), faults=(*speech.faults, *faults))
-
-    def _reply_or_default(self, answer: Answer) -> str | None:
-        """Return the text of a reply.
-
-        The default reply stands in for an agent that failed, and not for one that chose to say nothing.
-        """
-        return answer.text if answer.status == "ok" else answer.text or self.task.default_reply or None
-
-    def _is_too_old(self, decision: Decision) -> bool:
-        limit = self.task.clock.max_age_loops
-        return limit is not None and decision.due_loop - decision.asked_loop > limit
 
     # --- reporting ----------------------------------------------------------------------------------
 
@@ -312,7 +290,7 @@ class MatchSide:
         return Feedback(accepted, shorten(rejections), received, ordered=bool(accepted) or wrote)
 
     def _fate(self, decision: Decision, turn: SideTurn) -> Fate | None:
-        return "refused" if self._is_too_old(decision) else turn.joint.fates.get(decision.seat.agent)
+        return "refused" if replies.is_too_old(decision, self.task) else turn.joint.fates.get(decision.seat.agent)
 
     def report_dropped(self, at: StepId, decisions: Sequence[Decision], loop: int) -> Sequence[AgentReport]:
         """Return the reports of decisions that did not take effect before the end of the episode."""
@@ -342,12 +320,6 @@ def _agent_report(at: StepId, decision: Decision, loop: int, fate: Fate | None, 
         age_loops=loop - decision.asked_loop,
         fate=fate,
     )
-
-
-def _too_late(decision: Decision, text: str, start: int) -> Rejection:
-    age = decision.due_loop - decision.asked_loop
-    message = f"Your reply came {age} game loops after its observation, which is too late: no order of it was given."
-    return Rejection(reason="too_late", message=message, text=text, start=start)
 
 
 def _join(before: Feedback, more: Feedback) -> Feedback:

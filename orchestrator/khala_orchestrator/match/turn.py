@@ -1,9 +1,9 @@
 """Ask agents, and take their answers: all of them by a deadline, or those that have arrived.
 
 Below it: publishers of observations and their pictures, and one inbox of replies. Above it:
-`khala_orchestrator.match.match`, which decides who is asked when and reads the text of a reply. It knows nothing of
-games. A question is open until its answer is collected. The first valid reply to an open question counts; all others
-are counted as ignored and dropped.
+`khala_orchestrator.match.match`, which decides who is asked when. It knows nothing of games;
+`khala_orchestrator.match.replies` reads the text of an answer. A question is open until its answer is collected. The
+first valid reply to an open question counts; all others are counted as ignored and dropped.
 
 The wait for an agent ends early when what it sent is not a reply, or when its liveliness token goes: it may still
 answer while the question is open. A required agent that goes is waited for as long as the clock's grace, and once it

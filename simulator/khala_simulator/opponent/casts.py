@@ -9,7 +9,7 @@ import numpy as np
 
 from khala_simulator.combat import buffs
 from khala_simulator.opponent import hands
-from khala_simulator.opponent.builds import Data
+from khala_simulator.opponent.build_file import Data
 from khala_simulator.tables.loader import read_data
 from khala_simulator.world.columns import NOBODY
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.opponent import army, bases, boosts, casts, drops, economy, growth, hands, scouting
-from khala_simulator.opponent.builds import load_race, name_of
+from khala_simulator.opponent import army, bases, boosts, casts, drops, economy, hands, scouting, spending
+from khala_simulator.opponent.build_file import load_race, name_of
 from khala_simulator.opponent.economy import Staff
 from khala_simulator.opponent.enemy import Enemy
 from khala_simulator.opponent.side import OwnSide
@@ -42,7 +42,7 @@ def think(world: World, player: int) -> None:
     drops.lead(side, enemy)
     staff = Staff(side)
     economy.mine(side, staff)
-    growth.grow(side, enemy, staff)
+    spending.spend(side, enemy, staff)
     boosts.boost(side)
     scouting.look(side)
 

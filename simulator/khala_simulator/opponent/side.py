@@ -1,6 +1,7 @@
 """What a computer player knows of its own side in one thought, and the money that it has left in it.
 
-Made afresh for every thought. Above: every other module of this package. Below: the world, and ``levels``, ``builds``.
+Made afresh for every thought. Above: every other module of this package. Below: the world, and ``levels``,
+``build_file``.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ import numpy as np
 
 from khala_simulator.economy import building_sites, harvesting, supply
 from khala_simulator.economy.requirements import counts_as
-from khala_simulator.opponent.builds import load_race, stage_at
+from khala_simulator.opponent.build_file import load_race, stage_at
 from khala_simulator.opponent.levels import FASTER_LOOPS, level_of
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.builds import BuildOrder, BuildStage, Race
+    from khala_simulator.opponent.build_file import BuildOrder, BuildStage, Race
     from khala_simulator.opponent.levels import OpponentLevel
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.catalog import Catalog

@@ -9,8 +9,8 @@ from s2clientprotocol import common_pb2, debug_pb2
 
 from khala_bridge.act import Actor
 from khala_bridge.act.plan import PlanResult, PlanStep
-from khala_bridge.act.raw import RawExecutor
-from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.raw_executor import RawExecutor
+from khala_bridge.act.screen_executor import ScreenExecutor
 from khala_bridge.compat import actions as pysc2
 from khala_bridge.game.game import GameConfig
 from khala_bridge.game.pysc2_game import PySC2Game

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_bridge.act.raw import RawExecutor
+from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.catalogue.generated import without_words

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala_bridge.act.raw import RawExecutor
-from khala_bridge.act.screen import ScreenExecutor
+from khala_bridge.act.raw_executor import RawExecutor
+from khala_bridge.act.screen_executor import ScreenExecutor
 from khala_bridge.catalogue.catalogue import catalogue
 
 from .cases import by_caster, cases

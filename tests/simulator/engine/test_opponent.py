@@ -20,14 +20,14 @@ from khala_simulator.opponent import (
     composition,
     drops,
     economy,
-    growth,
     hands,
     player,
     products,
     sites,
+    spending,
     stance,
 )
-from khala_simulator.opponent.builds import NAMES, load_race, name_of, stage_at
+from khala_simulator.opponent.build_file import NAMES, load_race, name_of, stage_at
 from khala_simulator.opponent.casts import rules
 from khala_simulator.opponent.economy import Staff
 from khala_simulator.opponent.enemy import Enemy
@@ -286,7 +286,7 @@ def test_it_expands_when_its_base_is_full() -> None:
     world.players[1].minerals = 450.0
     side = side_of(world)
     side.mind.step = 99
-    growth.expand(side, Enemy(side), Staff(side))
+    spending.expand(side, Enemy(side), Staff(side))
     assert side_of(world).ordered["Nexus"] == 1
 
 
@@ -319,7 +319,7 @@ def test_a_weak_level_waits_between_the_steps_of_its_opening() -> None:
         world = game(levels=(level, 1))
         world.players[1].minerals = 400.0
         side = side_of(world)
-        growth.follow_opening(side, Enemy(side))
+        spending.follow_opening(side, Enemy(side))
         first[level] = side_of(world).ordered["Pylon"]
     assert first == {1: 0, 7: 1}
 
@@ -335,7 +335,7 @@ def test_a_weak_level_makes_its_army_slowly_whatever_it_could_pay() -> None:
         put(world, 1, "SupplyDepot", 46.0, 44.0, 2)
         world.players[1].minerals = 1000.0
         for _ in range(2):
-            growth.train_army(side_of(world))
+            spending.train_army(side_of(world))
             advance(world, 410)
         made[level] = having(world, 1)["Marine"]
     assert made == {1: 1, 7: 2}

@@ -1,6 +1,6 @@
 """What computer players build, and when: ``data/opponents/<race>.yaml`` as frozen values.
 
-A build is an opening, followed in order, and stages by time that say what is wanted from then on. ``growth`` spends
+A build is an opening, followed in order, and stages by time that say what is wanted from then on. ``spending`` spends
 the money on it.
 """
 

@@ -1,4 +1,4 @@
-"""Growth: what the money is spent on, in the order in which it matters.
+"""Spending: what a player builds, trains and researches, in the order in which it matters.
 
 What can't be paid yet is put aside, so that what comes later does not eat it up. While the army is too small for what
 is known of the enemy, the army comes first.
@@ -45,7 +45,7 @@ ADDONS: Final = ("TechLab", "Reactor")
 LEVELS: Final = ("Level1", "Level2", "Level3")
 
 
-def grow(side: OwnSide, enemy: Enemy, staff: Staff) -> None:
+def spend(side: OwnSide, enemy: Enemy, staff: Staff) -> None:
     """Spend the money of this thought."""
     economy.keep_supply_ahead(side)
     make_addons(side)

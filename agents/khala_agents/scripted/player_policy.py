@@ -1,4 +1,7 @@
-"""Policies that ask no model. `khala_agents.policy.FunctionPolicy` is the third of them."""
+"""Policies that ask no model: scripted players within a worker, and fixed replies.
+
+`khala_agents.scripted.players` has the players. `khala_agents.policy.FunctionPolicy` is the third such policy.
+"""
 
 from __future__ import annotations
 
