@@ -111,7 +111,6 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("compare", "docs/measurements-over-time.md"),
         Benchmark("history", "docs/measurements-over-time.md"),
         Benchmark("repository.house", "Makefile"),
-        Benchmark("repository.coverage", "Makefile"),
     )
 }
 """By name; those of the whole stand in the order in which it runs them."""

@@ -85,7 +85,7 @@ def _ip(namespace: str, *arguments: str) -> None:
 @pytest.mark.parametrize("topology", ["the host is the router", "a router between"])
 async def test_no_attack_from_another_machine_succeeds(machines: tuple[str, str], topology: str) -> None:
     host, stranger = machines
-    command = [sys.executable, "-m", "bench", "strangers", "--json", "--seconds", "2"]
+    command = [sys.executable, "-m", "bench", "strangers", "--json", "--seconds", "1"]
     command += ["--listen", f"tls/{HOST_ADDRESS}:7447", "--through", "ip", "netns", "exec", stranger]
     command += ["--router"] if topology == "a router between" else []
     process = await asyncio.create_subprocess_exec(

@@ -82,6 +82,7 @@ def test_probes_measure_what_the_tables_of_the_simulator_say(first: Calibration)
     assert first.probes["weapon.dead_attacker"].values["Zealot"].mean < 16  # its second hit does not come
 
 
+@pytest.mark.slow
 def test_two_runs_differ_in_nothing_beyond_chance_and_with_the_same_seed_in_nothing(first: Calibration) -> None:
     again, other = played(chosen(*CHEAP)), played(chosen(*CHEAP), seed=2)
     assert {name: one.values for name, one in again.probes.items()} == {

@@ -147,6 +147,7 @@ async def begun() -> asyncio.Event:
     return event
 
 
+@pytest.mark.slow
 async def test_a_child_that_fails_again_and_again_has_failed_for_good_in_its_last_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

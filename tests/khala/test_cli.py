@@ -299,6 +299,7 @@ def test_a_process_that_dies_again_and_again_ends_the_match(tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.game
 def test_an_agent_that_cannot_begin_ends_the_match_with_its_own_words(tmp_path: Path) -> None:
     (tmp_path / "picky.py").write_text(

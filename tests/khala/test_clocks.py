@@ -28,13 +28,13 @@ async def test_the_tokens_of_a_match_and_not_the_time_they_took_decide_it(tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
-async def test_a_match_repeats_under_every_rule_that_waits_and_replays_under_all(seed: int, tmp_path: Path) -> None:
-    rows = await measure("2s3z_pair", [seed], tmp_path)
+async def test_a_match_repeats_under_every_rule_that_waits_and_replays_under_all(tmp_path: Path) -> None:
+    rows = await measure("2s3z_pair", [2], tmp_path)
     assert [row.rule for row in rows] == list(RULES)
     assert [row.violations() for row in rows] == [[]] * len(RULES)
 
 
+@pytest.mark.slow
 async def test_in_real_time_the_wall_clock_decides_and_the_recording_replays(tmp_path: Path) -> None:
     task = change(load_task("2s3z_pair"), rule="realtime", speed=SPEED, max_steps=12)
     played = await play(MatchConfig(task=task, run="real"), tmp_path / "real.mcap", 0.3)

@@ -83,6 +83,7 @@ async def test_the_recorded_future_comes_about_again(golden: Trunk, tmp_path: Pa
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.game
 async def test_a_fork_is_the_recorded_match_up_to_its_step_and_goes_on_as_others_decide(
     golden: Trunk, tmp_path: Path

@@ -86,6 +86,7 @@ def test_an_error_of_the_model_ends_the_sample(tmp_path: Path) -> None:
     assert "the endpoint is away" in log.error.message
 
 
+@pytest.mark.slow
 def test_every_task_of_the_catalogue_is_one_of_inspect() -> None:
     from khala.inspect.tasks import TASKS
 

@@ -91,6 +91,7 @@ async def test_a_process_plays_one_match_after_another_and_answers_for_itself_al
     assert asked.is_set()
 
 
+@pytest.mark.slow
 async def test_a_process_that_is_told_to_end_closes_its_match_and_says_so(
     process: MatchWorker, asked: asyncio.Event, tmp_path: Path
 ) -> None:
@@ -100,6 +101,7 @@ async def test_a_process_that_is_told_to_end_closes_its_match_and_says_so(
     assert Recording.open(tmp_path / "first" / "recording.mcap").complete
 
 
+@pytest.mark.slow
 async def test_a_process_that_is_killed_has_lost_its_match(
     process: MatchWorker, asked: asyncio.Event, tmp_path: Path
 ) -> None:
@@ -127,6 +129,7 @@ async def test_a_match_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     assert ended == Ended(state="timeout", words="it took longer than 0.0001 hours")
 
 
+@pytest.mark.slow
 async def test_a_match_goes_on_from_the_newest_recording_of_its_directory(tmp_path: Path) -> None:
     def lose(message: Wire) -> None:
         if isinstance(message, Report) and message.step == 4:

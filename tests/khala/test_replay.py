@@ -44,6 +44,7 @@ def test_the_golden_recording_is_whole() -> None:
     assert [result.outcome for result in golden.results] == ["win"]
 
 
+@pytest.mark.slow
 async def test_the_host_shows_its_agents_what_it_showed_them_then(replay_host: Replay) -> None:
     assert await replay_host(GOLDEN) == []
 

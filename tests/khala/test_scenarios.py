@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import pytest
@@ -43,8 +44,7 @@ def test_the_skilled_player_wins(task: str, tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("player", PLAYERS)
-@pytest.mark.parametrize("task", scenarios())
+@pytest.mark.parametrize(("task", "player"), list(zip(scenarios(), itertools.cycle(PLAYERS))))
 def test_every_scenario_is_played_to_its_end(
     task: str, player: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,6 +42,7 @@ async def played(match: SeatedMatch) -> list[SeatsTurn]:
     return turns
 
 
+@pytest.mark.slow
 @game
 async def test_a_match_of_seats_is_the_match_over_the_bus(tmp_path: Path) -> None:
     here, there = tmp_path / "here.mcap", tmp_path / "there.mcap"
@@ -97,6 +98,7 @@ async def test_others_play_on_while_the_caller_has_one_seat_of_a_side() -> None:
     assert [result.side for result in turns[-1].results] == ["red"]
 
 
+@pytest.mark.slow
 @game
 async def test_news_are_each_agent_that_is_asked_or_no_longer_waited_for_and_each_step() -> None:
     hasty = change(load_task("2s3z_pair"), max_steps=1, max_wait_s=0.5)

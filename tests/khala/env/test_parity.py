@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from khala_simulator.battle import Point, Units
 
-EPISODES = 500
+EPISODES = 200
 """Of all maps together, through PySC2."""
 
 

@@ -76,6 +76,7 @@ def test_an_environment_is_pickled_before_its_first_episode(make: Any, library: 
     assert vars(again.unwrapped)["_task"] == vars(env.unwrapped)["_task"]
 
 
+@pytest.mark.slow
 @game
 def test_an_environment_with_an_episode_says_why_it_is_not_pickled(pair: TextParallelEnv) -> None:
     pair.reset(seed=1)

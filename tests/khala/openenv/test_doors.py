@@ -291,6 +291,7 @@ async def test_another_client_cannot_end_or_move_an_episode(serving: Serving) ->
         assert closed.json() == {"episode_id": made}, "the name that the server made is all that a client needs"
 
 
+@pytest.mark.slow
 @pytest.mark.game
 async def test_a_session_that_left_makes_room_and_reads_why_when_it_comes_back(
     serving: Serving, monkeypatch: pytest.MonkeyPatch

@@ -120,6 +120,7 @@ async def test_sessions_are_apart_seeded_and_no_more_than_the_server_has(serving
     assert not alive
 
 
+@pytest.mark.slow
 async def test_an_episode_over_http_has_a_name(serving: Serving) -> None:
     async with serving(sessions=2) as address, httpx.AsyncClient(base_url=address, timeout=60) as client:
         began = await client.post("/reset", json={"seed": 1, "task": "2s3z", "max_steps": 2})

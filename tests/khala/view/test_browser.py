@@ -188,6 +188,7 @@ def test_a_list_of_runs_leads_to_a_match(context: BrowserContext, view: Callable
     page.get_by_role("slider", name="Moment").wait_for()
 
 
+@pytest.mark.slow
 def test_a_match_that_is_played_grows_on_the_page(
     context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path
 ) -> None:
@@ -213,6 +214,7 @@ def test_a_match_that_is_played_grows_on_the_page(
 # --- safety -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_hostile_texts_stay_texts(context: BrowserContext, view: Callable[..., Viewer], tmp_path: Path) -> None:
     path = tmp_path / "hostile.mcap"
     with Recorder(path) as recorder:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.game
 
-STEPS = int(os.environ.get("KHALA_RANDOM_STEPS", "10000"))
+STEPS = int(os.environ.get("KHALA_RANDOM_STEPS", "2000"))
 SHORT = 60
 
 
@@ -84,19 +84,16 @@ def quiet() -> None:
     logging.set_verbosity(logging.ERROR)
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n == "Simple64" else [pytest.mark.slow]) for n in MAPS])
 @pytest.mark.filterwarnings("ignore")  # of PySC2
-def test_a_random_agent_meets_no_fault(
-    name: str, make_env: Callable[..., Any], capfd: pytest.CaptureFixture[str]
-) -> None:
-    run_at_random(make_env, name, SHORT, capfd)
+def test_a_random_agent_meets_no_fault(make_env: Callable[..., Any], capfd: pytest.CaptureFixture[str]) -> None:
+    run_at_random(make_env, "Simple64", SHORT, capfd)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", MAPS)
 @pytest.mark.filterwarnings("ignore")  # of PySC2
-def test_a_random_agent_meets_no_fault_in_ten_thousand_steps(
+def test_a_random_agent_meets_no_fault_in_two_thousand_steps(
     name: str, make_env: Callable[..., Any], capfd: pytest.CaptureFixture[str]
 ) -> None:
     run_at_random(make_env, name, STEPS, capfd)
