@@ -28,8 +28,7 @@ from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Policy, as_policy
-from khala_agents.scripted.player_policy import ScriptedPlayer, Silent
-from khala_agents.scripted.players import PLAYERS
+from khala_agents.scripted.players import PLAYERS, ScriptedPlayer, Silent
 from khala_agents.secret import read_key
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import import_trusted

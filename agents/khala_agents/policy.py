@@ -21,8 +21,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
-from khala_agents.deadline import time_to_decide_s
 from khala_agents.pictures import PictureStore
+from khala_agents.time_to_decide import time_to_decide_s
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:

@@ -21,12 +21,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 from khala_agents.briefings import Briefings
-from khala_agents.deadline import time_to_decide_s
 from khala_agents.guard import Guard
 from khala_agents.ledger import UsageLedger
 from khala_agents.links import Links, join
 from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context
+from khala_agents.time_to_decide import time_to_decide_s
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, BusError, PeerError
 from khala_protocol.messages import Briefing, Reply, Result, Usage, Wire

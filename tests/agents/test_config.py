@@ -18,7 +18,7 @@ from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import FunctionPolicy, ObjectPolicy
 from khala_agents.scripted.canned import Canned, Given
-from khala_agents.scripted.player_policy import Silent
+from khala_agents.scripted.players import Silent
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ChatMessage

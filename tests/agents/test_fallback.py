@@ -19,7 +19,7 @@ from khala_agents.llm.pricing import Prices
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Context, Decision
-from khala_agents.scripted.player_policy import Fixed, ScriptedPlayer
+from khala_agents.scripted.players import Fixed, ScriptedPlayer
 from khala_agents.worker import run_worker
 from khala_protocol.messages import Usage
 

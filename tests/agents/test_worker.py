@@ -17,7 +17,7 @@ from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Decision, FunctionPolicy, Policy
-from khala_agents.scripted.player_policy import Fixed
+from khala_agents.scripted.players import Fixed
 from khala_agents.worker import WorkerTally, run_worker, run_workers
 from khala_protocol.codec import encode
 from khala_protocol.errors import BusError

@@ -1,4 +1,4 @@
-"""Players that answer a prompt with a script: text in, reply in the form of the paper out.
+"""Players that answer a prompt with a script, and the policies by which a worker plays them without a model.
 
 `PLAYERS` lists them; `configs/models/scripted.yaml` says which plays by default. The same prompt gives the same reply.
 They know the prompt and nothing else: no game, no state, no clock.
@@ -7,16 +7,19 @@ They know the prompt and nothing else: no game, no state, no clock.
 from __future__ import annotations
 
 import math
+import random
 from collections import Counter
 from typing import TYPE_CHECKING, Literal
 
+from khala_agents.policy import Policy
 from khala_agents.scripted.reading import ANY, Situation, TextAction, TextTeam, TextUnit, read
 from khala_agents.scripted.skilled import skilled
 from khala_agents.scripted.writing import call, inside, point, reply
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Callable, Iterable, Iterator
+
+    from khala_agents.policy import Context
 
 PlayerName = Literal["silent", "random-legal", "focus-fire", "skilled"]
 
@@ -61,7 +64,10 @@ def random_calls(situation: Situation, rng: random.Random) -> Iterator[str]:
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
-    """Fire with all teams on the weakest enemy in reach, one target for all that reach it; the others advance."""
+    """Fire with all teams on the weakest enemy in reach, one target for all that reach it; the others advance.
+
+    The default player.
+    """
     situation = read(observation)
     teams = list(situation.teams.values())
     target = _common_target(teams)
@@ -167,3 +173,43 @@ def _hello(situation: Situation, rng: random.Random) -> list[tuple[str, str]]:
     if situation.correspondents and rng.random() < MESSAGE_SHARE:
         return [(rng.choice(situation.correspondents), f"{len(situation.teams)} team(s) of mine are left.")]
     return []
+
+
+# --- policies ---------------------------------------------------------------------------------------
+
+
+class Fixed(Policy):
+    """A policy that gives the same reply to every observation."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    async def decide(self, context: Context) -> str:
+        """Return the text."""
+        del context
+        return self._text
+
+
+class ScriptedPlayer(Policy):
+    """A scripted player within a worker: it plays from the text of the observation alone.
+
+    Args:
+        name: of the player.
+        seed: for what it leaves to chance; the same seed and text give the same reply.
+    """
+
+    def __init__(self, name: PlayerName, *, seed: int = 0) -> None:
+        self._play = PLAYERS[name]
+        self._seed = seed
+
+    async def decide(self, context: Context) -> str:
+        """Return the player's reply."""
+        text = context.observation.text
+        return self._play(text, random.Random(f"{self._seed} {text}"))
+
+
+class Silent(Fixed):
+    """A policy that answers, and orders nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("Analysis: I watch.\nActions:\n")

@@ -1,6 +1,6 @@
 """Replies: what an agent's answer says, by its own words or by the default reply of the task.
 
-Only here is a reply parsed. Above it: `khala_orchestrator.match.side`, which carries the words out.
+The host parses a reply here and nowhere else. Above it: `khala_orchestrator.match.side`, which carries the words out.
 """
 
 from __future__ import annotations

@@ -48,9 +48,9 @@ from khala_protocol.speech.headings import (
 )
 from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescape
 from khala_protocol.speech.objects import ObjectMessage, object_at
-from khala_protocol.speech.orders import numbers_in, standing_at
 from khala_protocol.speech.quoting import MessageReader
 from khala_protocol.speech.said import Forget, Gathering, ListenTo, MessageTo, Note, Revoke, Speech, Standing
+from khala_protocol.speech.standing import numbers_in, standing_at
 from khala_protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
