@@ -17,6 +17,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sqlite3
+import weakref
 from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from typing import TYPE_CHECKING, Self
 
@@ -41,7 +42,7 @@ create table held (entry integer primary key autoincrement, account text not nul
 
 
 class MoneyLedger:
-    """Sums of money in US dollars by account, in memory or in a file.
+    """Sums of money in US dollars by account, in memory or in a file, which is closed with the last use of the ledger.
 
     Args:
         path: of the file, which is made when something is booked; None to keep the sums in memory.
@@ -53,6 +54,7 @@ class MoneyLedger:
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
         self._database: sqlite3.Connection | None = None
+        self._closing: weakref.finalize[..., MoneyLedger] | None = None
 
     @property
     def exists(self) -> bool:
@@ -101,9 +103,9 @@ class MoneyLedger:
 
     def close(self) -> None:
         """Close the file. May be called twice, and the ledger be used again."""
-        database, self._database = self._database, None
-        if database is not None:
-            database.close()
+        self._database = None
+        if self._closing is not None:
+            self._closing()
 
     def __enter__(self) -> Self:
         return self
@@ -117,6 +119,7 @@ class MoneyLedger:
         try:
             if self._database is None:
                 self._database = self._open()
+                self._closing = weakref.finalize(self, self._database.close)
             with transaction(self._database):
                 yield self._database
         except (sqlite3.Error, OSError) as error:
@@ -126,15 +129,19 @@ class MoneyLedger:
 
     def _open(self) -> sqlite3.Connection:
         if self.path is None:
-            database = sqlite3.connect(":memory:", isolation_level=None)
+            database = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
             database.executescript(_SCHEMA)
             return database
         if not self.path.exists():
             _create(self.path)
-        database = sqlite3.connect(self.path, timeout=PATIENCE_S, isolation_level=None)
-        database.execute("select 1 from paid, held limit 1")  # a file that is empty or another one has no such tables
-        # Without a sync, a killed process loses nothing, only a power failure may. With a log, a request takes 0.2 ms.
-        database.executescript("pragma journal_mode = wal; pragma synchronous = off;")
+        database = sqlite3.connect(self.path, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
+        try:
+            database.execute("select 1 from paid, held limit 1")  # an empty file, or another one, has no such tables
+            # Without a sync, only a power failure loses anything. With a log, a request takes 0.2 ms.
+            database.executescript("pragma journal_mode = wal; pragma synchronous = off;")
+        except BaseException:
+            database.close()
+            raise
         return database
 
 
