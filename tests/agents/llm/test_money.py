@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import sqlite3
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -88,6 +89,7 @@ async def test_a_model_that_costs_nothing_is_asked_under_any_budget() -> None:
 
 
 SPENDING = """
+import sqlite3
 import sys
 from pathlib import Path
 from khala_agents.llm.money import MoneyLedger, Overdrawn
@@ -109,6 +111,16 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 def start(code: str, path: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", code, str(path)])
+
+
+def test_a_ledger_that_nobody_uses_any_more_has_closed_its_file(tmp_path: Path) -> None:
+    ledger = MoneyLedger(tmp_path / "match.ledger")
+    ledger.pay("", 0.1)
+    database = ledger._database
+    assert database is not None
+    del ledger
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        database.execute("select 1")
 
 
 def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: Path) -> None:
