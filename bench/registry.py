@@ -93,6 +93,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("simulator.rendering", "The simulator"),
         Benchmark("simulator.compilers", "docs/design/engine.md"),
         Benchmark("environments.smac", "SMAC's own package"),
+        Benchmark("environments.smacv2", "SMACv2's own package"),
         Benchmark("environments.smac_speed", "The simulator"),
         Benchmark("environments.env_parity", "Environments for training"),
         Benchmark("environments.train", "docs/how-to/train.md"),

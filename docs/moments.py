@@ -238,7 +238,7 @@ MOMENTS = {
 def gallery() -> Image:
     """Draw every type with its own outline, on both sides."""
     catalog = load_catalog()
-    sprites = wardrobe(catalog.version, GALLERY_SCALE)
+    sprites = wardrobe(catalog, GALLERY_SCALE)
     names = [name for name in OUTLINES if not name.endswith(("Phased", "Burrowed"))]
     rows = -(-len(names) // GALLERY_COLUMNS)
     image = np.full((rows * CELL[1], GALLERY_COLUMNS * CELL[0], 3), palette.LOW, np.uint8)

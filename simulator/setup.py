@@ -43,6 +43,12 @@ def members() -> list[Path]:
     return sorted(kernels | {rule for rule in rules - taken if rule.exists()})
 
 
+def layouts_changed() -> bool:
+    """Return whether a ``.pxd`` is younger than what was compiled: Cython does not see all who use it."""
+    compiled = [made.stat().st_mtime for made in PACKAGE.rglob("*.c")]
+    return bool(compiled) and max(types.stat().st_mtime for types in PACKAGE.rglob("*.pxd")) > min(compiled)
+
+
 def extensions() -> list[Extension]:
     """Return the modules to be compiled: none without a compiler."""
     if ENGINE == "python" or not find_compiler():
@@ -64,7 +70,8 @@ def extensions() -> list[Extension]:
         for member in members()
     ]
     jobs = os.cpu_count() or 1
-    return list(cythonize(modules, compiler_directives=flags.CYTHON, nthreads=jobs if sys.platform == "linux" else 0))
+    threads = jobs if sys.platform == "linux" else 0
+    return list(cythonize(modules, compiler_directives=flags.CYTHON, nthreads=threads, force=layouts_changed()))
 
 
 setup(ext_modules=extensions(), options={"build_ext": {"parallel": os.cpu_count() or 1}})

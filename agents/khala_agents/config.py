@@ -112,8 +112,9 @@ class ModelConfig(Frozen):
     seed: int | None = None
     extra: dict[str, JsonValue] = Field(default_factory=dict)
     """Fields of the request body, as they are."""
-    try_timeout_s: float = Field(default=45.0, gt=0)
-    """Time for one try; the time to the step's deadline if that is shorter."""
+    try_timeout_s: float | None = Field(default=None, gt=0)
+    """Time for one try; the time to the step's deadline if that is shorter. None: half of what the step gives, at least
+    45 s, so that a slow model answers and a lost request is made again; 10 minutes without a deadline."""
     retry: RetryRule = RetryRule()
     limits: LimitRules = LimitRules()
     breaker: BreakerRule = BreakerRule()

@@ -50,6 +50,10 @@ UNKNOWN = Usage(requests=1, unknown_requests=1)
 UNBILLED = Usage(requests=1)
 
 
+_LEAST_TRY_S = 45.0
+_PATIENCE_S = 600.0
+
+
 class LLMPolicy(Policy):
     """A policy that decides by asking a language model.
 
@@ -61,7 +65,8 @@ class LLMPolicy(Policy):
         retry: how often a failed try is repeated.
         limits: shared with other agents of the process.
         breaker: shared with the agents of the process that ask the same endpoint.
-        try_timeout_s: time for one try; the time to the deadline if that is shorter.
+        try_timeout_s: time for one try; the time to the deadline if that is shorter. None: half of what the step gives,
+            at least 45 s; 10 minutes without a deadline.
         vision: how the model sees; None if it does not see, and pictures are left out.
         pace: how fast the model is, for the clock `token`; None: the task says.
         rng: jitter of the waits between tries.
@@ -75,7 +80,7 @@ class LLMPolicy(Policy):
         retry: RetryRule | None = None,
         limits: RequestLimits | None = None,
         breaker: Breaker | None = None,
-        try_timeout_s: float = 45.0,
+        try_timeout_s: float | None = None,
         vision: Vision | None = None,
         pace: Pace | None = None,
         rng: random.Random | None = None,
@@ -133,7 +138,7 @@ class LLMPolicy(Policy):
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
-        return completion.text
+        return Decision(completion.text, cut=True) if completion.cut else completion.text
 
     def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:
         """Have memory and summary begin with these steps, in the episode that they are of."""
@@ -303,7 +308,7 @@ class _Tries:
         return usage if usage.images else usage + self._images  # a recorded one has them counted already
 
     def _request(self, now: float) -> Request:
-        timeout_s = self._policy.try_timeout_s
+        timeout_s = self._policy.try_timeout_s or _time_for_a_try(self._context.observation.answer_within_s)
         if self._context.deadline is not None:
             timeout_s = min(timeout_s, max(self._context.deadline - now, 0.0))
         return Request(
@@ -333,6 +338,7 @@ class _Tries:
             params=dict(self._policy.client.params),
             answered_by=completion.model if completion else "",
             completion=completion.text if completion else None,
+            finish=completion.finish if completion else "",
             status=outcome.status,
             reason=outcome.reason,
             started_s=began - self._context.arrived,
@@ -341,3 +347,8 @@ class _Tries:
             usage=usage,
         )
         self._context.trace(exchange)
+
+
+def _time_for_a_try(step_s: float | None) -> float:
+    """Return the time for one request in a step that gives so long; None for as long as it takes."""
+    return _PATIENCE_S if step_s is None else max(_LEAST_TRY_S, step_s / 2)

@@ -44,6 +44,7 @@ class Decision:
         detail: why it did not decide, in a few words that are the same each time: decisions are counted by them.
         reason: the same in the words of whoever failed, such as an endpoint.
         hopeless: whether it will never decide, because its endpoint refuses its key or its model.
+        cut: whether its model reached its limit of tokens within the text.
         attempts, usage: its cost; the worker counts requests that a policy traces (`Context.trace`).
     """
 
@@ -52,6 +53,7 @@ class Decision:
     detail: str = ""
     reason: str = ""
     hopeless: bool = False
+    cut: bool = False
     attempts: int = 0
     usage: Usage = field(default_factory=Usage)
 

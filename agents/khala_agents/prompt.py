@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
 if TYPE_CHECKING:
@@ -75,16 +76,17 @@ def _line(text: str) -> str:
 
 def system_text(briefing: Briefing) -> str:
     """Return the part of a prompt that says everything except what the agent sees."""
+    most = briefing.standing_orders
     sections = (
         ("Who you are", _identity(briefing)),
         ("Your task", briefing.task),
         ("Your teams", _teams(briefing.teams)),
         ("Rules", _rules(briefing)),
-        ("Actions", _actions(briefing.actions)),
+        ("Actions", manual.list_actions(briefing.actions)),
         ("Arguments", _arguments(briefing.actions, briefing.frames)),
         ("Communication", _communication(briefing.correspondents, briefing.channels)),
         ("Memory", _memory(briefing.memory)),
-        ("Standing orders", _standing(briefing)),
+        ("Standing orders", manual.standing_orders(briefing.actions, most) if most else ""),
         ("How to answer", _format(briefing)),
     )
     return "\n\n".join(f"# {title}\n{text}" for title, text in sections if text)
@@ -106,13 +108,15 @@ def _rules(briefing: Briefing) -> str:
         "You command your own teams only; others are commanded by other agents.",
         "Rely on what the latest observation says. Units that it does not list are out of sight or dead.",
         *_RULES[briefing.agent_kind],
-        f"A team carries out at most {number} of your actions a step, in the order you write them; more are refused.",
+        f"A team carries out at most {number} of your actions a step, one after the other; more are refused.",
+        *([_ALONE] if any(action.name.startswith("Select_Unit_") for action in briefing.actions) else []),
         "An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.",
         _clock(briefing.clock),
     ]
     return "\n".join(f"- {rule}" for rule in rules)
 
 
+_ALONE = "An action for a single unit takes it out of the actions of its team in the same answer."
 _RULES: dict[AgentKind, tuple[str, ...]] = {
     "combat_group": (
         "Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.",
@@ -158,17 +162,6 @@ def _clock(clock: Clock) -> str:
             return f"The game goes on while you think, and your actions meet what is there then: be brief.{answer}"
 
 
-def _actions(actions: Iterable[ActionSpec]) -> str:
-    return "\n".join(
-        f"- {signature(action)}" + (f": {action.description}" if action.description else "") for action in actions
-    )
-
-
-def signature(action: ActionSpec) -> str:
-    """Return an action as it is listed: `<Attack_Unit(tag)>`."""
-    return f"<{action.name}({', '.join(action.args)})>"
-
-
 def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
     used = {argument for action in actions for argument in action.args}
     meanings = {
@@ -186,19 +179,16 @@ def _communication(correspondents: Sequence[Contact], channels: Sequence[str]) -
         return ""
     lines = [f"- {who.name}" + (f": {who.role}" if who.role else "") for who in correspondents]
     lines += [f"- {channel}: a channel, heard by all who listen to it" for channel in channels]
-    lines.append("<MessageTo(name, '''text''')> sends a text to one of them; it arrives with their next observation.")
+    lines.append(manual.MESSAGE)
     if channels:
-        lines.append("<ListenTo(channel)> lets you hear a channel from the next observation on.")
+        lines.append(manual.LISTEN)
     return "\n".join(lines)
 
 
 def _memory(rule: MemoryRule) -> str:
     lines = []
     if rule.notes:
-        lines += [
-            "<Note('''text''')> keeps a note for yourself, of at most 200 characters.",
-            f"You have room for {rule.notes} notes; then the oldest one goes. <Forget(2)> removes note 2.",
-        ]
+        lines += [manual.NOTE, manual.FORGET.format(notes=rule.notes)]
     if rule.messages_s:
         lines += [
             f"A message to you is shown for {rule.messages_s:g} s of game time, or until you write to its sender."
@@ -206,23 +196,11 @@ def _memory(rule: MemoryRule) -> str:
     return "\n".join(lines)
 
 
-_STANDING = """\
-<Standing({call}, until 4:30)> under the heading of a team has the host give this action again and again.
-It is given to idle units of the team; for a team without units, once a step whenever it is possible.
-It ends at 4:30 of the game's clock. Other ends: until 22 Probe (so many, with those in production), until \
-WarpGateResearch (an upgrade), until attacked, until minerals 400. Without an end it goes on until you revoke it.
-<Revoke(1)> ends standing order 1. A team has at most {most}; they do not count as actions of a step."""
-
-
-def _standing(briefing: Briefing) -> str:
-    plain = [action.name for action in briefing.actions if not action.args]
-    call = f"{plain[0]}()" if plain else "Action(arguments)"
-    return _STANDING.format(call=call, most=briefing.standing_orders) if briefing.standing_orders else ""
-
-
 def _format(briefing: Briefing) -> str:
-    lines = [
-        'Write "Analysis:" and a few sentences on what matters now.',
+    lines = ['Write "Analysis:" and a few sentences on what matters now.']
+    if not briefing.teams:
+        return "\n".join([*lines, 'Then write "Communications:" and your messages: you have no team to order.'])
+    lines += [
         'Then write "Actions:", and under it a line "Team <name>:" for each team that shall act, named as observed.',
         "Below it write the actions of that team, each as <Name(arguments)> on a line of its own.",
         "A team that you do not mention goes on with what it is doing.",

@@ -266,6 +266,7 @@ class Worker:
             detail=decision.detail,
             reason=decision.reason,
             hopeless=decision.hopeless,
+            cut=decision.cut,
             latency_s=latency_s,
             attempts=attempts or decision.attempts,
             usage=usage if attempts or usage.requests else decision.usage,

@@ -22,12 +22,15 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bench.command_line import make_parser
 from khala_simulator.process.install import install
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
 AGENTS = ("random", "heuristic")
 MOST_REWARD = 20.0
@@ -56,30 +59,40 @@ class Played:
     trouble: str = ""
 
 
-def package_root(path: Path) -> Path:
-    """Return the directory from which `smac` can be imported.
+def package_root(path: Path, package: str = "smac") -> Path:
+    """Return the directory from which the package can be imported.
 
     Raises:
         SystemExit: there is no such package.
     """
     for root in (path, path.parent):
-        if (root / "smac" / "env" / "starcraft2").is_dir():
+        if (root / package / "env" / "starcraft2").is_dir():
             return root.absolute()
-    raise SystemExit(f"{path} holds no package smac: clone https://github.com/oxwhirl/smac and give the path of that")
+    raise SystemExit(
+        f"{path} holds no package {package}: clone https://github.com/oxwhirl/{package} and give the path of that"
+    )
 
 
 def play(map_name: str, agent: str, episodes: int, seed: int) -> Played:
     """Play one map in this process; `smac` must be importable."""
     from smac.env import StarCraft2Env  # noqa: PLC0415  # a package that only this measurement needs
 
+    env = StarCraft2Env(map_name=map_name, seed=seed, heuristic_ai=agent == "heuristic")
+    return play_episodes(env, map_name, agent, episodes, seed)
+
+
+def play_episodes(
+    env: Any, map_name: str, agent: str, episodes: int, seed: int, begun: Callable[[], Iterable[str]] = tuple
+) -> Played:
+    """Play episodes and close the environment; `begun` says what is wrong with the one that begins."""
     begun_s = time.monotonic()
     rng = np.random.default_rng(seed)
-    env = StarCraft2Env(map_name=map_name, seed=seed, heuristic_ai=agent == "heuristic")
     facts = env.get_env_info()
-    trouble = []
+    trouble = list[str]()
     results = []
     for _ in range(episodes):
         env.reset()
+        trouble += begun()
         sizes = {len(obs) for obs in env.get_obs()}, len(env.get_state())
         if sizes != ({facts["obs_shape"]}, facts["state_shape"]):
             trouble.append(f"sizes {sizes}")
@@ -111,6 +124,8 @@ def _episode(env: Any, agent: str, rng: np.random.Generator) -> Episode:
     """Play one episode to its end."""
     total = 0.0
     regained = 0.0
+    vitals = sum(enemy.health_max + enemy.shield_max for enemy in env.enemies.values())
+    worth = env.n_enemies * env.reward_death_value + env.reward_win + vitals
     over = False
     info = {}
     steps = 0
@@ -120,7 +135,7 @@ def _episode(env: Any, agent: str, rng: np.random.Generator) -> Episode:
             actions = [int(rng.choice(np.flatnonzero(env.get_avail_agent_actions(i)))) for i in range(env.n_agents)]
         reward, over, info = env.step(actions)
         total, regained, steps = total + reward, regained + _gains(env), steps + 1
-    most = MOST_REWARD * (1 + 2 * regained / env.max_reward)
+    most = MOST_REWARD * (worth + 2 * regained) / env.max_reward
     return Episode(total, most, bool(info.get("battle_won")), steps)
 
 
@@ -130,9 +145,11 @@ def _gains(env: Any) -> float:
     return float(sum(max(0.0, now.health + now.shield - old.health - old.shield) for now, old in both if old))
 
 
-def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: argparse.Namespace) -> Played:
+def play_apart(
+    root: Path, sc2path: Path, map_name: str, agent: str, options: argparse.Namespace, benchmark: str = "smac"
+) -> Played:
     """Play one map in a process of its own, and end it when it takes too long."""
-    command = [sys.executable, "-m", "bench", "smac", str(root), "--one", "--maps", map_name, "--agents", agent]
+    command = [sys.executable, "-m", "bench", benchmark, str(root), "--one", "--maps", map_name, "--agents", agent]
     command += ["--episodes", str(options.episodes), "--seed", str(options.seed)]
     environment = {**os.environ, "SC2PATH": str(sc2path), "PYTHONPATH": str(root)}
     limit_s = START_S + options.patience_s * options.episodes
@@ -147,7 +164,20 @@ def play_apart(root: Path, sc2path: Path, map_name: str, agent: str, options: ar
 
 def main() -> None:
     """Play what the command line asks for; exit with 1 if anything was wrong."""
-    parser = make_parser(__doc__)
+    main_of("smac", __doc__ or "", play, _maps)
+
+
+def _maps() -> Iterable[str]:
+    from smac.env.starcraft2.maps.smac_maps import get_smac_map_registry  # noqa: PLC0415  # see above
+
+    return [*get_smac_map_registry()]
+
+
+def main_of(
+    package: str, text: str, play: Callable[[str, str, int, int], Played], maps: Callable[[], Iterable[str]]
+) -> None:
+    """Play what the command line asks for with one package; exit with 1 if anything was wrong."""
+    parser = make_parser(text)
     parser.add_argument("path", type=Path)
     parser.add_argument("--maps", nargs="+")
     parser.add_argument("--agents", nargs="+", choices=AGENTS, default=AGENTS)
@@ -156,22 +186,20 @@ def main() -> None:
     parser.add_argument("--patience-s", type=float, default=120.0, help="for one episode")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    root = package_root(options.path)
+    root = package_root(options.path, package)
     sys.path.insert(0, str(root))
     if options.one:
         print(json.dumps(dataclasses.asdict(play(options.maps[0], options.agents[0], options.episodes, options.seed))))
         return
-    from smac.env.starcraft2.maps.smac_maps import get_smac_map_registry  # noqa: PLC0415  # see above
-
     if not options.json:
         print("| map | agent | won | reward | best | steps | obs | state | actions | s | |")
         print("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---|")
     wrong = False
     with tempfile.TemporaryDirectory() as directory:
         sc2path = install(directory)
-        for map_name in options.maps or get_smac_map_registry():
+        for map_name in options.maps or maps():
             for agent in options.agents:
-                played = play_apart(root, sc2path, map_name, agent, options)
+                played = play_apart(root, sc2path, map_name, agent, options, package)
                 wrong |= bool(played.trouble)
                 print(json.dumps(dataclasses.asdict(played)) if options.json else _row(played), flush=True)
     sys.exit(wrong)

@@ -5,6 +5,8 @@
     python -m bench opponents ladder --race zerg --games 10     each pair of levels, one race against itself
     python -m bench opponents ladder --neighbours --games 10    each level against the one below it, nine match-ups
     python -m bench opponents ladder --pairs 7-8 --log won.jsonl     one pair; games in the file are not played again
+    python -m bench opponents replays                           the same beside replays of the game's own
+    python -m bench opponents replays --races zerg --levels 3 7
     python -m bench opponents speed                             loops per second of a game with and without them
 
 Straight on the engine, without the SC2 API. A pair plays each seed from both seats in turn. A game that is not over
@@ -19,6 +21,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import statistics
 import sys
 import time
 from collections import Counter
@@ -32,7 +35,9 @@ from khala.experiment.statistics import wilson
 from khala_simulator.economy import supply
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.opponent import player
+from khala_simulator.opponent.build_file import NAMES
 from khala_simulator.opponent.levels import FASTER_LOOPS, load_levels
+from khala_simulator.tables.loader import read_data
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.players import GameResult, PlayerSetup
 
@@ -47,6 +52,8 @@ MOMENTS_S: Final = (90, 180, 300, 360, 480)
 MACRO: Final = 2
 CLEARLY: Final = 1.25
 STRIDE: Final = 112
+TOLERANCES: Final = {"workers": (0.15, 0.0), "army": (0.25, 3.0), "minerals": (0.2, 0.0)}
+"""How far from the median of replays a number may be: a share of it, or so much."""
 HELD_BACK: Final = 1 << 40
 """A loop that no game reaches."""
 
@@ -236,6 +243,39 @@ def ladder_table(games: Iterable[Game]) -> Iterator[str]:
         )
 
 
+# beside replays -------------------------------------------------------------------------------------------------------
+
+
+def beside_replays(options: argparse.Namespace) -> Iterator[str]:
+    """Yield the lines of a Markdown table: medians of replays, and of ours, one game of each build."""
+    replays = read_data("opponents", "replays.yaml")
+    moments = replays["moments_s"]
+    held = compared = 0
+    yield "| player | build | replays | what | 3:00 | 5:00 | 6:00 | 8:00 |"
+    yield f"|{'---|' * 8}"
+    for row in replays["rows"]:
+        if row["race"] not in options.races or row["level"] not in options.levels:
+            continue
+        builds = [number for number, name in NAMES.items() if row["build"] in {name, "any"}]
+        seats = [Seat(row["race"], row["level"], build) for build in builds]
+        games = [growth(options.map, seat, moments, options.seed + seat.build) for seat in seats]
+        income = load_levels()[row["level"]].income
+        ours = {
+            "workers": [[g.workers for g in grown] for grown in zip(*games, strict=True)],
+            "army": [[g.supply - g.workers for g in grown] for grown in zip(*games, strict=True)],
+            "minerals": [[g.minerals * income for g in grown] for grown in zip(*games, strict=True)],
+        }
+        for what, (share, absolute) in TOLERANCES.items():
+            cells = []
+            for real, found in zip(row[what], map(statistics.median, ours[what]), strict=True):
+                off = real is not None and abs(found - real) > max(share * real, absolute)
+                held += real is not None and not off
+                compared += real is not None
+                cells.append(f"{'-' if real is None else f'{real:g}'} / {found:.0f}{' !' if off else ''}")
+            yield f"| {seats[0].name} | {row['build']} | {row['players']} | {what} | {' | '.join(cells)} |"
+    yield f"\n{held} of {compared} hold; replays / ours, ! beyond {', '.join(map(str, TOLERANCES))} within 15, 25, 20 %"
+
+
 # the command ----------------------------------------------------------------------------------------------------------
 
 
@@ -311,7 +351,7 @@ def speed(options: argparse.Namespace) -> Iterator[str]:
 def main() -> None:
     """Measure what the options ask for, and print it."""
     parser = make_parser(__doc__)
-    parser.add_argument("what", choices=("growth", "ladder", "speed"))
+    parser.add_argument("what", choices=("growth", "replays", "ladder", "speed"))
     parser.add_argument("--map", default="Melee/Simple64", help="as in the simulator's data")
     parser.add_argument("--race", default="terran", choices=RACES, help="of a ladder of one race")
     parser.add_argument("--races", nargs="*", default=list(RACES), choices=RACES)
@@ -326,8 +366,9 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
     options.minutes = options.minutes or (20.0 if options.what == "ladder" else 8.0)
-    if options.what == "speed":
-        print("\n".join(speed(options)))
+    if options.what in {"speed", "replays"}:
+        for line in (speed if options.what == "speed" else beside_replays)(options):
+            print(line, flush=True)
         return
     rows: Sequence[Growth | Game]
     if options.what == "growth":

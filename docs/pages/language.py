@@ -6,7 +6,7 @@ import inspect
 
 from docs.pages.markdown import fence, head, join
 from khala_protocol import speech
-from khala_protocol.speech import arguments, headings
+from khala_protocol.speech import arguments, echoes, headings
 
 
 def page() -> str:
@@ -24,6 +24,10 @@ def page() -> str:
         _table(headings),
         "## Arguments",
         _table(arguments),
+        "## Quotes of the prompt",
+        "What a reply repeats of its prompt is no order but a mention. If it holds nothing else, its agent "
+        "hears so in its next observation.",
+        _table(echoes),
     )
 
 

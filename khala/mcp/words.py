@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_agents.prompt import Prompt
+from khala_protocol.messages import count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -71,7 +72,8 @@ def _deadline(left_s: float | None, *, waits: bool) -> str:
 
 def _fate(report: AgentReport) -> str:
     what = report.fate or report.detail or report.status
-    return f"Your last answer: {what}; {len(report.accepted)} carried out, {len(report.rejections)} refused."
+    refused = count_refusals(report.rejections).total()
+    return f"Your last answer: {what}; {len(report.accepted)} carried out, {refused} refused."
 
 
 def _result(result: Result, episodes: int) -> str:

@@ -26,7 +26,7 @@ from khala.playing.seats import SeatsTurn
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.configfile import loads
 from khala_protocol.errors import KhalaError
-from khala_protocol.messages import LOOPS_PER_S
+from khala_protocol.messages import LOOPS_PER_S, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -287,7 +287,7 @@ class KhalaEnvironment(Environment[KhalaAction, KhalaObservation, KhalaState]):
             killed_value=sum(report.killed_value or 0.0 for report in reports),
             lost_value=sum(report.lost_value or 0.0 for report in reports),
             accepted=sum(len(agent.accepted) for agent in agents),
-            refused=sum(len(agent.rejections) for agent in agents),
+            refused=sum(count_refusals(agent.rejections).total() for agent in agents),
             elapsed_s=(self._game_loop - before) / LOOPS_PER_S,
             result=outcome_of(results[0]) if results else None,
             done=self._state.over,

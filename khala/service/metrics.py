@@ -16,7 +16,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, G
 from khala.doors.pages import guard
 from khala.doors.rules import Door
 from khala_protocol.listening import Patience, bind
-from khala_protocol.messages import Report, Result
+from khala_protocol.messages import Report, Result, count_refusals
 from khala_protocol.service import MatchState
 
 if TYPE_CHECKING:
@@ -96,8 +96,8 @@ class Metrics:
 
     def _decision(self, agent: AgentReport) -> None:
         self._decisions.labels(agent.status).inc()
-        for rejection in agent.rejections:
-            self._rejections.labels(rejection.reason).inc()
+        for reason, count in count_refusals(agent.rejections).items():
+            self._rejections.labels(reason).inc(count)
         self._tokens.labels("prompt").inc(agent.usage.prompt_tokens)
         self._tokens.labels("completion").inc(agent.usage.completion_tokens)
         self._cost.inc(agent.usage.cost_usd or 0.0)

@@ -17,7 +17,7 @@ from opentelemetry.sdk.trace.export import BatchSpanProcessor
 from opentelemetry.trace import StatusCode
 
 from khala_protocol.errors import ConfigError
-from khala_protocol.messages import ModelCall, Report
+from khala_protocol.messages import ModelCall, Report, count_refusals
 
 if TYPE_CHECKING:
     from opentelemetry.context import Context
@@ -119,7 +119,7 @@ class Traces:
             "khala.step": asked,
             "khala.status": agent.status,
             "khala.accepted": len(agent.accepted),
-            "khala.rejected": len(agent.rejections),
+            "khala.rejected": count_refusals(agent.rejections).total(),
         }
         span = self._tracer.start_span("agent", inside, start_time=began_ns, attributes=about)
         if agent.status != "ok":

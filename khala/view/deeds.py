@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala.view.wire import Deed
-from khala_protocol.speech import Standing, parse
+from khala_protocol.speech import NOTHING_SHOWN, ShownText, Standing, parse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -38,6 +38,7 @@ def deeds(
     *,
     frames: Mapping[str, Sequence[str]],
     screens: Mapping[str, Screen],
+    shown: ShownText = NOTHING_SHOWN,
 ) -> tuple[Deed, ...]:
     """Return the calls of a reply, in the order of the text.
 
@@ -46,8 +47,9 @@ def deeds(
         report: of the step in which it took effect; None if that has not happened.
         frames: by action, the kinds of its arguments.
         screens: by team.
+        shown: what its agent had read; what repeats it is no call.
     """
-    speech = parse(reply)
+    speech = parse(reply, shown)
     standing = [(order.call, order.start, order.end) for order in speech.standing if isinstance(order, Standing)]
     calls = sorted([*((call, call.start, call.end) for call in speech.calls), *standing], key=lambda call: call[1])
     rejections = list(report.rejections) if report else []

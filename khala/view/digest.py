@@ -109,7 +109,7 @@ class Digest:
             "lost_value": self._lost(said, side),
             "tokens": sum(usage.get("prompt_tokens", 0) + usage.get("completion_tokens", 0) for usage in usages),
             "cost_usd": sum(costs) if costs else None,
-            "refused": sum(len(agent.get("rejections", ())) for agent in agents),
+            "refused": sum(_count_refused(agent) for agent in agents),
         })  # fmt: skip
         self.note(said, known | sums | {f"latency_s/{side}": max(latencies, default=None)})
         for agent in agents:
@@ -285,3 +285,8 @@ def count_kinds(kinds: Iterable[str]) -> str:
 
 def _several(kind: str) -> str:
     return f"{kind}es" if kind.endswith(("ch", "sh", "s", "x")) else f"{kind}s"
+
+
+def _count_refused(agent: dict[str, Any]) -> int:
+    """Return how many calls of an agent's report were refused."""
+    return sum(sum(said.get("others", {}).values()) or 1 for said in agent.get("rejections", ()))

@@ -16,6 +16,7 @@ from khala.view.wire import DecisionTexts, Deed, Letter, SeenDecision, SeenTeam,
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
+from khala_protocol.manual import manual
 from khala_protocol.messages import (
     LOOPS_PER_S,
     Briefing,
@@ -30,7 +31,7 @@ from khala_protocol.messages import (
     Usage,
     Wire,
 )
-from khala_protocol.speech import thought_of
+from khala_protocol.speech import NOTHING_SHOWN, ShownText, thought_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -56,7 +57,7 @@ class Moments:
 
     def __init__(self, index: Index, agents: Sequence[AgentLine], cells_per_unit: float) -> None:
         self._index, self._agents, self._scale = index, agents, cells_per_unit
-        self._briefings: dict[Spot, tuple[float, dict[str, tuple[str, ...]]]] = {}
+        self._briefings: dict[Spot, tuple[float, dict[str, tuple[str, ...]], ShownText]] = {}
 
     def moment(self, episode: int, step: int) -> StepView | None:
         """Return everything about a step but the map; None if there is no such step."""
@@ -203,23 +204,25 @@ class Moments:
             yield SeenTeam(name=team.name, tags=tags, minimap=team.minimap, screen=size)
 
     def _deeds(self, reply: str, report: AgentReport | None, seen: Observation) -> tuple[Deed, ...]:
-        cells, frames = self._briefing(seen)
+        cells, frames, known = self._briefing(seen)
         screens = {
             team.name: Screen(team.minimap, cells * self._scale, cells)
             for team in seen.view.teams if team.minimap is not None
         }  # fmt: skip
-        return deeds(reply, report, frames=frames, screens=screens)
+        shown = ShownText(seen.text, earlier=known)
+        return deeds(reply, report, frames=frames, screens=screens, shown=shown)
 
-    def _briefing(self, seen: Observation) -> tuple[float, dict[str, tuple[str, ...]]]:
-        """Return the size of the screen frame, and the kinds of arguments by action."""
+    def _briefing(self, seen: Observation) -> tuple[float, dict[str, tuple[str, ...]], ShownText]:
+        """Return the size of the screen frame, the kinds of arguments by action, and how calls are written."""
         found = self._index.newest(Topic.BRIEFING, seen.episode, seen.side, seen.agent, 0)
         if found is None:
-            return Frames().screen, {}
+            return Frames().screen, {}, NOTHING_SHOWN
         if found.spot not in self._briefings:
             briefing = self._read(Briefing, found)
             frames = briefing.frames if briefing else Frames()
             actions = briefing.actions if briefing else ()
-            self._briefings[found.spot] = frames.screen, {action.name.casefold(): action.args for action in actions}
+            kinds: dict[str, tuple[str, ...]] = {action.name.casefold(): action.args for action in actions}
+            self._briefings[found.spot] = frames.screen, kinds, ShownText(manual(actions))
         return self._briefings[found.spot]
 
     def _read(self, kind: type[W], found: FoundSample) -> W | None:

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from khala_orchestrator.roster import Seat
-from khala_protocol.messages import LOOPS_PER_S, Frozen, Report, Result, Run, Usage, Wire
+from khala_protocol.messages import LOOPS_PER_S, Frozen, Report, Result, Run, Usage, Wire, count_refusals
 from khala_protocol.visible import visible, visible_line
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class Progress:
             counts = self._counts.setdefault(seat, Counter())
             counts[agent.status] += 1
             counts["accepted"] += len(agent.accepted)
-            counts["rejected"] += len(agent.rejections)
+            counts["rejected"] += count_refusals(agent.rejections).total()
             self._show_failure(agent, report.step)
             self._usage[seat] = self._usage.get(seat, Usage()) + agent.usage
 

@@ -63,7 +63,7 @@ export interface Deed {
   team: string;
   /** None while its step is not over, or if the host did not say. */
   accepted: boolean | null;
-  reason: "malformed" | "unknown_action" | "wrong_arguments" | "unknown_team" | "unknown_target" | "dead_target" | "not_yours" | "invalid_target" | "wrong_frame" | "out_of_bounds" | "not_available" | "too_many_actions" | "unknown_recipient" | "too_late" | "too_many_messages" | "refused_by_game" | null;
+  reason: "malformed" | "unknown_action" | "wrong_arguments" | "unknown_team" | "unknown_target" | "dead_target" | "not_yours" | "invalid_target" | "wrong_frame" | "out_of_bounds" | "not_available" | "too_many_actions" | "unknown_recipient" | "unread" | "too_late" | "too_many_messages" | "refused_by_game" | null;
   /** Why it was refused, as the agent reads it. */
   message: string;
   /** Units that it names. */
@@ -191,6 +191,8 @@ export interface ModelCall {
   params: Record<string, string | number | number | boolean | null>;
   /** None if no answer came. */
   completion: string | null;
+  /** Why it ended, in the words of the endpoint: `stop`, `length`, … */
+  finish: string;
   /**
    * `ok`, `empty`, `cut`, `refused` or `filtered` of an answer; else `timeout`, `cancelled`, `http 429`,
    * `connection`, `malformed`.

@@ -19,7 +19,6 @@ from khala_agents.llm.client import (
     RequestRefused,
     Unauthorized,
     Unreachable,
-    Verdict,
 )
 from khala_agents.llm.limits import LimitRules, RequestLimits
 from khala_agents.llm.money import SharedBudget
@@ -35,6 +34,7 @@ from khala_protocol.messages import ModelCall, Usage
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from khala_agents.llm.verdict import Verdict
     from khala_protocol.messages import Briefing, Observation
 
 CLOCK = "jumps"
@@ -87,6 +87,20 @@ async def test_a_try_gets_its_own_time_and_never_more_than_is_left(
     policy, _ = traced(model, try_timeout_s=6.0)
     await policy.decide(briefing(), observation(within_s=10.0))
     assert [request.timeout_s for _, request in model.requests] == [6.0, 6.0, 6.0, 2.5]
+
+
+@pytest.mark.parametrize(("within_s", "try_s"), [(300.0, 150.0), (60.0, 45.0), (None, 600.0)])
+async def test_a_try_may_take_half_of_what_the_step_gives(
+    within_s: float | None,
+    try_s: float,
+    listed_model: Callable[..., Any],
+    briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
+) -> None:
+    model = listed_model("good")
+    policy, _ = traced(model)
+    await policy.decide(briefing(), observation(within_s=within_s))
+    assert [request.timeout_s for _, request in model.requests] == [try_s]
 
 
 async def test_no_try_is_begun_that_cannot_end_before_the_deadline(

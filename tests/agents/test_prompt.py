@@ -34,7 +34,7 @@ Defeat all enemy units.
 - Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.
 - Fight where you gain more than you lose; pull out units that are about to die for nothing.
 - Abilities that help now come before moving and attacking.
-- A team carries out at most 2 of your actions a step, in the order you write them; more are refused.
+- A team carries out at most 2 of your actions a step, one after the other; more are refused.
 - An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.
 - The game stands still while you think; 0.36 s of game time pass between two observations. Answer within 10 s, \
 or your teams go on as before.

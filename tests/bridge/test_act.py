@@ -171,9 +171,21 @@ def test_only_the_units_that_can_do_it_are_told_to(act: Callable[..., JointActio
             ["<Select_Unit_Move_Screen(0x100040001, [12, 12])>", "<Select_Unit_Move_Screen(0x100080001, [12, 12])>"],
             [((S1,), False), ((S2,), False)],
         ),
-        (  # a unit with an order waits, the rest of the team begins at once
+        (  # a unit with an order of its own is left out of the team's, whichever stands first
             ["<Select_Unit_Move_Screen(0x100040001, [12, 12])>", "<Attack_Unit(0x100180001)>"],
-            [((S1,), False), ((S2,), False), ((S1,), True)],
+            [((S1,), False), ((S2,), False)],
+        ),
+        (
+            ["<Attack_Unit(0x100180001)>", "<Select_Unit_Move_Screen(0x100040001, [12, 12])>"],
+            [((S2,), False), ((S1,), False)],
+        ),
+        (  # … unless all units have one
+            [
+                "<Select_Unit_Move_Screen(0x100040001, [12, 12])>",
+                "<Select_Unit_Move_Screen(0x100080001, [12, 12])>",
+                "<Attack_Unit(0x100180001)>",
+            ],
+            [((S1,), False), ((S2,), False), ((S1, S2), True)],
         ),
     ],
 )
@@ -214,17 +226,17 @@ REFUSED = [
         ),
     ),
     ("<Stop(0x1)>", "wrong_arguments", "Stop takes no arguments: write <Stop()>."),
-    ("<Attack_Unit()>", "wrong_arguments", "Attack_Unit takes (tag): write it like <Attack_Unit(0x100140001)>."),
+    ("<Attack_Unit()>", "wrong_arguments", "Attack_Unit takes (tag): write it like <Attack_Unit(0x100180001)>."),
     (
         "<Attack_Unit(Zealot)>",
         "wrong_arguments",
-        "Attack_Unit takes (tag): write it like <Attack_Unit(0x100140001)>.",
+        "Attack_Unit takes (tag): write it like <Attack_Unit(0x100180001)>.",
     ),
     ("<Move_Screen(12)>", "wrong_arguments", "Move_Screen takes (screen): write it like <Move_Screen([12, 9.5])>."),
     (
         "<Select_Unit_Move_Screen([3, 4], [5, 6])>",
         "wrong_arguments",
-        "Select_Unit_Move_Screen takes (tag, screen): write it like <Select_Unit_Move_Screen(0x100140001, [12, 9.5])>.",
+        "Select_Unit_Move_Screen takes (tag, screen): write it like <Select_Unit_Move_Screen(0x100040001, [12, 9.5])>.",
     ),
     (
         "<Move_Minimap(0x100180001)>",
@@ -309,6 +321,7 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
     "too_many_messages": "tests/orchestrator/test_mailbox.py",
     "refused_by_game": "tests/bridge/test_executors.py",
     "too_late": "tests/orchestrator/test_clocks.py",
+    "unread": "tests/orchestrator/test_match.py",
 }
 
 

@@ -114,7 +114,7 @@ def test_what_was_meant_is_carried_out_as_far_as_it_can_be(
 @pytest.mark.parametrize(
     ("call", "changes", "reason", "message"),
     [
-        (ATTACK, {"dead": {FOE}}, "dead_target", "The unit 0x100180001 died 40 loops ago; choose another target."),
+        (ATTACK, {"dead": {FOE}}, "dead_target", "The unit 0x100180001 died 1.8 s ago; choose another target."),
         (
             ATTACK,
             {"gone": {FOE}},
@@ -125,7 +125,7 @@ def test_what_was_meant_is_carried_out_as_far_as_it_can_be(
             STOP,
             {"dead": {S1, S2}},
             "not_available",
-            "Team Stalker-1 cannot do Stop now: its last unit died 40 loops ago.",
+            "Team Stalker-1 cannot do Stop now: its last unit died 1.8 s ago.",
         ),
         (
             STOP,
@@ -133,7 +133,7 @@ def test_what_was_meant_is_carried_out_as_far_as_it_can_be(
             "not_available",
             "Team Stalker-1 cannot do Stop now: its units are not on the map.",
         ),
-        (BY_ONE, {"dead": {S2}}, "dead_target", "The unit 0x100080001 died 40 loops ago; it does nothing any more."),
+        (BY_ONE, {"dead": {S2}}, "dead_target", "The unit 0x100080001 died 1.8 s ago; it does nothing any more."),
         (
             BY_ONE,
             {"gone": {S2}},
@@ -203,7 +203,7 @@ def test_a_present_decision_is_told_of_the_dead_of_the_whole_episode(task: Any, 
     (fault,) = Actor(config).joint(now, {"A": parse(said(ATTACK))}).rejections["A"]
     assert (fault.reason, fault.message) == (
         "dead_target",
-        "The unit 0x100180001 died 40 loops ago; choose another target.",
+        "The unit 0x100180001 died 1.8 s ago; choose another target.",
     )
 
 

@@ -33,10 +33,8 @@ if TYPE_CHECKING:
 
 S1, S2, FOE = 0x100040001, 0x100080001, 0x100180001
 ALL = frozenset(int(function.id) for function in pysc2.FUNCTIONS)
-REPLY = """Actions:
-Team Stalker-1:
-<Attack_Unit(0x100180001)>
-<Select_Unit_Move_Screen(0x100080001, [13, 12])>"""
+REPLIES = ("<Attack_Unit(0x100180001)>", "<Select_Unit_Move_Screen(0x100080001, [13, 12])>")
+"""All attack; then one walks, once it has attacked."""
 
 
 class Table:
@@ -151,9 +149,9 @@ def table(unit: Make, snapshot: Snap) -> Callable[..., Table]:
 
 @pytest.fixture
 def joint(task: Callable[..., TaskConfig]) -> Callable[..., JointAction]:
-    """Return the joint action of a reply to a table, of an agent with one team of Stalkers."""
+    """Return the joint action of replies to a table, of an agent with one team of Stalkers; the later ones wait."""
 
-    def decide(table: Table, reply: str = REPLY, **team: Any) -> JointAction:
+    def decide(table: Table, *replies: str, **team: Any) -> JointAction:
         config = task("3s_vs_3z")
         agent = config.agents[0]
         teams = (agent.teams[0].model_copy(update=team),)
@@ -161,7 +159,10 @@ def joint(task: Callable[..., TaskConfig]) -> Callable[..., JointAction]:
         config = config.model_copy(
             update={"agents": (agent.model_copy(update={"teams": teams, "actions": {"Stalker": verbs}}),)}
         )
-        return Actor(config).joint(Observer(config).observe(table.now()), {agent.name: parse(reply)})
+        seen = Observer(config).observe(table.now())
+        first, *more = (Actor(config).joint(seen, {agent.name: parse(reply)}) for reply in replies or REPLIES)
+        later = (replace(command, queued=True) for joint in more for command in joint.commands)
+        return replace(first, commands=(*first.commands, *later))
 
     return decide
 

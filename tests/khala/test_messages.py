@@ -29,12 +29,11 @@ GROUP = (
 
 
 def transcript(*said: str, obeys: bool = True) -> Transcript:
-    """Return a game of two steps: messages of the commander to a group, and the reply of the group."""
-    texts = "\n".join(f"<MessageTo(Group, '''{text}''')>" for text in said)
+    """Return a game: replies of the commander with a message to a group each, and then the reply of the group."""
     heard = GROUP.format(order=said[-1])
     reply = skilled(heard, random.Random(1)) if obeys else "Actions:\n"
-    commander = Turn(1, read(LEADER), parse(f"Communications:\n{texts}"))
-    return Transcript({"Commander": [commander], "Group": [Turn(2, read(heard), parse(reply))]})
+    commander = [Turn(1, read(LEADER), parse(f"Communications:\n<MessageTo(Group, '''{text}''')>")) for text in said]
+    return Transcript({"Commander": commander, "Group": [Turn(2, read(heard), parse(reply))]})
 
 
 def test_the_players_own_order_is_true_if_its_reader_carries_it_out() -> None:

@@ -395,7 +395,7 @@ async def test_agents_write_to_those_and_on_the_channels_that_the_task_says(
     words = "Communications:\n<ListenTo(Channel-1)>\n<MessageTo(Zealots, 'a')>\n<MessageTo(Channel-1, 'b')>"
     for name, changes, heard, refused in (
         ("all", {}, ["a", "b"], 0),
-        ("nobody", {"communication": False}, [], 4),
+        ("nobody", {"communication": False}, [], 8),
     ):
         with subtests.test(name):
             got: list[str] = []

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.match import MatchObserver
     from khala_orchestrator.match.turn import Question
-    from khala_protocol.messages import Observation
+    from khala_protocol.messages import Observation, ReplyStatus
     from tests.orchestrator.conftest import StillGame
 
     MakeConfig = Callable[..., MatchConfig]
@@ -377,3 +377,46 @@ async def test_a_standing_order_is_carried_out_until_it_is_revoked(play: Play) -
     assert [fault.message for fault in four.rejections] == ["You have no standing order 4; you have none."]
     assert not one.view.standing
     assert not four.view.standing
+
+
+# --- what could not be read --------------------------------------------------------------------------------------
+
+ORDER = "Actions:\n    Team Stalker-1:\n        <Stop()>\n"
+
+
+def reply_of(text: str, status: ReplyStatus = "ok", *, cut: bool = False) -> Answer:
+    said = Reply(run="test", agent="Stalkers", side="blue", episode=0, step=0, text=text, status=status, cut=cut)
+    return Answer(status, said)
+
+
+@pytest.mark.parametrize(
+    ("given", "begins"),
+    [
+        (reply_of("", "empty"), "Your last answer was empty: write your actions"),
+        (reply_of("", "cut"), "Your last answer was cut at the limit of tokens before it said anything"),
+        (reply_of("I can't help with that.", "refused"), "You declined to answer"),
+        (reply_of("", "filtered"), "Your last answer was taken away by a filter"),
+        (
+            reply_of("Let us attack the weak one with Attack_Unit(0x1) at once."),
+            "Nothing could be read in your last answer.",
+        ),
+        (reply_of("Valid actions\n    Team Stalker-1: <Stop()>"), "Your last answer only repeats what you were shown"),
+        (
+            reply_of(ORDER + "        <Move_Scr", cut=True),
+            "Your last answer was cut at the limit of tokens; what was cut off",
+        ),
+    ],
+)
+async def test_what_was_not_read_comes_back_in_one_sentence(play: Play, given: Answer, begins: str) -> None:
+    played = await play({("Stalkers", 0): given}, max_steps=3)
+    _, seen, after = played.pool.of("Stalkers")
+    (said,) = [fault for fault in seen.rejections if fault.reason == "unread"]
+    assert said.message.startswith(begins)
+    assert f"\n    {said.message}\n" in seen.text.partition("Your last errors")[2]
+    assert not after.rejections
+
+
+@pytest.mark.parametrize("text", [ORDER, "Analysis: we wait.\nActions:\n", "", "Actions: none"])
+async def test_an_answer_that_was_read_or_says_nothing_on_purpose_is_left_alone(play: Play, text: str) -> None:
+    played = await play({("Stalkers", 0): reply_of(text)}, max_steps=2)
+    assert not [fault for fault in played.pool.of("Stalkers")[1].rejections if fault.reason == "unread"]

@@ -10,11 +10,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import khala_protocol.speech
-import khala_protocol.speech.arguments
-import khala_protocol.speech.headings
+from khala_protocol import speech
 from khala_protocol.messages import Call
-from khala_protocol.speech import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing, parse, render
+from khala_protocol.speech import (
+    Forget,
+    ListenTo,
+    MessageTo,
+    Note,
+    Revoke,
+    ShownText,
+    Speech,
+    Standing,
+    arguments,
+    echoes,
+    headings,
+    parse,
+    render,
+)
 
 REPLY = """Analysis: the Zealot 0x10ac is weak, so <Attack_Unit(0x10ac)> it.
 Actions:
@@ -135,10 +147,10 @@ ARGUMENTS = [
 
 
 def test_the_form_of_an_argument_says_what_it_is(subtests: pytest.Subtests) -> None:
-    for rule, inside, arguments in ARGUMENTS:
+    for rule, inside, wanted in ARGUMENTS:
         with subtests.test(rule, inside=inside):
             speech = parse(f"<Act({inside})>")
-            assert [list(call.args) for call in speech.calls] == [arguments]
+            assert [list(call.args) for call in speech.calls] == [wanted]
             assert not speech.faults
 
 
@@ -239,6 +251,13 @@ HEADINGS += [
     ("H6", "Team A: <Stop()>, and Team B: <Go()>", ["A: <Stop()>", "B: <Go()>"]),
     ("H21", '{"team": "A-1", "do": "<Go()>"}', ["A-1: <Go()>"]),
 ]  # fmt: skip
+SHOWN = ShownText("- <Attack_Unit(tag)>: Attack the enemy.\n- <Stop()>: Stop moving and firing.")
+INVOKE = '<function_calls><invoke name="Go_To"><parameter name="minimap">[3, 4]</parameter></invoke></function_calls>'
+HARMONY = (
+    "<|channel|>analysis<|message|>so <Stop()><|end|><|start|>assistant<|channel|>commentary to=functions.Go_To "
+    '<|constrain|>json<|message|>{"team": "A", "minimap": [3, 4]}<|call|>'
+)
+YAML_READ = ["A: <Go_To([3, 4])>", "B: <Hold_Position()>"]
 RULES = [
     ("S1", "<Stop()>", ["<Stop()>"]),
     ("S1", "I will do this.\n<Stop()>\n<Go()>", ["<Stop()>", "<Go()>"]),
@@ -327,7 +346,7 @@ RULES = [
     ("S18", "<MessageTo(A '''go''')>", ["to A: go"]),
     ("S18", "<MessageTo(\"A\" \"go\")>", ["to A: go"]),
     ("S18", "<MessageTo(Channel-1: 'go')>", ["to Channel-1: go"]),
-    ("S19", "<messageto(A, 'go')> <Message_To(A, 'go')> <LISTENTO(C)>", ["to A: go", "to A: go", "hear C"]),
+    ("S19", "<messageto(A, 'go')> <Message_To(A, 'on')> <LISTENTO(C)>", ["to A: go", "to A: on", "hear C"]),
     ("S20", "<ListenTo(Channel-1, 'Channel-2')>", ["hear Channel-1", "hear Channel-2"]),
     ("S7", "List<Unit>, Map<Tag, Unit>", []),
     ("S21", "<Attack Unit(0x1)>", ["<Attack_Unit(0x1)>"]),
@@ -394,20 +413,49 @@ RULES = [
     ("S35", "<Standing('Stop', \"4:30\")>", ["standing <Stop()>: 4:30"]),
     ("S35", '{"action": "Standing", "args": ["Stop()", "until attacked"]}', ["standing <Stop()>: attacked"]),
     ("S35", "Analysis: <Standing(Stop())>?\nActions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("S36", "<MessageTo(A, 'go')> <MessageTo(B, 'go')>\n<MessageTo(A, \"go\")>", ["to A: go", "to B: go"]),
+    ("S37", INVOKE, ["<Go_To([3, 4])>"]),
+    ("S37", '<function_calls>\n<invoke name="Stop">\n<parameter name="team">A</parameter>\n</invoke>', ["A: <Stop()>"]),
+    ("S37", "<function=Go_To><parameter=minimap>[3, 4]</parameter></function>", ["<Go_To([3, 4])>"]),
+    ("S37", '<function=Go_To>{"minimap": [3, 4]}</function>', ["<Go_To([3, 4])>"]),
+    ("S37", '[TOOL_CALLS]Go_To[ARGS]{"team": "A", "minimap": [3, 4]}', ["A: <Go_To([3, 4])>"]),
+    ("S37", 'functions.Go_To:0<|tool_call_argument_begin|>{"minimap": [3, 4]}', []),
+    ("S37", '<|tool_call_begin|>functions.Go_To:0<|tool_call_argument_begin|>{"tag": "0x1"}', ["<Go_To(0x1)>"]),
+    ("S37", "<｜tool▁call▁begin｜>function<｜tool▁sep｜>Go_To\n```json\n{\"tag\": \"0x1\"}\n```", ["<Go_To(0x1)>"]),
+    ("S37", HARMONY, ["A: <Go_To([3, 4])>"]),
+    ("S37", '{"tool_calls": [{"function": {"name": "Go", "arguments": "{\\"team\\": \\"A\\"}"}}]}', ["A: <Go()>"]),
+    ("S37", "<|python_tag|>Go_To.call(minimap=[3, 4])", ["<Go_To([3, 4])>"]),
+    ("S37", "```tool_code\nprint(default_api.Go_To(team='A', minimap=[3, 4]))\n```", ["A: <Go_To([3, 4])>"]),
+    ("S38", "- team: A\n  action: Go_To\n  minimap: [3, 4]\n- team: B\n  action: Hold_Position", YAML_READ),
+    ("S38", "- action: gather at the ramp\n- target: 0x1", []),
+    ("S39", 'go_to(team="A-1", minimap=(3, 4))', ["A-1: <go_to([3, 4])>"]),
+    ("S39", "**Final Answer:** `Go_To([3, 4])` for A-1", ["A-1: <Go_To([3, 4])>"]),
+    ("S39", "We could use Go_To([3, 4]) for A-1 later", []),
+    ("S40", "Actions:\n<Go()>\n\nGame\n    Time: 1:20\nActions:\n<Stop()>", ["<Go()>"]),
+    ("S40", "Game\n    Time: 1:20\nActions:\n<Stop()>", ["<Stop()>"]),
+    ("E1", "Actions:\n- <Stop()>: Stop moving and firing.\n- <Stop()>: they are strong", ["? <Stop()>", "<Stop()>"]),
+    ("E2", "accepted: A-1 <Stop()>\nrejected: <Go()>: no", ["? <Stop()>", "? <Go()>"]),
+    ("E2", "(write it like <Stop()>)", ["? <Stop()>"]),
+    ("E3", "A: <Attack_Unit(tag)>, <Stop()>\n\n<Go()>", ["? <Attack_Unit(tag)>", "? <Stop()>", "A: <Go()>"]),
+    ("E3", "Actions:\n<Attack_Unit(tag)>", ["<Attack_Unit(tag)>"]),
+    ("E4", "Valid actions\n    Team A: <Stop()>\n\nTeam A: <Go()>", ["? <Stop()>", "A: <Go()>"]),
+    ("E4", "Valid actions:\nTeam A: <Attack_Unit(0x1)>", ["A: <Attack_Unit(0x1)>"]),
+    ("E6", "Actions:\n- <Attack_Unit(tag)>: Attack the enemy.\n- <Stop()>", ["? <Attack_Unit(tag)>", "? <Stop()>"]),
+    ("E5", "Your last actions\n    A-1 <Attack_Unit(0x1)>\n\n<Go()>", ["? <Attack_Unit(0x1)>", "A-1: <Go()>"]),
 ]  # fmt: skip
 
 
 def test_a_reply_is_read_as_it_was_meant(subtests: pytest.Subtests) -> None:
     for rule, text, lines in HEADINGS + RULES:
         with subtests.test(rule, text=text):
-            assert outline(parse(text)) == lines
+            assert outline(parse(text, SHOWN)) == lines
 
 
 def test_every_rule_of_the_documentation_has_a_row_and_every_row_a_rule() -> None:
     documented = [
         rule
-        for module in (khala_protocol.speech, khala_protocol.speech.headings, khala_protocol.speech.arguments)
-        for rule in re.findall(r"^\| ([SHA]\d+) \|", module.__doc__ or "", re.MULTILINE)
+        for module in (speech, headings, arguments, echoes)
+        for rule in re.findall(r"^\| ([SHAE]\d+) \|", module.__doc__ or "", re.MULTILINE)
     ]
     assert len(documented) == len(set(documented))
     assert {row[0] for row in [*ARGUMENTS, *HEADINGS, *RULES]} == set(documented)

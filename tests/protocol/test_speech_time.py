@@ -9,7 +9,7 @@ import time
 import pytest
 
 from bench.survival.hostile import TOKENS
-from khala_protocol.speech import MAX_REPLY_CHARACTERS, parse
+from khala_protocol.speech import MAX_REPLY_CHARACTERS, ShownText, echoes, parse
 
 PAIRS = list(itertools.product(TOKENS, TOKENS))
 """5 300; a long test tries 800 of them."""
@@ -17,15 +17,17 @@ PREFIXES = ("", "Actions:\n<Stop()>\n", "Actions:\nA:")
 FOUND = (  # each was quadratic, or worse, before
     *("A_", "A_A_", "Aa_bAa_b", "<!--", "[\n", ". Actions: A1| ", '{"action":"A_b"}A1| ', "\nMessageTo(A, x"),
     *("<MessageTo (A, x", "<MessageTo (A, x<a(x)>", "<MessageTo(A," + " " * 170 + "'x", "<MessageTo> ,x"),
-    *("Final actions:\n<A_b()>\n", "<A_b([1, 2], [3, 4])>\n"),
+    *("Final actions:\n<A_b()>\n", "<A_b([1, 2], [3, 4])>\n", "<A_b()> and more words, "),
 )
+SHOWN = ShownText("Team A: <A_b()>, <C_d(tag)>\n- <A_b()>: Stop moving and firing\nTeam B: " + "<A_b()>, " * 60)
+"""What repeats it is looked up for each call."""
 NOTICED_S = 0.02
 """Less time is noise."""
 
 
 def seconds(text: str) -> float:
     begin = time.thread_time()
-    parse(text)
+    parse(text, SHOWN)
     return time.thread_time() - begin
 
 
@@ -103,3 +105,17 @@ def test_all_calls_up_to_the_limit_are_read() -> None:
 def test_an_entity_with_too_many_digits_is_text(entity: str) -> None:
     (message,) = parse(f"<MessageTo(A, 'go {entity} on')>").messages
     assert message.text == f"go {entity} on"
+
+
+def test_a_long_line_is_not_compared_with_shown_lists_once_for_each_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[int] = []
+    plain = echoes._plain  # what a comparison costs
+
+    def count(words: str) -> str:
+        compared.append(len(words))
+        return plain(words)
+
+    monkeypatch.setattr(echoes, "_plain", count)
+    text = "<A_b()> and more words, " * 600
+    parse(text, SHOWN)
+    assert 0 < sum(compared) < 20 * len(text)  # 600 times its length if each call took the whole line

@@ -171,6 +171,44 @@ def test_a_battle_that_is_known_by_name_has_its_own_script() -> None:
     assert same_size.digest != shipped.digest
 
 
+LIBERTY = "bnet:Liberty (Mod)/0.0/999,file:Mods/Liberty.SC2Mod"
+SWARM = "bnet:Swarm (Mod)/0.0/999,file:Mods/Swarm.SC2Mod"
+VOID = "bnet:Void (Mod)/0.0/999,file:Mods/Void.SC2Mod"
+MULTI = "bnet:Void Multi (Mod)/0.0/999,file:Mods/VoidMulti.SC2Mod"
+
+
+@pytest.mark.parametrize(
+    ("mods", "data"),
+    [
+        ([LIBERTY], "liberty"),
+        ([VOID], "void"),
+        ([VOID, SWARM, LIBERTY], "void"),
+        ([LIBERTY, SWARM, VOID, MULTI], "multi"),
+        (["file:Mods/Own.SC2Mod", LIBERTY], "multi"),
+        ([], "multi"),
+    ],
+)
+@pytest.mark.parametrize("name", ["DocumentInfo", "DocumentHeader"])
+def test_the_mods_of_an_archive_say_whose_numbers_units_have(name: str, mods: list[str], data: str) -> None:
+    named = "".join(f"<Value>{mod}</Value>" for mod in mods).encode()
+    game_map = read_archive(with_file(name, named), "Melee/Hill.SC2Map")
+    assert game_map.scenario.data == data
+    assert new_game(game_map).catalog.data == data
+
+
+def test_a_battle_that_is_known_by_name_has_the_numbers_of_its_own_mods() -> None:
+    files = resized(*load_map("llm_smac/2s3z").terrain.size)
+    own = read_archive(archive(files | {"DocumentInfo": MULTI.encode()}), "llm_smac/2s3z.SC2Map")
+    assert (load_map("llm_smac/2s3z").scenario.data, own.scenario.data) == ("liberty", "multi")
+
+
+def test_two_can_play_a_map_without_start_locations_and_have_what_they_make() -> None:
+    objects = OBJECTS.replace('Type="StartLoc"', 'Type="Normal"').encode()
+    scenario = read_archive(archive(map_files() | {"Objects": objects}), "SMAC_Maps/Field.SC2Map").scenario
+    assert (sorted(scenario.players), scenario.melee) == ([1, 2], False)
+    assert {player.ai for player in scenario.players.values()} == {None}
+
+
 @pytest.mark.parametrize("name", ["Simple64", "Flat32"])
 def test_a_melee_map_of_a_known_name_begins_where_its_file_says(name: str) -> None:
     shipped = load_map(name)
@@ -289,6 +327,16 @@ def test_own_maps_are_linked_one_folder_deep(tmp_path: Path, whole: bytes) -> No
     assert link_maps(root, own)  # again, and nothing is in the way
     assert (root / "Maps/Melee/Simple64.SC2Map").is_symlink()
     assert (own / "Melee/Simple64.SC2Map").read_bytes() == whole
+
+
+def test_maps_of_a_folder_that_clients_look_into_stay_in_it(tmp_path: Path) -> None:
+    own = tmp_path / "SMAC_Maps"
+    own.mkdir()
+    (own / "32x32_flat.SC2Map").write_bytes(archive(resized(32, 32)))
+    root = install(tmp_path / "game")
+    assert [entry.path for entry in link_maps(root, own)] == ["SMAC_Maps/32x32_flat.SC2Map"]
+    linked = root / "Maps/SMAC_Maps/32x32_flat.SC2Map"
+    assert read_map(linked.read_bytes(), str(linked)).scenario is load_map("32x32_flat").scenario
 
 
 @pytest.mark.parametrize(

@@ -264,6 +264,19 @@ def test_a_failed_creation_leaves_the_game_alone(playing: Client) -> None:
     assert playing.observe().observation.game_loop == 5
 
 
+@pytest.mark.parametrize(
+    ("path", "damage", "period_s"),  # of a Stalker
+    [("SMAC_Maps/2s3z", 10, 1.44), ("llm_smac/2s3z", 10, 1.44), ("pvz_task2_level1", 10, 1.44), ("Simple64", 13, 1.87)],
+)
+def test_the_tables_that_clients_read_are_those_of_the_map(
+    client: Client, path: str, damage: float, period_s: float
+) -> None:
+    client.play(path, interface(screen=0))
+    units = client.ask(data=sc.RequestData(unit_type_id=True)).data.units
+    (weapon,) = next(unit for unit in units if unit.name == "Stalker").weapons
+    assert (weapon.damage, weapon.speed) == pytest.approx((damage, period_s))
+
+
 # joining --------------------------------------------------------------------------------------------------------------
 
 

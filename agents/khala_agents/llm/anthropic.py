@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
 from khala_agents.llm.quirks import CACHE_MARK
-from khala_agents.llm.verdict import AnswerParts
+from khala_agents.llm.verdict import AnswerParts, tool_words
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
@@ -63,7 +63,9 @@ class Anthropic(HttpClient[_Answer]):
             text="".join(_text(block) for block in blocks if block.get("type") == "text"),
             finish=body.stop_reason if isinstance(body.stop_reason, str) else "end_turn",
             reasoned=any(block.get("type") in {"thinking", "redacted_thinking"} for block in blocks),
-            tools=tuple(str(block.get("name", "")) for block in blocks if block.get("type") == "tool_use"),
+            tools=tuple(
+                tool_words(block.get("name"), block.get("input")) for block in blocks if block.get("type") == "tool_use"
+            ),
             limit=self.answer_tokens,
         )
 

@@ -24,22 +24,20 @@ import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, TypeAlias
 
+from khala_agents.llm.verdict import CUT
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import ChatMessage, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from khala_agents.llm.verdict import Verdict
     from khala_agents.llm.vision import Vision
     from khala_protocol.messages import Purpose
 
 Scalar = str | int | float | bool | None
 
 LimitType: TypeAlias = Literal["requests_per_minute", "tokens_per_minute", "budget_usd"]
-
-Verdict: TypeAlias = Literal["ok", "empty", "cut", "refused", "filtered"]
-"""Whether a completion has words to play. If not: the model said nothing, it reached its limit of tokens before it said
-anything, it declined, or a filter of the endpoint took the answer away."""
 
 UNBILLED = frozenset({"http 409", "http 429", "http 529"})
 """Statuses of an endpoint that turned a request away before a model read it. Any other 5xx may come from a gateway, and
@@ -115,6 +113,11 @@ class Completion:
     model: str = ""
     verdict: Verdict = "ok"
     reason: str = ""
+
+    @property
+    def cut(self) -> bool:
+        """Whether it ended at a limit of tokens."""
+        return self.finish.lower() in CUT
 
 
 def model_name(said: object) -> str:

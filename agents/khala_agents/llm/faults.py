@@ -32,7 +32,7 @@ from khala_agents.secret import excerpt
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_agents.llm.client import Verdict
+    from khala_agents.llm.verdict import Verdict
 
 _LONGEST_MESSAGE = 400
 _BOM = b"\xef\xbb\xbf"

@@ -12,11 +12,11 @@ from pydantic import BaseModel, Field
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
 from khala_agents.llm.client import MalformedCompletion
 from khala_agents.llm.faults import broken_off, is_error
-from khala_agents.llm.verdict import CUT, FILTERED, AnswerParts
+from khala_agents.llm.verdict import CUT, FILTERED, AnswerParts, tool_words
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from khala_agents.llm.client import Request
     from khala_agents.llm.profiles import Profile
@@ -46,7 +46,7 @@ class _Message(BaseModel):
             refusal=self.refusal if isinstance(self.refusal, str) else "".join(map(_refusal, parts)),
             thoughts=thoughts,
             reasoned=any(_kind(part) in {"thinking", "reasoning"} for part in parts),
-            tools=tuple(_tool_names(self.tool_calls, self.function_call)),
+            tools=tuple(_tools(self.tool_calls, self.function_call)),
             limit=limit,
         )
 
@@ -173,7 +173,10 @@ def _refusal(part: object) -> str:
     return words if isinstance(words, str) else ""
 
 
-def _tool_names(calls: object, call: object) -> list[str]:
+def _tools(calls: object, call: object) -> Iterator[str]:
+    """Yield the tools that a message calls, in words."""
     made = calls if isinstance(calls, list) else []
     functions = [each.get("function") for each in made if isinstance(each, dict)]
-    return [str(function.get("name", "")) for function in [*functions, call] if isinstance(function, dict)]
+    for function in [*functions, call]:
+        if isinstance(function, dict) and function.get("name"):
+            yield tool_words(function["name"], function.get("arguments"))

@@ -20,15 +20,16 @@ from khala_agents.llm.client import (
     TryTimeout,
     Unauthorized,
     Unreachable,
-    Verdict,
     prompt_sha256,
 )
 from khala_agents.llm.retry import is_retried
+from khala_agents.llm.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_protocol.messages import ChatMessage, ModelCall
+
 
 Key = tuple[str, int, int, str, int]
 VERDICTS: Final[frozenset[str]] = frozenset(get_args(Verdict))
@@ -68,6 +69,7 @@ class ReplayClient:
             return Completion(
                 exchange.completion,
                 exchange.usage,
+                finish=exchange.finish,
                 model=exchange.answered_by,
                 verdict=cast("Verdict", exchange.status) if exchange.status in VERDICTS else "ok",
                 reason=exchange.reason,

@@ -6,14 +6,17 @@ the model may decline. Clients of all kinds of endpoints say here what they foun
 
 from __future__ import annotations
 
+import contextlib
+import json
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final, Literal, TypeAlias
 
 from khala_agents.secret import excerpt, scrub
 
-if TYPE_CHECKING:
-    from khala_agents.llm.client import Verdict
+Verdict: TypeAlias = Literal["ok", "empty", "cut", "refused", "filtered"]
+"""Whether a completion has words to play. If not: the model said nothing, it reached its limit of tokens before it said
+anything, it declined, or a filter of the endpoint took the answer away."""
 
 CUT: Final = frozenset({"length", "max_tokens", "model_length", "max_output_tokens", "model_context_window_exceeded"})
 """Why an answer ended, in the words of endpoints in lower case: at a limit of tokens."""
@@ -22,6 +25,7 @@ FILTERED: Final = frozenset(
 )
 """The same: a filter took it away. The last five are Gemini's."""
 
+_TOOLS = "the model called tools, of which none are offered; they are read as its orders"
 _CALL = re.compile(r"<\s*+[A-Za-z]\w*+\s*+\(")
 _NAMES = r"(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)"
 _END = rf"<\s*+/\s*+{_NAMES}\s*+>|\[/THINK\]|◁/think▷"
@@ -47,7 +51,7 @@ class AnswerParts:
         refusal: the words with which the model declined, in a place of their own.
         thoughts: its reasoning, in a place of its own, if that could be the answer.
         reasoned: whether it reasoned in any other place.
-        tools: names of tools that it called; none are offered.
+        tools: the tools that it called, in words (`tool_words`); none are offered.
         limit: of generated tokens, None for none.
     """
 
@@ -69,9 +73,17 @@ class AnswerJudgement:
     reason: str = ""
 
 
+def tool_words(name: object, arguments: object) -> str:
+    """Return the call of a tool in words that are read as a call: an object of JSON."""
+    if isinstance(arguments, str):
+        with contextlib.suppress(ValueError):
+            arguments = json.loads(arguments)
+    return json.dumps({"name": str(name), "arguments": arguments or {}}, ensure_ascii=False)
+
+
 def judge(said: AnswerParts) -> AnswerJudgement:
     """Return what became of an answer."""
-    text = scrub(said.text)
+    text = scrub("\n".join(filter(None, (said.text, *said.tools))))
     finish = said.finish.lower()
     if finish in FILTERED:
         return AnswerJudgement(
@@ -86,7 +98,7 @@ def judge(said: AnswerParts) -> AnswerJudgement:
     if words:
         if _declines(words):
             return AnswerJudgement(text, "refused", f"the model declined: {excerpt(words)}")
-        return AnswerJudgement(text)
+        return AnswerJudgement(text, reason=_TOOLS if said.tools else "")
     return _wordless(said, text, finish)
 
 
@@ -101,9 +113,6 @@ def _wordless(said: AnswerParts, text: str, finish: str) -> AnswerJudgement:
     thought = said.reasoned or bool(said.thoughts.strip() or text.strip())
     if finish in CUT:
         return AnswerJudgement(text, "cut", _why_cut(said.limit, finish, thought=thought))
-    if said.tools:
-        names = excerpt(", ".join(said.tools), 80)
-        return AnswerJudgement(text, "empty", f"the model called tools, of which none are offered: {names}")
     if said.thoughts.strip() and not text.strip():
         return AnswerJudgement(
             scrub(said.thoughts), "ok", "the whole answer was among the model's reasoning, and is read there"

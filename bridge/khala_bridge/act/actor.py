@@ -148,12 +148,13 @@ class Actor:
         faults: list[Rejection] = []
         hindered = False
         most = self._most_calls(saw)
-        for call in speech.calls[:most]:
-            recognised = recognise(call, words, addressees)
-            if isinstance(recognised, Rejection):
-                faults.append(recognised)
+        meant = [recognise(call, words, addressees) for call in speech.calls[:most]]
+        translator.set_apart(said for found in meant if not isinstance(found, Rejection) for said in found)
+        for found in meant:
+            if isinstance(found, Rejection):
+                faults.append(found)
                 continue
-            for said in recognised:
+            for said in found:
                 translated = translator.translate(said)
                 if isinstance(translated, Rejection):
                     faults.append(translated)
@@ -172,6 +173,7 @@ class Actor:
         """Begin and end the standing orders of one agent; return what was accepted, and what was not."""
         accepted: list[str] = []
         faults: list[Rejection] = []
+        translator.set_apart(())
         for item in speech.standing[:MOST_WRONG]:
             try:
                 if isinstance(item, Revoke):

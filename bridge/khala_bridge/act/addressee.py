@@ -23,7 +23,7 @@ from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.vocabulary import squash
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from khala_bridge.act.vocabulary import Vocabulary
     from khala_bridge.catalogue.action import Action
@@ -74,6 +74,23 @@ class Addressees:
         """Return the team of a heading, or all of them."""
         team = None if heading is None else self._team_called(heading)
         return self._agent.teams if team is None else [team]
+
+    def tag_called(self, digits: str) -> int | None:
+        """Return the tag of the only unit in sight that these digits stand for: its tag without 0x, or its mark."""
+        meant = {tag for tag in self._tags() if digits == tag[2:] or digits in (tag[-7:-4], tag[-8:-4])}
+        return int(meant.pop(), 16) if len(meant) == 1 else None
+
+    def sample_tags(self, own: int, others: int) -> Sequence[str]:
+        """Return tags in sight for an example, so many of own units and then of others; nothing if there are fewer."""
+        views = [team.view for team in self._agent.teams]
+        of_own = [unit.tag for view in views for unit in view.units][:own]
+        of_others = [unit.tag for view in views for unit in (*view.enemies, *view.allies)][:others]
+        found = (*of_own, *of_others)
+        return found if len(found) == own + others else ()
+
+    def _tags(self) -> Iterator[str]:
+        """Return the tags of all units that the agent sees."""
+        return (unit.tag for team in self._agent.teams for unit in team.units_in_view())
 
     def _able(self, action: Action) -> list[TeamObservation]:
         """Return the teams that have the action."""

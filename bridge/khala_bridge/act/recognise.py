@@ -7,7 +7,7 @@ Only words are judged here: whether the action exists, takes these arguments, an
 |---|---|
 | a name in another case, with blanks or hyphens, an alias | the action (`khala_bridge.act.vocabulary`) |
 | `stalker 1`, no team, several, all teams | those that are meant (`khala_bridge.act.addressee`) |
-| a tag as a decimal number | the tag |
+| a tag as a decimal number, without 0x, or as its mark in a picture | the tag |
 | a point before the tags | the tags, then the point |
 | `None` for no argument | no argument |
 
@@ -16,6 +16,7 @@ Everything else is rejected, with the nearest valid names.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -31,8 +32,10 @@ if TYPE_CHECKING:
 
 __all__ = ["CallRejected", "Recognised", "recognise", "reject"]
 
-EXAMPLES: dict[ArgKind, str] = {"tag": "0x100140001", "screen": "[12, 9.5]", "minimap": "[30, 41]"}
+POINTS: dict[ArgKind, str] = {"screen": "[12, 9.5]", "minimap": "[30, 41]"}
 _SMALLEST_TAG = 2**16  # smaller numbers are coordinates or counts, not tags
+_USUAL_TAG = 2**32  # tags of a game are larger; in decimal they have ten digits, in hexadecimal nine
+_HEX = re.compile(r"[0-9a-f]{3,16}", re.IGNORECASE)
 _LONGEST_TAG = 20  # digits of 2^64
 _NOTHING = frozenset({"none", "null", "nil", "n/a", "-"})
 
@@ -71,7 +74,7 @@ def recognise(call: Call, words: Vocabulary, addressees: Addressees) -> list[Rec
     """
     try:
         action = _action(call, words, addressees)
-        tags, point = _arguments(call, action)
+        tags, point = _arguments(call, action, addressees)
         teams = addressees.meant(call.team, action, tags)
     except CallRejected as refused:
         return reject(call, refused)
@@ -85,20 +88,23 @@ def _action(call: Call, words: Vocabulary, addressees: Addressees) -> Action:
     raise CallRejected("unknown_action", f"There is no action {call.name}; {hint}")
 
 
-def _arguments(call: Call, action: Action) -> tuple[tuple[int, ...], Point | None]:
-    given = [_read_argument(argument) for argument in call.args]
+def _arguments(call: Call, action: Action, addressees: Addressees) -> tuple[tuple[int, ...], Point | None]:
+    given = [_read_argument(argument, addressees) for argument in call.args]
     if not action.args and _is_nothing(given):
         given = []
     tags = tuple(value for value in given if isinstance(value, int))
     points = [value for value in given if isinstance(value, tuple)]
     wanted = action.args.count("tag")
     if len(given) != len(action.args) or len(tags) != wanted or len(points) != len(action.args) - wanted:
-        raise CallRejected("wrong_arguments", _right_form(action))
+        raise CallRejected("wrong_arguments", _right_form(action, addressees))
     return tags, points[0] if points else None
 
 
-def _read_argument(argument: str | Point) -> int | Point | str:
-    """Return a tag as a number, a point as it is, anything else as text."""
+def _read_argument(argument: str | Point, addressees: Addressees) -> int | Point | str:
+    """Return a tag as a number, a point as it is, anything else as text.
+
+    A tag may lack its 0x, and may be the mark that stands beside the unit in a picture.
+    """
     if not isinstance(argument, str):
         return argument
     if argument.startswith("0x"):
@@ -106,16 +112,29 @@ def _read_argument(argument: str | Point) -> int | Point | str:
             return int(argument, 16)
         except ValueError:
             return argument
-    is_number = argument.isascii() and argument.isdigit() and len(argument) <= _LONGEST_TAG
-    return int(argument) if is_number and int(argument) >= _SMALLEST_TAG else argument
+    seen = addressees.tag_called(argument.casefold())
+    return _bare_tag(argument) if seen is None else seen
+
+
+def _bare_tag(digits: str) -> int | str:
+    """Return the tag that these digits without 0x are, hexadecimal or decimal; the text if they are none."""
+    number = int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_TAG else 0
+    if number < _USUAL_TAG and _HEX.fullmatch(digits) and int(digits, 16) >= _USUAL_TAG:
+        return int(digits, 16)
+    return number if number >= _SMALLEST_TAG else digits
 
 
 def _is_nothing(given: list[int | Point | str]) -> bool:
     return len(given) == 1 and isinstance(given[0], str) and given[0].casefold() in _NOTHING
 
 
-def _right_form(action: Action) -> str:
+def _right_form(action: Action, addressees: Addressees) -> str:
     if not action.args:
         return f"{action.name} takes no arguments: write <{action.name}()>."
-    example = ", ".join(EXAMPLES[kind] for kind in action.args)
+    wanted = action.args.count("tag")
+    tags = addressees.sample_tags(action.actor_count, wanted - action.actor_count)
+    if len(tags) < wanted:
+        return f"{action.name} takes ({', '.join(action.args)})."
+    left = iter(tags)
+    example = ", ".join(POINTS.get(kind) or next(left) for kind in action.args)
     return f"{action.name} takes ({', '.join(action.args)}): write it like <{action.name}({example})>."

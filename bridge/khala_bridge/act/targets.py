@@ -21,6 +21,7 @@ from khala_bridge.frames import CAMERA_WIDTH, Camera, MinimapPoint, ScreenPoint,
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import SEEN_NOW
+from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -50,11 +51,11 @@ class Targets:
         self._units = observation.snapshot.units
 
     def end_of(self, tag: int) -> str | None:
-        """Return the end of a unit in words, `died 40 loops ago`; None if it is not known to be dead."""
+        """Return the end of a unit in words, `died 1.8 s ago`; None if it is not known to be dead."""
         if tag not in self._observation.died:
             return None
         loops = self._observation.snapshot.game_loop - self._observation.died[tag]
-        return f"died {loops} loop{'s' if loops > 1 else ''} ago" if loops else "is dead"
+        return f"died {loops / LOOPS_PER_S:.1f} s ago" if loops else "is dead"
 
     def end_of_all(self, tags: Iterable[int]) -> str:
         """Return the end of a team that is gone, in words."""

@@ -12,6 +12,9 @@ Order of the commands of one turn, unit by unit: the first one replaces what the
 if the action queues (the catalogue says), and replaces it if not. In the paper the first queueing function of a *team*
 replaces. Then an order to a second unit would wait behind that unit's old order, and an attack would cancel a skill of
 the same reply, since here all commands of a turn reach the game in one loop.
+
+A unit that a reply orders by name is left out of the orders to its whole team in that reply: "all attack, and this one
+steps back" is two calls.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from khala_bridge.auto.aims import aim_of, reaches
 from khala_bridge.frames import WorldPoint
 from khala_bridge.rules import Cost, facts_for, is_attack, is_free, nearest, of_team, price_of, use_of, why_not
 from khala_bridge.state.means import ledger_of, side_of
+from khala_protocol.messages import Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -36,7 +40,6 @@ if TYPE_CHECKING:
     from khala_bridge.knowledge import AbilityFacts
     from khala_bridge.observe.observation import SideObservation
     from khala_bridge.rules import Ledger
-    from khala_protocol.messages import Rejection
 
 MAKERS = frozenset({"build", "warp_in", "research"})
 """Kinds of abilities for which one unit of a team is enough."""
@@ -81,6 +84,13 @@ class Translator:
         self._targets = Targets(observation)
         self._count: Counter[tuple[str, str]] = Counter()
         """By agent and team, the actions of this turn."""
+        self._apart: frozenset[int] = frozenset()
+
+    def set_apart(self, calls: Iterable[Recognised]) -> None:
+        """Leave the units that these calls order by name, and can order, out of what is translated from now on."""
+        named = [said for said in calls if said.action.actor_count]
+        possible = [said for said in named if not isinstance(self.try_(said), Rejection)]
+        self._apart = frozenset(tag for said in possible for tag in said.tags[: said.action.actor_count])
 
     def translate(self, said: Recognised) -> list[Command] | Rejection:
         """Return the commands of a call: none if it orders nothing, two if only some of its units have to wait."""
@@ -213,7 +223,9 @@ class Translator:
         found = tuple(tag for tag in tags if tag in self._snapshot.units)
         if not found:
             raise self._cannot(said, [self._targets.end_of_all(tags) if tags else "it has no units"])
-        return found
+        if said.action.actor_count:
+            return found
+        return tuple(tag for tag in found if tag not in self._apart) or found
 
     def _having(self, said: Recognised, tags: Iterable[int]) -> tuple[int, ...]:
         """Return the units that have the action by the task."""

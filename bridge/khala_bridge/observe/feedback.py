@@ -7,12 +7,13 @@ the number of the others, and so has the report of the step: the recording has t
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from khala_protocol.messages import count_refusals
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from khala_protocol.messages import NoteView, Received, Rejection, StandingView
 
@@ -40,15 +41,29 @@ class Feedback:
 
 
 def shorten(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:
-    """Return the first rejections, as far as they fit, and one that counts the others by their reasons."""
+    """Return the first rejections, as far as they fit, and one that counts the others by their reasons.
+
+    Of rejections that say the same of the same call, the first stands for all.
+    """
+    rejections = tuple(_without_repeats(rejections))
     listed = tuple(_first(rejections))
-    others = Counter(rejection.reason for rejection in rejections[len(listed) :])
+    others = count_refusals(rejections[len(listed) :])
     if not others:
         return listed
     counts = ", ".join(f"{number} {reason}" for reason, number in others.most_common())
     message = f"{others.total()} more are not listed: {counts}."
     ((reason, _),) = others.most_common(1)
-    return *listed, rejections[len(listed)].but(reason=reason, message=message, text="", team=None)
+    return *listed, rejections[len(listed)].but(reason=reason, message=message, text="", team=None, others=dict(others))
+
+
+def _without_repeats(rejections: Iterable[Rejection]) -> Iterator[Rejection]:
+    same: dict[tuple[object, ...], list[Rejection]] = {}
+    for rejection in rejections:
+        same.setdefault((rejection.reason, rejection.text, rejection.message, rejection.team), []).append(rejection)
+    for first, *more in same.values():
+        count = 1 + len(more)
+        said = {"message": f"{first.message} (so {count} times in this answer)", "others": {first.reason: count}}
+        yield first.but(**said) if more else first
 
 
 def _first(rejections: Sequence[Rejection]) -> Iterator[Rejection]:

@@ -14,7 +14,7 @@ from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.feedback import Feedback
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from khala_bridge.frames import Camera, MapFrame
     from khala_bridge.observe.picture import Picture
@@ -65,8 +65,11 @@ class TeamObservation:
     def seen(self, tag: int) -> UnitView | None:
         """Return the view of a unit of the team or on its screen, except resources; None if it was not there."""
         wanted = hex(tag)
-        units = chain(self.view.units, self.view.allies, self.view.enemies)
-        return next((unit for unit in units if unit.tag == wanted), None)
+        return next((unit for unit in self.units_in_view() if unit.tag == wanted), None)
+
+    def units_in_view(self) -> Iterator[UnitView]:
+        """Return the views of its units and of those on its screen, except resources."""
+        return chain(self.view.units, self.view.allies, self.view.enemies)
 
 
 @dataclass(frozen=True, slots=True)

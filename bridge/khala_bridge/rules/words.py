@@ -70,7 +70,7 @@ def _too_dear(short: Shortfall) -> str:
 
 
 def _too_few(why: Unavailable) -> str:
-    return ", ".join(f"{needs - has:g} {account} too few" for account, needs, has, _ in why.missing)
+    return ", ".join(f"{needs - has:g} more {account} needed" for account, needs, has, _ in why.missing)
 
 
 def _every(why: Unavailable, of_all: str, of_one: str) -> str:

@@ -27,6 +27,7 @@ from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import (
     LOOPS_PER_S,
+    ActionSpec,
     AgentCard,
     AgentKind,
     Clock,
@@ -231,6 +232,10 @@ class AgentConfig(Frozen):
         lists = (*(team.actions for team in self.teams), *self.actions.values())
         names = dict.fromkeys(name for listed in lists for name in listed)
         return tuple(catalogue()[name] for name in names)
+
+    def specs(self) -> tuple[ActionSpec, ...]:
+        """Return its catalogue as its briefing lists it."""
+        return tuple(action.spec for action in self.catalogue())
 
     def team_specs(self) -> tuple[TeamSpec, ...]:
         """Return its teams as its briefing describes them."""

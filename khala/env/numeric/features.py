@@ -31,9 +31,9 @@ NO_OP, STOP, FIRST_MOVE, FIRST_TARGET = 0, 1, 2, 6
 MOVES: Final = ((0, 1), (0, -1), (1, 0), (-1, 0))
 """North, south, east and west: the actions from `FIRST_MOVE` on."""
 _MOVES: Final = np.array(MOVES).T[:, None]
-_PATHING_POINTS: Final = ((0, 2), (0, -2), (2, 0), (-2, 0), (1, 1), (-1, -1), (1, -1), (-1, 1))
+PATHING_POINTS: Final = ((0, 2), (0, -2), (2, 0), (-2, 0), (1, 1), (-1, -1), (1, -1), (-1, 1))
 """Points of an observation around a unit, in lengths of a move."""
-_HEIGHT_POINTS: Final = (*_PATHING_POINTS, (0, 0))
+HEIGHT_POINTS: Final = (*PATHING_POINTS, (0, 0))
 
 
 class Board(NamedTuple):
@@ -128,9 +128,9 @@ class BattleScene:
     def _moves(self) -> Iterator[Floats]:
         yield self.masks[:, FIRST_MOVE:FIRST_TARGET].astype(np.float64)
         if self._options.obs_pathing_grid:
-            yield self._around(self._board.walkable, _PATHING_POINTS)
+            yield self._around(self._board.walkable, PATHING_POINTS)
         if self._options.obs_terrain_height:
-            yield self._around(self._board.height, _HEIGHT_POINTS)
+            yield self._around(self._board.height, HEIGHT_POINTS)
 
     def _around(self, grid: Floats, points: tuple[tuple[int, int], ...]) -> Floats:
         """Return [agents, points] the values of a grid around each agent."""

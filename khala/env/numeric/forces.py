@@ -83,6 +83,10 @@ class Force:
         self.alive = there
         self.life = self.now.life * there
 
+    def one_medivac(self, own: OwnForce) -> bool:
+        """Return whether one Medivac is all that is left of these enemies, against a side that has some, too."""
+        return bool(own.heals.any()) and self.now.type_id[self.alive].tolist() == [MEDIVAC]
+
 
 class OwnForce(Force):
     """The agents' units, in the order of their types and places.

@@ -2,12 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import difflib
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Final
 
 from khala_protocol.errors import ConfigError
+from khala_simulator.tables.versions import BUILD_OF_VERSION
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 LEVELS = "123456789A"
 """SMAC's names of the computer player's levels, the easiest first."""
+
+
+_PACKAGE: Final = "SMAC's own package plays on the simulator as well, see docs/how-to/train.md"
+_INSTEAD: Final = {
+    "heuristic_ai": f"step() takes the actions of your agents; {_PACKAGE}",
+    "replay_dir": f"no replay is written; {_PACKAGE}",
+    "replay_prefix": f"no replay is written; {_PACKAGE}",
+    "window_size_x": "there is no window, and render() returns a picture of one size",
+    "window_size_y": "there is no window, and render() returns a picture of one size",
+    "debug": "nothing is logged; get_obs(), get_state() and get_avail_actions() return what you can log",
+}
+"""What to do instead of what other values of these options would mean."""
+_SMACV2: Final = frozenset({
+    "action_mask", "capability_config", "conic_fov", "fully_observable", "kill_unit_step_mul", "min_attack_range",
+    "num_fov_actions", "obs_own_pos", "obs_starcraft", "prob_obs_enemy", "use_unit_ranges",
+})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,8 +77,30 @@ class Options:
     reward_scale: bool = True
     """Divide by the reward of the best episode, and multiply by `reward_scale_rate`."""
     reward_scale_rate: float = 20
+    game_version: str | None = None
+    """The version whose tables the game has: 4.10 or 5.0.13; None: 4.10."""
+    heuristic_rest: bool = False
+    """Ignored, as in SMAC without `heuristic_ai`."""
+    heuristic_ai: bool = False
+    """Only False, and of the following only the default: they are here because files of settings name them."""
+    replay_dir: str | None = ""
+    replay_prefix: str | None = ""
+    window_size_x: int = 1920
+    window_size_y: int = 1200
+    debug: bool = False
 
     def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name in _INSTEAD and value not in (field.default, None):
+                raise ConfigError(
+                    f"{field.name} is {value!r} and can only be {field.default!r}: {_INSTEAD[field.name]}"
+                )
+        if self.game_version not in (None, *BUILD_OF_VERSION):
+            known = " and ".join(BUILD_OF_VERSION)
+            raise ConfigError(
+                f"there are no tables of game_version {self.game_version!r}, only of {known}: leave it out"
+            )
         if self.difficulty not in LEVELS or len(self.difficulty) != 1:
             raise ConfigError(f"difficulty {self.difficulty!r} is not a level: give one of {', '.join(LEVELS)}")
         if self.step_mul < 1:
@@ -71,3 +115,21 @@ class Options:
     def own_health(self) -> bool:
         """Whether an observation has the agent's own health."""
         return self.obs_all_health or self.obs_own_health
+
+
+def options_of(given: Mapping[str, Any]) -> Options:
+    """Return options from keyword arguments.
+
+    Raises:
+        ConfigError: there is no such option, or it has no such value.
+    """
+    known = {field.name for field in fields(Options)}
+    for name in given:
+        if name in _SMACV2:
+            raise ConfigError(
+                f"{name} is an option of SMACv2: play its own package on the simulator, see docs/how-to/train.md"
+            )
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            raise ConfigError(f"there is no option {name!r}{f': did you mean {close[0]}?' if close else ''}")
+    return Options(**given)

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from khala.env.numeric.forces import MEDIVAC
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -54,9 +52,7 @@ def ending_of(own: OwnForce, enemy: Force) -> Ending | None:
         return "lost"
     if not own.alive.any():
         return "lost" if enemy.alive.any() else "draw"
-    left = enemy.now.type_id[enemy.alive]
-    alone = own.heals.any() and left.tolist() == [MEDIVAC]
-    return "won" if alone or not len(left) else None
+    return "won" if enemy.one_medivac(own) or not enemy.alive.any() else None
 
 
 def _damage(force: Force) -> NDArray[np.float64]:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from khala.env.numeric.features import FIRST_TARGET
+from khala.env.numeric.features import FIRST_TARGET, HEIGHT_POINTS, MOVES, PATHING_POINTS
 
 if TYPE_CHECKING:
     from khala.env.numeric.maps import SmacMap
     from khala.env.numeric.options import Options
 
-_AROUND, _HEIGHTS = 8, 9
+
+class ObservationParts(NamedTuple):
+    """How many values an observation has of moves, of each enemy, of each ally, and of the agent itself."""
+
+    moves: int
+    enemy: int
+    ally: int
+    own: int
 
 
 def actions(spec: SmacMap) -> int:
@@ -18,13 +25,19 @@ def actions(spec: SmacMap) -> int:
     return FIRST_TARGET + spec.enemies
 
 
-def observation(spec: SmacMap, options: Options) -> int:
-    """Return the length of an observation."""
+def parts(spec: SmacMap, options: Options) -> ObservationParts:
+    """Return the lengths of the parts of an observation."""
     own_shields, enemy_shields = (race == "P" for race in spec.races)
-    moves = 4 + _AROUND * options.obs_pathing_grid + _HEIGHTS * options.obs_terrain_height
+    around = len(PATHING_POINTS) * options.obs_pathing_grid + len(HEIGHT_POINTS) * options.obs_terrain_height
     enemy = 4 + spec.type_bits + options.obs_all_health * (1 + enemy_shields)
     ally = 4 + spec.type_bits + options.obs_all_health * (1 + own_shields) + options.obs_last_action * actions(spec)
     own = spec.type_bits + options.own_health * (1 + own_shields) + options.obs_timestep_number
+    return ObservationParts(len(MOVES) + around, enemy, ally, own)
+
+
+def observation(spec: SmacMap, options: Options) -> int:
+    """Return the length of an observation."""
+    moves, enemy, ally, own = parts(spec, options)
     return moves + spec.enemies * enemy + (spec.agents - 1) * ally + own
 
 

@@ -20,8 +20,10 @@ from khala.env.numeric import rewards, sizes
 from khala.env.numeric.features import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP, STOP, BattleScene, Board
 from khala.env.numeric.forces import enemy_force, look, own_force
 from khala.env.numeric.maps import smac_map
-from khala.env.numeric.options import Options
+from khala.env.numeric.names import SmacNames
+from khala.env.numeric.options import options_of
 from khala_simulator.battle import Battle
+from khala_simulator.tables.versions import DEFAULT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +41,7 @@ _MOST_SEED = 2**31
 PICTURE_PX: Final = (512, 512)
 
 
-class StarCraft2Env:
+class StarCraft2Env(SmacNames):
     """One battle after the other on a SMAC map.
 
     Attributes:
@@ -61,7 +63,7 @@ class StarCraft2Env:
         """
         self._spec = smac_map(map_name)
         self.map_name = map_name
-        self.options = Options(**options)
+        self.options = options_of(options)
         self.n_agents, self.n_enemies = self._spec.agents, self._spec.enemies
         self.n_actions = sizes.actions(self._spec)
         self.episode_limit = episode_limit or self._spec.limit
@@ -85,6 +87,17 @@ class StarCraft2Env:
         Raises:
             RuntimeError: there is none yet.
         """
+        return self._require_battle()
+
+    def _sides(self) -> tuple[OwnForce, Force]:
+        self._require_battle()
+        return self._own, self._enemy
+
+    def _map(self) -> Board:
+        self._require_battle()
+        return self._board
+
+    def _require_battle(self) -> Battle:
         if self._battle is None:
             raise RuntimeError("no episode has begun: call reset() first")
         return self._battle
@@ -116,7 +129,9 @@ class StarCraft2Env:
 
     def _launch(self) -> None:
         seed = secrets.randbelow(_MOST_SEED) if self._seed is None else self._seed
-        self._battle = Battle(f"SMAC_Maps/{self.map_name}", seed=seed, difficulty=self.options.level)
+        version = self.options.game_version or DEFAULT_VERSION
+        name = f"SMAC_Maps/{self.map_name}"
+        self._battle = Battle(name, seed=seed, difficulty=self.options.level, version=version)
         self._board = Board.of(self._battle.ground(), self.options.move_amount)
 
     def _arrivals(self) -> tuple[OwnForce, Force]:
@@ -199,6 +214,7 @@ class StarCraft2Env:
         reward = rewards.of_end(ending, self.options, rewards.of_battle(own, enemy, self.options))
         if self.options.reward_scale:
             reward /= self.max_reward / self.options.reward_scale_rate
+        self.reward = reward
         return reward, self._ended, info
 
     @property

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
-from khala_protocol.messages import Fate, RejectionReason
+from khala_protocol.messages import Fate, RejectionReason, count_refusals
 
 if TYPE_CHECKING:
     from khala.experiment.measures.evidence import SideStep
@@ -60,6 +60,8 @@ class Actions:
     """Of these: over the number of actions that a team may have in one reply."""
     rejected_unknown_recipient: int
     """Of these: a message to nobody."""
+    rejected_unread: int
+    """Of these: replies of which nothing, or not the end, could be read; no call was refused."""
     rejected_too_late: int
     """Of these: the reply took effect too long after its observation."""
     rejected_too_many_messages: int
@@ -83,7 +85,7 @@ class ActionTally:
             self._decisions += 1
             self._accepted += len(agent.accepted)
             self._fates[agent.fate] += 1
-            self._reasons.update(rejection.reason for rejection in agent.rejections)
+            self._reasons.update(count_refusals(agent.rejections))
 
     def total(self) -> Actions:
         """Return the group."""

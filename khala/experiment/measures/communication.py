@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from khala.experiment.measures.evidence import tags
 from khala_bridge.knowledge import knowledge
+from khala_protocol.messages import count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -68,8 +69,8 @@ class CommunicationTally:
     def add(self, step: SideStep) -> None:
         """Take in a step."""
         self._sent += len(step.messages)
-        reasons = [rejection.reason for agent in step.report.agents for rejection in agent.rejections]
-        self._undeliverable += reasons.count("unknown_recipient")
+        refusals = count_refusals(rejection for agent in step.report.agents for rejection in agent.rejections)
+        self._undeliverable += refusals["unknown_recipient"]
         for decision in step.decisions:
             if decision.is_of_policy:
                 self._check(decision, step)

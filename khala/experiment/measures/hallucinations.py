@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
 from khala.experiment.measures.evidence import tags
+from khala_protocol.messages import count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -44,6 +45,7 @@ KINDS: Mapping[RejectionReason, Judgement] = {
     "not_yours": Judgement("context_conflicting", "the observation lists the units of each team"),
     "invalid_target": Judgement("fact_conflicting", "in the game the action cannot be used on it"),
     "not_available": Judgement("fact_conflicting", "in the game it costs, needs or waits for more"),
+    "unread": Judgement("not_hallucinated", "no call was refused: there was none"),
     "too_late": Judgement("not_hallucinated", "a deadline, however right the call was"),
     "too_many_actions": Judgement("not_hallucinated", "a limit, however right the call was"),
     "too_many_messages": Judgement("not_hallucinated", "a limit, however right the message was"),
@@ -90,7 +92,8 @@ class HallucinationTally:
         for decision in step.decisions:
             self._kinds.update(self._judge(decision))
             if decision.is_of_policy:
-                rejected = sum(rejection.reason not in _OF_MESSAGES for rejection in decision.report.rejections)
+                refusals = count_refusals(decision.report.rejections)
+                rejected = sum(count for reason, count in refusals.items() if reason not in _OF_MESSAGES)
                 self._calls += len(decision.report.accepted) + rejected
 
     def _judge(self, decision: RecordedDecision) -> Iterator[Kind]:
@@ -101,7 +104,8 @@ class HallucinationTally:
                 self._outdated += 1
                 yield "not_hallucinated"
             else:
-                yield KINDS[rejection.reason].kind
+                for reason in count_refusals([rejection]).elements():
+                    yield KINDS[reason].kind
 
     def total(self) -> Hallucinations:
         """Return the group."""

@@ -32,7 +32,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         agent_kind=agent.kind,
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),
-        actions=tuple(action.spec for action in agent.catalogue()),
+        actions=agent.specs(),
         correspondents=tuple(Contact(name=other.name, role=other.role) for other in others),
         channels=task.channels if others else (),
         frames=task.frames,

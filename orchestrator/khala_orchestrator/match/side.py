@@ -21,10 +21,12 @@ from khala_orchestrator.words.letters import Letters
 from khala_orchestrator.words.mailbox import Mailbox, newest
 from khala_orchestrator.words.notebook import Notebook
 from khala_orchestrator.words.repeats import Repeats
+from khala_protocol.manual import manual
 from khala_protocol.messages import LOOPS_PER_S, AgentReport, Message, Observation, Received, Rejection, Report
+from khala_protocol.speech import ShownText
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from khala_bridge.act import Command, JointAction
     from khala_bridge.game.game import StepResult
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.match.schedule import Decision, StepId
     from khala_orchestrator.words.mailbox import Post
     from khala_protocol.messages import Advice, Fate, Timings, Trigger, Unasked
+    from khala_protocol.speech import Speech
 
 
 class SideTurn(NamedTuple):
@@ -45,8 +48,8 @@ class SideTurn(NamedTuple):
     decisions: Sequence[Decision]
     joint: JointAction
     post: Post
-    note_rejections: Mapping[str, Sequence[Rejection]]
-    """By agent, why notes were not written or forgotten."""
+    other_rejections: Mapping[str, Sequence[Rejection]]
+    """By agent, what is wrong with its notes, its channels, and its reply as a whole."""
 
     @property
     def commands(self) -> Sequence[Command]:
@@ -60,6 +63,8 @@ class _Member:
 
     notebook: Notebook
     letters: Letters
+    manual: ShownText
+    """How its prompt says that calls are written."""
     repeats: Repeats = field(default_factory=Repeats)
     seen: AgentObservation | None = None
     """Its newest observation; None before the first one."""
@@ -67,6 +72,10 @@ class _Member:
     """Health and shield of its units in that observation, by tag."""
     news: Feedback = field(default_factory=Feedback)
     """The feedback and the messages since that observation."""
+
+    def shown(self) -> ShownText:
+        """Return what it has read: a reply that repeats it orders nothing."""
+        return ShownText(self.seen.text, earlier=self.manual) if self.seen else self.manual
 
     def offers(self) -> dict[str, Sequence[str]]:
         """Return by team the actions that were possible when it decided."""
@@ -120,10 +129,11 @@ class MatchSide:
         self._observer.begin()
         self._actor.begin()
         self._mailbox.clear()
-        memories = {agent.name: self.task.memory_of(agent) for agent in self.task.agents}
-        self._members = {
-            name: _Member(Notebook(memory.notes), Letters(memory.messages_s)) for name, memory in memories.items()
-        }
+        self._members = {}
+        for agent in self.task.agents:
+            memory = self.task.memory_of(agent)
+            known = ShownText(manual(agent.specs()))
+            self._members[agent.name] = _Member(Notebook(memory.notes), Letters(memory.messages_s), known)
 
     # --- seeing -------------------------------------------------------------------------------------
 
@@ -193,7 +203,10 @@ class MatchSide:
             advice: of all sides, since the step before.
         """
         own = [decision for decision in decisions if decision.seat.side == self.name]
-        words = {decision.seat.agent: replies.read(decision, self.task) for decision in own}
+        words = {
+            decision.seat.agent: replies.read(decision, self.task, self._members[decision.seat.agent].shown())
+            for decision in own
+        }
         speeches = {agent: speech for agent, speech in words.items() if speech is not None}
         seen = {name: member.seen for name, member in self._members.items() if member.seen is not None}
         joint = self._actor.joint(self._now, speeches, seen)
@@ -207,13 +220,18 @@ class MatchSide:
             for advised in advice
             if advised.side == self.name
         ]
-        for agent, speech in speeches.items():
-            for listen in speech.listens:
-                self._mailbox.listen(self.seat(agent), listen.channel)
-        now = self._now.snapshot
-        time_s = round(now.game_loop / LOOPS_PER_S, 1)
-        refused = {name: tuple(self._members[name].notebook.take(s.notes, time_s)) for name, s in speeches.items()}
-        return SideTurn(now, own, joint, self._mailbox.deliver(messages), refused)
+        refused = {decision.seat.agent: tuple(self._take_in(decision, words[decision.seat.agent])) for decision in own}
+        return SideTurn(self._now.snapshot, own, joint, self._mailbox.deliver(messages), refused)
+
+    def _take_in(self, decision: Decision, speech: Speech | None) -> Iterator[Rejection]:
+        """Take the notes and the channels of a reply; yield what is wrong with them, and with the reply as a whole."""
+        seat = decision.seat
+        for listen in speech.listens if speech else ():
+            if fault := self._mailbox.listen(seat, listen.channel):
+                yield fault
+        time_s = round(self._now.snapshot.game_loop / LOOPS_PER_S, 1)
+        yield from self._members[seat.agent].notebook.take(speech.notes if speech else (), time_s)
+        yield from replies.say_unread(decision, speech, self.task)
 
     def _message(self, at: StepId, agent: str, recipient: str, text: str, *, human: bool = False) -> Message:
         return Message(
@@ -280,7 +298,7 @@ class MatchSide:
             *turn.joint.rejections.get(seat.agent, ()),
             *(refusal.rejection for refusal in result.played.refusals if refusal.agent == seat.agent),
             *turn.post.rejections.get(seat, ()),
-            *turn.note_rejections.get(seat.agent, ()),
+            *turn.other_rejections.get(seat.agent, ()),
         )
         if any(decision.seat == seat for decision in turn.decisions):
             rejections = member.repeats.annotate(rejections, member.offers())

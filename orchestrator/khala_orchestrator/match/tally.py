@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.state import Alliance
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage
+from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -72,7 +72,7 @@ class Tally:
             name = agent.agent
             self._deeds.add(agent)
             self._usage[name] += agent.usage
-            self._rejections.update(rejection.reason for rejection in agent.rejections)
+            self._rejections.update(count_refusals(agent.rejections))
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:

@@ -67,6 +67,11 @@ class Answer:
         return self.reply.reason if self.reply else ""
 
     @property
+    def cut(self) -> bool:
+        """Whether its model reached its limit of tokens within the text."""
+        return self.reply is not None and self.reply.cut
+
+    @property
     def usage(self) -> Usage:
         """The usage of the reply."""
         return self.reply.usage if self.reply else Usage()

@@ -63,11 +63,16 @@ class Mailbox:
         """Forget all listeners, at the beginning of an episode."""
         self._listeners.clear()
 
-    def listen(self, seat: Seat, channel: str) -> None:
-        """Deliver what is said on `channel` to `seat` from now on; unknown channels stay silent."""
+    def listen(self, seat: Seat, channel: str) -> Rejection | None:
+        """Deliver what is said on `channel` to `seat` from now on; return what is wrong with an unknown one."""
         name = channel.casefold()
-        if name in self._channels and seat not in self._listeners[seat.side, name]:
+        if name not in self._channels:
+            known = "the channels are " + ", ".join(self._channels.values()) if self._channels else "there is none"
+            message = f"There is no channel {channel!r}: {known}."
+            return Rejection(reason="unknown_recipient", message=message, text=channel, start=0)
+        if seat not in self._listeners[seat.side, name]:
             self._listeners[seat.side, name].append(seat)
+        return None
 
     def deliver(self, messages: Iterable[Message]) -> Post:
         """Sort the messages of one step."""

@@ -44,6 +44,7 @@ from khala_protocol.messages.to_agents import (
     Rejection,
     RejectionReason,
     TeamSpec,
+    count_refusals,
 )
 from khala_protocol.messages.to_all import (
     AgentCard,
@@ -199,4 +200,5 @@ __all__ = [
     "View",
     "WarpGates",
     "Wire",
+    "count_refusals",
 ]

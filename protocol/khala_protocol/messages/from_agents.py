@@ -67,6 +67,8 @@ class Reply(Wire):
     """The same in the words of its endpoint or its policy."""
     hopeless: bool = False
     """Whether the agent's endpoint refuses it for good: its key or its model is wrong."""
+    cut: bool = False
+    """Whether its model reached its limit of tokens within the text."""
     latency_s: float = 0.0
     """From the arrival of the observation to this reply."""
     attempts: Count = 0
@@ -123,6 +125,8 @@ class ModelCall(Wire):
     params: dict[str, str | int | float | bool | None] = {}
     completion: str | None
     """None if no answer came."""
+    finish: str = ""
+    """Why it ended, in the words of the endpoint: `stop`, `length`, …"""
     status: str
     """`ok`, `empty`, `cut`, `refused` or `filtered` of an answer; else `timeout`, `cancelled`, `http 429`,
     `connection`, `malformed`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections import Counter
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -10,6 +11,9 @@ from khala_protocol.clock_rule import ClockRule
 from khala_protocol.messages.base import Count, Frozen, Wire
 from khala_protocol.messages.usage import Pace
 from khala_protocol.messages.view import ActionSpec, View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 RejectionReason = Literal[
     "malformed",  # looks like a call, but is not one
@@ -25,6 +29,7 @@ RejectionReason = Literal[
     "not_available",  # known, but not now: cost, cooldown, requirement
     "too_many_actions",  # over the number of actions a team may have in one reply
     "unknown_recipient",  # a message to nobody
+    "unread",  # of the reply, or of its end, nothing could be read
     "too_late",  # the reply took effect too long after its observation
     "too_many_messages",  # over the number of messages an agent may send in one reply
     "refused_by_game",  # PySC2 or the game answered with an error
@@ -171,6 +176,16 @@ class Rejection(Frozen):
     start: int = Field(ge=0)
     """Offset of `text` in the reply."""
     team: str | None = None
+    others: dict[RejectionReason, int] = {}
+    """How many it stands for, by reason, if an observation has no room for them; else it stands for itself."""
+
+
+def count_refusals(rejections: Iterable[Rejection]) -> Counter[RejectionReason]:
+    """Return how many were refused, by reason."""
+    found: Counter[RejectionReason] = Counter()
+    for rejection in rejections:
+        found.update(rejection.others or {rejection.reason: 1})
+    return found
 
 
 class Received(Frozen):

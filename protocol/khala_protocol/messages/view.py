@@ -18,6 +18,11 @@ class ActionSpec(Frozen):
     args: tuple[Literal["tag", "screen", "minimap"], ...] = ()
     description: str = ""
 
+    @property
+    def form(self) -> str:
+        """The action as it is listed: `<Attack_Unit(tag)>`."""
+        return f"<{self.name}({', '.join(self.args)})>"
+
 
 class OrderView(Frozen):
     """One order of a unit of the own side."""

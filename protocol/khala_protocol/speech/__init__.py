@@ -18,8 +18,9 @@ and affects nothing else. Nothing raises, the time is linear in the length of th
 `MAX_REPLY_CHARACTERS`, and up to 4 000 lines and 1 000 calls), and a call that is cut off is never guessed at.
 
 This package knows no unit, no action and no game: the bridge decides whether a name, a tag or a team exists.
-These are the rules of tolerance, in addition to those of headings (H, `khala_protocol.speech.headings`) and arguments
-(A, `khala_protocol.speech.arguments`); each has a row in the table test:
+These are the rules of tolerance, in addition to those of headings (H, `khala_protocol.speech.headings`), of arguments
+(A, `khala_protocol.speech.arguments`) and of what only repeats the prompt (E, `khala_protocol.speech.echoes`); each has
+a row in the table test:
 
 | id | rule | example |
 |---|---|---|
@@ -58,21 +59,29 @@ These are the rules of tolerance, in addition to those of headings (H, `khala_pr
 | S33 | a message without angle brackets, as an element, with three quotes and `>` | `MessageTo(A, 'go')` |
 | S34 | a note wherever it stands, quoted like a message; of several numbers, each | `<Note(go)>`, `<Forget(1, 2)>` |
 | S35 | brackets or none around the call of a standing order; no "until" | `<Standing(<Stop()>, 4:30)>` |
+| S36 | a message that is written again in the same reply is sent once | `<MessageTo(A, 'go')>` twice |
+| S37 | a tool call as text, as models of several makers write it | `<invoke name="Stop">` … |
+| S38 | an item of a list of YAML | `- action: Move_Screen`, then `screen: [3, 4]` |
+| S39 | a team as the first argument, or behind a call without angle brackets | `Stop(team="A")`, `Stop() for A-1` |
+| S40 | a made-up observation ends the reply, once orders stand before it | `Game`, then `Time: 1:20` |
 """
 
 from khala_protocol.messages import MAX_REPLY_CHARACTERS
 from khala_protocol.speech.arguments import render, written
+from khala_protocol.speech.echoes import NOTHING_SHOWN, ShownText
 from khala_protocol.speech.reader import parse
 from khala_protocol.speech.said import Forget, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.thoughts import thought_of
 
 __all__ = [
     "MAX_REPLY_CHARACTERS",
+    "NOTHING_SHOWN",
     "Forget",
     "ListenTo",
     "MessageTo",
     "Note",
     "Revoke",
+    "ShownText",
     "Speech",
     "Standing",
     "parse",

@@ -14,20 +14,26 @@ from khala_protocol.speech.marks import SHORT, MalformedCall
 
 # Possessive quantifiers (`*+`) keep every expression linear: they never backtrack. Optional groups that
 # may fail half way are not possessive: Python before 3.11.5 then goes on from where they failed (gh-106052).
-_NAME = re.compile(r"<(?P<blank>\s*+)[*`]*+(?P<name>[A-Za-z](?:\\?+[\w-])*+)[*`]*+(?P<open>\s*+\\?+\()?")
+_NAME = re.compile(
+    r"<(?P<blank>[ \t]*+(?:\n[ \t]*+)?+)[*`]*+(?P<name>[A-Za-z](?:\\?+[\w-])*+)[*`]*+(?P<open>\s*+\\?+\()?"
+)
 _SPACED = re.compile(r"<(?P<name>[A-Z][\w-]*+(?:[ \t]++[A-Z][\w-]*+){1,4})\s*+\\?+\(")
 _CLOSE = re.compile(r"[\s\\)\]}]*+[-=/]?+\s*+\\?+>")
 _CLOSE_BARE = re.compile(r"\s*+\\?+/?+\s*+\\?+>")
 _LOOSE = re.compile(r"(?:\s*+[:=]\s*+|\s++|(?=[\[{]))(?P<inside>[^<>\n]{1,200}+)\s*+/?+\s*+>")
 _ELEMENT = re.compile(r"(?P<inside>[^<>]{1,200}+)</\s*+(?P<name>[\w-]++)\s*+>")
 _LINE_ENDS = re.compile(r"[ \t]*+(?:$|[\n<,;.|#]|//|--|- |\()")
+_FOR_TEAM = re.compile(
+    r"[`*\"']*+[ \t]++for[ \t]++(?:team[ \t]++)?(?P<team>[A-Za-z]\w*-[0-9]++)[.`*]*+[ \t]*+(?=\n|$)", re.IGNORECASE
+)
 _STANDS_ALONE = re.compile(r"[ \t`*_\"'”’»」\]})>|,;.]*+(?:$|\n|</|#|//|/\*|[-–—:(]|[A-Z]\w*+\()")  # noqa: RUF001  # dashes
 _BRACKET = re.compile(r"[()\[\]{}<>]")
 _OPENED_BY = {")": "(", "]": "[", "}": "{"}
 _SEGMENT = re.compile(r"[^<>\n]*+>?")
 _NAKED = re.compile(
     r"(?:[^\w\n<]|_|[0-9]{1,2}+[.)])*+"
-    r"(?P<call>(?:(?P<team>[A-Za-z]\w*-[0-9]++)\.)?(?P<name>[^\W\d][\w-]*+)"
+    r"(?P<call>(?:print\()?(?:(?P<team>[A-Za-z]\w*-[0-9]++)\.|(?:default_api|functions?|tools?)\.)?"
+    r"(?P<name>[^\W\d][\w-]*+)(?:\.call)?"
     r"\((?P<inside>[^()<>\n]*+(?:\([^()<>\n]*+\)[^()<>\n]*+)*+)\))"
 )
 _NAKED_TALK = re.compile(
@@ -38,7 +44,8 @@ _IN_WORDS = re.compile(r"\b(?P<name>[A-Z](?=\w*_\w)\w++)[ \t:|=]++(?:0[xX][0-9a-
 _MORE_WORDS = re.compile(r"(?:[ \t]++\w++)++(?=[ \t]*+\()")
 _CLOSING_TAG = re.compile(r"</\s*+([^\W\d][\w-]*+)\s*+>")
 _HTML = re.compile(
-    "a|b|body|br|center|code|div|em|font|h[1-6]|hr|html|i|img|li|ol|p|pre|s|span|strong|su[bp]|table|t[dhr]|u|ul",
+    "a|b|body|br|center|code|div|em|font|h[1-6]|hr|html|i|img|li|ol|p|pre|s|span|strong|su[bp]|table|t[dhr]|u|ul"
+    "|(?:function|tool)_calls?",
     re.IGNORECASE,
 )
 
@@ -183,7 +190,13 @@ def in_words_at(text: str, at: int) -> re.Match[str] | None:
 
 def stands_alone(text: str, end: int) -> bool:
     """Return whether only marks, a comment or another call follow on the line: then a naked call is meant as one."""
-    return _STANDS_ALONE.match(text, end) is not None
+    return _STANDS_ALONE.match(text, end) is not None or named_behind(text, end) is not None
+
+
+def named_behind(text: str, end: int) -> str | None:
+    """Return the team named at the end of the line: `Move_Minimap([20, 32]) for Stalker-1`."""
+    named = _FOR_TEAM.match(text, end)
+    return named["team"] if named else None
 
 
 def is_talk(name: str) -> bool:

@@ -53,7 +53,11 @@ class Tone(Enum):
 
     DO = "do"
     SPEAK_OF = "speak of"
-    """They are drafts, possibilities, examples, or past actions."""
+    """They are drafts, possibilities or examples."""
+    OFFERED = "offered"
+    """They are what the host says is possible (rule E4)."""
+    PAST = "past"
+    """They were ordered before (rule E5)."""
     INSTEAD = "instead"
     """They replace those of earlier sections."""
 
@@ -84,7 +88,8 @@ _KEYWORD = rf"(?:{words.ANALYSIS}|{words.ACTIONS}|{words.COMMUNICATIONS})(?![^\W
 _TEAM_WORD = rf"(?:{words.TEAM})"
 _FOR_TEAM = rf"(?:[ \t]+(?:for|of)[ \t]+(?:{_TEAM_WORD}[ \t]+)?(?P<of>{_WORD}))?"
 _SECTION = (
-    rf"(?:(?:(?P<speak_of>{words.NOT_TO_DO})|(?P<instead>{words.INSTEAD})|my|our|next|chosen|current|team|the)[ \t]+)?"
+    rf"(?:(?:(?:your[ \t]+)?+(?:(?P<speak_of>{words.NOT_TO_DO})|(?P<offered>{words.OFFERED})|(?P<past>{words.PAST}))"
+    rf"|(?P<instead>{words.INSTEAD})|my|our|next|chosen|current|team|the)[ \t]+)?"
     rf"(?:(?:{words.ANALYSIS})[ \t]+(?:and|&|\+|/)[ \t]+|(?:{_KEYWORD})[ \t]*[/|][ \t]*)?"
     rf"(?P<section>{_KEYWORD})(?:[ \t]*+(?P<number>[0-9]{{1,2}}+))?{_FOR_TEAM}{_CLOSE}(?::|$)"
 )
@@ -170,10 +175,18 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
         section=section,
         names_team=not explains and (section is None or name is not None),
         team=_clean(name),
-        tone=Tone.SPEAK_OF if found["speak_of"] else Tone.INSTEAD if found["instead"] else Tone.DO,
+        tone=_tone(found) if section else Tone.DO,
         numbered=found["number"] is not None,
         explains=explains,
     )
+
+
+def _tone(found: dict[str, str | None]) -> Tone:
+    if found["instead"]:
+        return Tone.INSTEAD
+    if found["speak_of"]:
+        return Tone.SPEAK_OF
+    return Tone.OFFERED if found["offered"] else Tone.PAST if found["past"] else Tone.DO
 
 
 def json_heading_at(text: str, at: int) -> Heading | None:

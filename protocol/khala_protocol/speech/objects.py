@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 NAMES = ("action", "name", "function", "command", "tool")
 ARGUMENTS = ("args", "arguments", "parameters", "params", "input")
 TEAMS = ("team", "team_name", "group")
+_PLACES = ("tag", "screen", "minimap", "target", "unit", "point", "position", "location")
+"""Names of arguments beside the name of an action."""
 RECIPIENTS = ("to", "recipient")
 TEXTS = ("text", "message", "content")
 LONGEST = 2_000
@@ -58,17 +60,27 @@ def object_at(text: str, at: int) -> ObjectCall | ObjectMessage | None:
     """Return what the object at this `{` stands for; None if it is neither a call nor a message."""
     if not _LOOKS_LIKE_ONE.match(text, at):
         return None
+    decoded = decode_at(text, at)
+    if decoded is None:
+        return None
+    found, end = decoded
+    to, words = _first(found, RECIPIENTS), _first(found, TEXTS)
+    if isinstance(to, str) and isinstance(words, str) and to.strip() and words.strip():
+        return ObjectMessage(to.strip(), words.strip(), end)
+    return call_of(found, end)
+
+
+def decode_at(text: str, at: int) -> tuple[object, int] | None:
+    """Return the JSON that begins here, and the offset after it; None if there is none, or a very long one."""
     try:
         found, length = _DECODER.raw_decode(text[at : at + LONGEST])
     except (ValueError, RecursionError):
         return None
-    to, words = _first(found, RECIPIENTS), _first(found, TEXTS)
-    if isinstance(to, str) and isinstance(words, str) and to.strip() and words.strip():
-        return ObjectMessage(to.strip(), words.strip(), at + length)
-    return _call(found, at + length)
+    return found, at + length
 
 
-def _call(found: object, end: int) -> ObjectCall | None:
+def call_of(found: object, end: int) -> ObjectCall | None:
+    """Return the call that an object of JSON stands for, which ends here."""
     named = _first(found, NAMES)
     if isinstance(found, dict) and isinstance(named, dict):  # {"function": {"name": …, "arguments": …}}
         found, named = {**found, **named}, _first(named, NAMES)
@@ -76,6 +88,10 @@ def _call(found: object, end: int) -> ObjectCall | None:
     if call is None or not (call["inside"] is not None or "_" in call["name"] or _has(found, ARGUMENTS)):
         return None
     given = _first(found, ARGUMENTS)
+    if isinstance(given, str) and given.lstrip()[:1] in ("{", "["):
+        given = _load(given)
+    if given is None and isinstance(found, dict):  # {"action": …, "minimap": [3, 4]}
+        given = {key: value for key, value in found.items() if str(key).lower() in _PLACES}
     team = _first(found, TEAMS) or _first(given, TEAMS)
     if isinstance(given, dict):
         given = {key: value for key, value in given.items() if str(key).lower() not in TEAMS}
@@ -99,8 +115,6 @@ def _first(found: object, keys: tuple[str, ...]) -> object:
 
 def _values(given: object) -> list[str | Point]:
     """Return the arguments in JSON: from a list, an object of named ones, a single one, or text of one of these."""
-    if isinstance(given, str) and given.lstrip()[:1] in ("{", "["):
-        given = _load(given)
     match given:
         case None | "":
             return []

@@ -1,7 +1,8 @@
 """One pass over a reply, from mark to mark and never back.
 
-Above it: `khala_protocol.speech`, which lists the rules (S1 to S33). Below: `headings`, `calls`, `arguments`, `quoting`
-and `objects`, each of which reads one kind of thing at one place, and `said`, which decides what counts.
+Above it: `khala_protocol.speech`, which lists the rules (S1 to S40). Below: `headings`, `calls`, `arguments`,
+`quoting`, `objects` and `tools`, each of which reads one kind of thing at one place, `echoes`, which knows what repeats
+the prompt, and `said`, which decides what counts.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ from khala_protocol.speech.calls import (
     loose_arguments,
     naked_at,
     naked_talk_at,
+    named_behind,
     opening_at,
     refuse_words,
     segment_end,
     stands_alone,
 )
+from khala_protocol.speech.echoes import NOTHING_SHOWN, ShownText, has_arguments, is_form
 from khala_protocol.speech.headings import (
     JSON_KEY,
     SENTENCE_END,
@@ -47,10 +50,11 @@ from khala_protocol.speech.headings import (
     tag_heading_at,
 )
 from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescape
-from khala_protocol.speech.objects import ObjectMessage, object_at
+from khala_protocol.speech.objects import TEAMS, ObjectCall, ObjectMessage, object_at
 from khala_protocol.speech.quoting import MessageReader
 from khala_protocol.speech.said import Forget, Gathering, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.standing import numbers_in, standing_at
+from khala_protocol.speech.tools import BEGINS, item_at, tool_at
 from khala_protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
@@ -69,9 +73,14 @@ MAX_FOUND = 1_000
 """Number of calls, messages and faults that are read: 9 000 of them, as many as fit, would take a third of a second."""
 
 
-def parse(text: str) -> Speech:
-    """Read a reply. Never raise; see the table of `khala_protocol.speech`."""
-    walk = _Walk(text[:MAX_REPLY_CHARACTERS])
+def parse(text: str, shown: ShownText = NOTHING_SHOWN) -> Speech:
+    """Read a reply. Never raise; see the table of `khala_protocol.speech`.
+
+    Args:
+        text: the reply.
+        shown: what its agent was shown: calls that repeat it are mentions.
+    """
+    walk = _Walk(text[:MAX_REPLY_CHARACTERS], shown)
     try:
         walk.run()
     except _TooManyError as error:
@@ -102,18 +111,28 @@ _THINK = (
 _CHANNEL = r"<\|channel\|>\s*+"
 _THINKS = rf"{_THINK.format(slash='')}|<\|begin_of_thought\|>|{_CHANNEL}(?:analysis|commentary)\b[^<>\n]*+<\|message\|>"
 _THOUGHT = rf"{_THINK.format(slash='/')}|<\|end_of_thought\|>"
-_THINK_ENDS = re.compile(rf"{_THOUGHT}|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
-_MAY_BEGIN = re.compile(r"[\n<\[◁{\"'.!?;。]")
+_THINK_ENDS = re.compile(rf"{_THOUGHT}|<\|end\|>|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
+_SPEAKER = (
+    r"<\|(?:im_)?start\|>\s*+user\b|<start_of_turn>\s*+user\b|<\|user\|>|<\|start_header_id\|>\s*+user\b|\[INST\]"
+)
+_MAY_BEGIN = re.compile(r"[\n<\[◁{`|\"'.!?;。]")
 """First characters of what `_NEXT` matches; a search for one of them is ten times faster."""
 _NEXT = re.compile(
-    rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<think>{_THINKS})|(?P<comment><!--)"
-    r"|(?P<speaker><\|(?:im_)?start\|>\s*+user\b)|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
-    r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\())"
+    rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<tool>{BEGINS})|(?P<think>{_THINKS})|(?P<comment><!--)"
+    rf"|(?P<speaker>{_SPEAKER})"
+    r"|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
+    r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\()|(?:(?<=:)|(?<=: )|(?<=:\*\* ))`(?=[A-Z]\w*_\w*\()"
+    r"|(?<=<\|python_tag)\|>(?=\w))"
     rf"|(?P<sentence>{SENTENCE_END}|{JSON_KEY})",
     re.IGNORECASE,
 )
 _OBJECT_AHEAD = re.compile(r"[\s\[,]{0,40}+\{")
 _OTHER_SPEAKER = re.compile(r"[*_#]*+(?:user|human)[*_]*+:", re.IGNORECASE)
+_OBSERVATION = re.compile(r"[*_#> ]*+Game[:*_ ]*+\n\s*+Time: ?[0-9]+:[0-9]{2}")
+"""The beginning of an observation: a model that goes on with it makes the next turn up."""
+_TEAM_ARGUMENT = re.compile(
+    rf"(?:{'|'.join(TEAMS)})\s*+[=:]\s*+[\"'`]?(?P<team>[^\"'`]{{1,60}}+)[\"'`]?", re.IGNORECASE
+)
 _GENERIC = re.compile(r"[A-Za-z0-9]<")
 _NEGATED = re.compile(rf"(?:{NEGATION})[\s`*\"'_]*+$", re.IGNORECASE)
 _STRUCK = re.compile(r"~~[\s`*]*+$")
@@ -126,8 +145,9 @@ _DIRECTLY_ABOVE = 80
 
 
 class _Walk:
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, shown: ShownText) -> None:
         self._text = text
+        self._shown = shown
         self._plain = to_ascii(text)
         self._messages = MessageReader(self._plain)
         self._lines = 0
@@ -137,6 +157,8 @@ class _Walk:
     def _start_over(self) -> None:
         self.gathering = Gathering()
         self._section = ReplySection.NONE
+        self._tone = Tone.DO
+        self._echo_end = -1
         self._aside_until = 0
         self._team: str | None = None
         self._team_above_section: str | None = None
@@ -167,6 +189,8 @@ class _Walk:
         return len(self._plain) if self.gathering else mark.end()
 
     def line(self, mark: re.Match[str]) -> int:
+        if mark.group().count("\n") > 1:
+            self._tone = Tone.DO  # a section of the host ends with an empty line
         return self._line(mark.end())
 
     def sentence(self, mark: re.Match[str]) -> int:
@@ -188,6 +212,8 @@ class _Walk:
             raise _TooManyError(f"{MAX_LINES} lines", at)
         if self.gathering and _OTHER_SPEAKER.match(self._plain, at):  # S26
             return len(self._plain)
+        if self.gathering.has_orders() and _OBSERVATION.match(self._plain, at):
+            return len(self._plain)
         at = self._headings(at, line_start=True)
         if self._section is ReplySection.ACTIONS and (words := in_words_at(self._plain, at)):
             reason = f"a call stands in angle brackets: write <{words['name'][:SHORT]}(...)>"
@@ -198,6 +224,9 @@ class _Walk:
     def _headings(self, at: int, *, line_start: bool) -> int:
         while self._plain[at : at + 1] not in _NO_HEADING:
             brace = _OBJECT_AHEAD.match(self._plain, at)
+            if line_start and self._plain[at] == "-" and (item := item_at(self._plain, at)):  # S38
+                self._add_object(item, at)
+                return item.end - 1
             if brace and (end := self._object(brace.end() - 1)):
                 at = end
             elif heading := heading_at(self._plain, at, line_start=line_start):
@@ -221,13 +250,15 @@ class _Walk:
             else:
                 self._section = ReplySection.ANALYSIS
         if heading.section:
+            self._echo_end = -1
             self.gathering.open_block(self._plain[at : heading.end])
             if at - self._team_end < _DIRECTLY_ABOVE and not self._plain[self._team_end : at].strip('#*_> \t\n",{['):
                 self._team_above_section = self._team  # S14
             elif (self._section, heading.section) != (ReplySection.ANALYSIS, ReplySection.ACTIONS):
                 self._team_above_section = None
             self._team = self._team if heading.numbered else self._team_above_section
-            if heading.tone is Tone.SPEAK_OF and heading.section is ReplySection.ACTIONS:
+            self._tone = heading.tone if heading.section is ReplySection.ACTIONS else Tone.DO
+            if self._tone in (Tone.SPEAK_OF, Tone.OFFERED, Tone.PAST):
                 self._section = ReplySection.ANALYSIS
             else:
                 self._section = heading.section
@@ -249,6 +280,13 @@ class _Walk:
         self._fault(begin.start(), begin.end(), "", reason)
         return len(self._text)
 
+    def tool(self, mark: re.Match[str]) -> int:  # S37
+        called = tool_at(self._plain, self._text, mark.start())
+        if called is None:
+            return mark.end()
+        self._add_object(called, mark.start())
+        return called.end
+
     def team(self, mark: re.Match[str]) -> int:
         heading = json_heading_at(self._plain, mark.start())
         if heading is None:
@@ -258,17 +296,20 @@ class _Walk:
 
     def _object(self, start: int) -> int | None:
         """Read a call or a message as an object of JSON; return None if there is none at this `{`."""
-        found = object_at(self._plain, start)
+        found = object_at(self._text, start) or object_at(self._plain, start)  # JSON has escapes of its own
         if found is None:
             return None
         if isinstance(found, ObjectMessage):
             self._add(MessageTo(found.recipient, found.text, start, found.end), ReplySection.COMMUNICATIONS, start)
-            return found.end
-        try:
-            self._add_call(found.name, found.args, start, found.end, team=found.team)
-        except MalformedCall as error:
-            self._fault(start, found.end, found.name, str(error))
+        else:
+            self._add_object(found, start)
         return found.end
+
+    def _add_object(self, called: ObjectCall, start: int) -> None:
+        try:
+            self._add_call(called.name, called.args, start, called.end, team=called.team)
+        except MalformedCall as error:
+            self._fault(start, called.end, called.name, str(error))
 
     def _read_naked(self, at: int) -> int | None:
         """Read a call without angle brackets; return None if there is none."""
@@ -286,7 +327,8 @@ class _Walk:
             elif is_talk(name):
                 self._listen(start, found.end(), name, found["inside"])
             else:
-                self._add_call(name, read_arguments(found["inside"]), start, found.end(), team=found["team"])
+                team = found["team"] or named_behind(self._plain, found.end())
+                self._add_call(name, read_arguments(found["inside"]), start, found.end(), team=team)
             return found.end()
         except MalformedCall as error:
             end = naked.end() if naked else found.end()
@@ -386,6 +428,8 @@ class _Walk:
         self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
     ) -> None:
         kind = name.lower()
+        if args and isinstance(args[0], str) and (own := _TEAM_ARGUMENT.fullmatch(args[0])):
+            team, args = own["team"], args[1:]
         if kind in (FORGET, REVOKE):
             make = Forget if kind == FORGET else Revoke
             for number in numbers_in(args, name):
@@ -404,7 +448,7 @@ class _Walk:
         text = self._text[start : min(end, start + 2 * SHORT)].rstrip()
         fault = Rejection(reason="malformed", message=reason, text=text, start=start, team=self._team)
         kind = ReplySection.COMMUNICATIONS if is_talk(name) else ReplySection.ACTIONS
-        self.gathering.add(fault, kind, self._section_at(start))
+        self.gathering.add(fault, kind, self._section_at(start), echoed=self._is_echo(start, end))
 
     def _add(self, item: Said, kind: ReplySection, start: int) -> None:
         self._count(start)
@@ -414,7 +458,29 @@ class _Walk:
         if before and not before.isspace():
             struck = _STRUCK.search(before) and _STRUCK_BEHIND.match(self._plain, item.end)
             taken_back = bool(struck or _NEGATED.search(before))
-        self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back)
+        echoed = self._is_echo(start, item.end)
+        self.gathering.add(item, kind, self._section_at(start), taken_back=taken_back, echoed=echoed)
+
+    def _is_echo(self, start: int, end: int) -> bool:
+        """Return whether what stands here repeats what the agent was shown (rules E1 to E6)."""
+        call = self._plain[start:end]
+        names_no_target = is_form(call) or not has_arguments(call)
+        ordered = self._section is ReplySection.ACTIONS
+        found = (
+            self._tone is Tone.PAST
+            or (names_no_target and (self._tone is Tone.OFFERED or self._ends_a_quote(start, end)))
+            or self._shown.is_echo(self._plain, start, end, ordered=ordered)
+        )
+        if found:
+            self._echo_end = end
+        return found
+
+    def _ends_a_quote(self, start: int, end: int) -> bool:
+        """Return whether the reply ends here, on the line after an echo: there a quote was cut."""
+        if self._echo_end < 0 or self._plain[end : end + SHORT].strip(" \t\n`:"):
+            return False
+        _, line_end, before = self._plain[self._echo_end : start].partition("\n")
+        return bool(line_end) and not before.strip(" \t*_>|-")
 
     def _count(self, start: int) -> None:
         self._found += 1
@@ -431,6 +497,7 @@ _READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {
     "sentence": _Walk.sentence,
     "thought": _Walk.end_of_thoughts,
     "think": _Walk.thoughts,
+    "tool": _Walk.tool,
     "comment": _Walk.comment,
     "speaker": _Walk.speaker,
     "object": _Walk.object,

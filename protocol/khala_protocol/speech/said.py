@@ -7,10 +7,13 @@ which calls are orders, which are only mentioned, and which were repeated.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from khala_protocol.messages import Call, Rejection
 from khala_protocol.speech.headings import ReplySection
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,9 @@ class Speech:
         notes: notes to keep and to forget.
         standing: standing orders to begin and to end.
         faults: text that looks like one of these, but is not; reason `malformed`.
-        mentions: actions that are only mentioned, not ordered (rules S10, S24, S25, S27, H18, H19).
+        mentions: actions that are only mentioned, not ordered (rules S10, S24, S25, S27, H18, H19, E1 to E6).
+        echoes: number of calls, messages and faults that only repeat what was shown.
+        headed: whether it has a heading of orders or messages, which says that it is an answer, whatever follows.
     """
 
     calls: tuple[Call, ...] = ()
@@ -91,6 +96,13 @@ class Speech:
     standing: tuple[Standing | Revoke, ...] = ()
     faults: tuple[Rejection, ...] = ()
     mentions: tuple[Call, ...] = ()
+    echoes: int = 0
+    headed: bool = False
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether it says nothing that counts, and nothing that is wrong."""
+        return not any((self.calls, self.messages, self.listens, self.notes, self.standing, self.faults))
 
 
 Item: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke | Rejection
@@ -105,6 +117,7 @@ class _Found:
     """The section that contains it."""
     block: int
     taken_back: bool
+    echoed: bool
 
     @property
     def in_prose(self) -> bool:
@@ -131,7 +144,9 @@ class Gathering:
         """Begin a section under this heading."""
         self._titles.append("".join(filter(str.isalnum, title)).casefold())
 
-    def add(self, item: Item, kind: ReplySection, section: ReplySection, *, taken_back: bool = False) -> None:
+    def add(
+        self, item: Item, kind: ReplySection, section: ReplySection, *, taken_back: bool = False, echoed: bool = False
+    ) -> None:
         """Add an item.
 
         Args:
@@ -139,9 +154,12 @@ class Gathering:
             kind: the section that it belongs under.
             section: the section that contains it.
             taken_back: whether words around it say that it is not meant.
+            echoed: whether it only repeats what the agent was shown.
         """
-        found = _Found(item, kind, section, len(self._titles) - 1, taken_back)
+        found = _Found(item, kind, section, len(self._titles) - 1, taken_back or echoed, echoed)
         self._found.append(found)
+        if echoed:
+            return
         if isinstance(item, Call | Standing | Rejection) and kind is ReplySection.ACTIONS:
             team = item.call.team if isinstance(item, Standing) else item.team
             self._orders.setdefault(team, []).append(found)
@@ -172,12 +190,14 @@ class Gathering:
                 mentioned.append(found.item.call)
         return Speech(
             calls=tuple(item for item in said if isinstance(item, Call)),
-            messages=tuple(item for item in said if isinstance(item, MessageTo)),
+            messages=tuple(_once(item for item in said if isinstance(item, MessageTo))),
             listens=tuple(item for item in said if isinstance(item, ListenTo)),
             notes=tuple(item for item in said if isinstance(item, Note | Forget)),
             standing=tuple(item for item in said if isinstance(item, Standing | Revoke)),
             faults=tuple(item for item in said if isinstance(item, Rejection)),
             mentions=tuple(mentioned),
+            echoes=sum(found.echoed for found in self._found),
+            headed=bool(self.headed - {ReplySection.ANALYSIS}),
         )
 
     def _repeats(self) -> set[tuple[ReplySection, int]]:
@@ -196,6 +216,15 @@ class Gathering:
                 repeated.add((kind, block))
             seen.add(page)
         return repeated
+
+
+def _once(messages: Iterable[MessageTo]) -> Iterator[MessageTo]:
+    """Yield messages without those that repeat an earlier one (rule S36)."""
+    seen = set()
+    for message in messages:
+        if _content(message) not in seen:
+            seen.add(_content(message))
+            yield message
 
 
 def _content(item: Item) -> tuple[object, ...]:

@@ -32,10 +32,14 @@ EVERY_TEAM = (
     r"全チーム|모든[ \t]?팀"
 )
 NOT_TO_DO = (
-    "draft|initial|tentative|possible|potential|candidate|alternative|other|valid|available|legal|previous|last|past|"
-    "earlier|old|rejected|discarded|considered|example|sample|backup|fallback"
+    "draft|initial|tentative|possible|potential|candidate|alternative|other|old|discarded|considered|example|sample|"
+    "backup|fallback"
 )
 """Words before "actions" that say that the following is not to be carried out."""
+OFFERED = "valid|available|legal"
+"""Words before "actions" that say, as the host does, that the following is possible."""
+PAST = "last|previous|past|earlier|rejected"
+"""Words before "actions" that say, as the host does, that the following was ordered before."""
 INSTEAD = "final|revised|corrected|updated|definitive|definite|actual"
 """Words before "actions" that withdraw earlier text under such a heading."""
 EXPLANATION = "explanations?|rationale|justification|summary|conclusion|erklärung|explicación|解释|说明|总结"

@@ -323,6 +323,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     if world.harvest[slot]:
         _end_harvest(world, slot)
     world.order_kind[slot] = order.kind
+    world.on_guard[slot] = False
     world.order_ability[slot] = order.ability
     world.order_target[slot] = target
     world.order_point[slot] = world.pos[slot] if order.point is None else order.point

@@ -91,6 +91,8 @@ def _units(catalog: Catalog) -> Iterable[data_pb2.UnitTypeData]:
             _describe_unknown(data, row)
         else:
             _describe(data, catalog.units[known])
+            if catalog.units[known].like:  # each map numbers its own types
+                data.name = catalog.units[known].name
         yield data
 
 

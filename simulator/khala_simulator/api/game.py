@@ -21,7 +21,7 @@ from khala_simulator.api import actions, debug
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import OBSERVER
 from khala_simulator.api.types import types_of
-from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.catalog import load_catalog, renumber
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.players import PlayerSetup
 
@@ -75,8 +75,9 @@ class HostedGame:
     def __init__(self, setup: Setup, version: str, log: Iterable[LogEntry] = (), end_loop: int | None = None) -> None:
         self.setup = setup
         self.end_loop = end_loop
-        self.catalog = load_catalog(version)
-        self.types = types_of(version)
+        scenario = setup.game_map.scenario
+        self.catalog = renumber(load_catalog(version, scenario.data), scenario.own_types)
+        self.types = types_of(self.catalog)
         players = _player_setups(setup)
         self.world: World = new_game(
             setup.game_map, players, seed=setup.seed, catalog=self.catalog, fog=not setup.disable_fog

@@ -68,6 +68,26 @@ class Frame:
     fogged: bool  # dark where the player does not see
 
 
+@dataclasses.dataclass(frozen=True)
+class _Bodies:
+    """The units of a frame in drawing order: flying ones over those on the ground."""
+
+    pos: Floats  # [n, 2] world
+    radius: Floats
+    known: Bools  # not hidden by the fog
+    values: NDArray[np.int32]  # [layers, n]
+
+    def take(self, rows: NDArray[np.intp]) -> _Bodies:
+        """Return some of them, in another order."""
+        return _Bodies(self.pos[rows], self.radius[rows], self.known[rows], self.values.take(rows, axis=1))
+
+
+def _bodies(frame: Frame) -> _Bodies:
+    sight = frame.sight
+    bodies = _Bodies(sight.pos, sight.radius, sight.display != Display.HIDDEN.value, unit_values(frame))
+    return bodies.take(np.argsort(sight.flying, kind="stable")) if sight.flying.any() else bodies
+
+
 class FeatureLayers:
     """The feature layers that one client asked for; keeps the parts that stay the same from frame to frame."""
 
@@ -82,10 +102,10 @@ class FeatureLayers:
 
     def encode(self, frame: Frame) -> list[Part]:
         """Return the parts of an `ObservationFeatureLayer`."""
-        values = unit_values(frame)
-        return wire.embed(1, self._encode_screen(frame, values)) + wire.embed(2, self._encode_minimap(frame, values))
+        bodies = _bodies(frame)
+        return wire.embed(1, self._encode_screen(frame, bodies)) + wire.embed(2, self._encode_minimap(frame, bodies))
 
-    def _encode_screen(self, frame: Frame, values: Ints) -> list[Part]:
+    def _encode_screen(self, frame: Frame, bodies: _Bodies) -> list[Part]:
         screen = self.screen
 
         def axes() -> tuple[Floats, Floats]:
@@ -95,9 +115,9 @@ class FeatureLayers:
             _, lines = screen.to_world(corner, pixels[: screen.rows], frame.camera)
             return columns, lines
 
-        sight, image = frame.sight, self._screen
-        x, y = screen.to_pixels(sight.pos[:, 0], sight.pos[:, 1], frame.camera)
-        units = image.units.encode(x, y, sight.radius / screen.scale, values)
+        image = self._screen
+        x, y = screen.to_pixels(bodies.pos[:, 0], bodies.pos[:, 1], frame.camera)
+        units = image.units.encode(x, y, bodies.radius / screen.scale, bodies.values)
         return (
             image.encode_terrain(frame, axes) + units + self._effects(frame) + self._power(frame) + self._blips(frame)
         )
@@ -134,7 +154,7 @@ class FeatureLayers:
         x, y = screen.to_pixels(spots.pos[:, 0], spots.pos[:, 1], frame.camera)
         return self._screen.spots(layer).encode(x, y, spots.radius / screen.scale, values[None])
 
-    def _encode_minimap(self, frame: Frame, values: Ints) -> list[Part]:
+    def _encode_minimap(self, frame: Frame, bodies: _Bodies) -> list[Part]:
         minimap = self.minimap
 
         def axes() -> tuple[Floats, Floats]:
@@ -144,14 +164,10 @@ class FeatureLayers:
             _, lines = minimap.to_world(corner, pixels[: minimap.rows])
             return columns, lines
 
-        sight, image = frame.sight, self._minimap
-        pos = sight.pos
-        radius = sight.radius
-        known = sight.display != Display.HIDDEN.value
-        if not known.all():
-            pos, radius, values = pos[known], radius[known], values.compress(known, axis=1)
-        x, y = minimap.to_pixels(pos[:, 0], pos[:, 1])
-        units = image.units.encode(x, y, radius / minimap.scale, values)
+        image = self._minimap
+        bodies = bodies if bodies.known.all() else bodies.take(np.flatnonzero(bodies.known))
+        x, y = minimap.to_pixels(bodies.pos[:, 0], bodies.pos[:, 1])
+        units = image.units.encode(x, y, bodies.radius / minimap.scale, bodies.values)
         return image.encode_terrain(frame, axes) + units + self._camera(frame) + self._alerts(frame)
 
     def _camera(self, frame: Frame) -> list[Part]:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from khala_simulator.api.sight import API_NEUTRAL, Display, alliance_of, sees
-from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.players import NEUTRAL
 
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.sight import Sight
+    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.world import World
 
     Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ def strikes(world: World, sight: Sight) -> Strikes:
     fires = clear & (weapon >= 0) & (target != NOBODY) & (cooldown > 0) & (world.windup[slot] < 0)
     attacker = np.flatnonzero(fires)
     weapon, at = weapon[attacker], row_of[target[attacker]]
-    damage_point, melee = _rhythm(world.catalog.version)
+    damage_point, melee = _rhythm(world.catalog)
     period = world.stats.period[world.owner[slot[attacker]], weapon]
     recent = (period - cooldown[attacker] - damage_point[weapon] <= FLASH_LOOPS) & (at != NOBODY)
     return Strikes(attacker[recent], at[recent], melee[weapon[recent]])
@@ -80,8 +80,8 @@ def in_flight(world: World, player: int, *, through_fog: bool = False) -> InFlig
 
 
 @functools.cache
-def _rhythm(version: str) -> tuple[Floats, NDArray[np.bool_]]:
+def _rhythm(catalog: Catalog) -> tuple[Floats, NDArray[np.bool_]]:
     """Return, by weapon, the loops from start to damage point, and whether it is melee."""
-    weapons = load_catalog(version).weapons
+    weapons = catalog.weapons
     points = np.array([weapon.damage_point_loops for weapon in weapons])
     return points, np.array([weapon.melee for weapon in weapons], np.bool_)

@@ -21,7 +21,7 @@ cdef int64_t ALLIED
 cdef int64_t IDLE
 cdef int64_t VISIBLE_CELL
 
-@cython.locals(width=Py_ssize_t, height=Py_ssize_t, fogged=bint, observes=bint, n=Py_ssize_t, flying=Py_ssize_t, i=Py_ssize_t,
+@cython.locals(width=Py_ssize_t, height=Py_ssize_t, fogged=bint, observes=bint, n=Py_ssize_t, last=Py_ssize_t, i=Py_ssize_t,
                slot=int64_t, own=bint, hides=int64_t, seen=bint)
 cdef _units_seen(object world, object types, int64_t player, bint show_cloaked, bint through_fog)
 cdef int64_t _cloak(Columns c, int64_t slot, bint own, bint uncovered) noexcept

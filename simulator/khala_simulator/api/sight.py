@@ -1,7 +1,8 @@
 """What one player perceives of all units at this loop, as columns: the source of every part of an observation.
 
 The rules of perception are here and nowhere else: the side of each unit, what fog and cloak hide, and what is still
-known of a hidden unit. Rows are in drawing order, ground units before flying ones.
+known of a hidden unit. Some of the units that a scenario makes, drawn at their birth, come last and in descending
+order of their slots: so the order of recorded first observations differs from episode to episode.
 
 Above: `raw.py`, `layers.py`, `ui.py`. Below: the world's columns.
 """
@@ -150,7 +151,6 @@ def _units_seen(world: World, types: Types, player: int, show_cloaked: bool, thr
     visibility = memory.uint8s(world.visibility[player])
     fogged = world.fog
     observes = player == OBSERVER
-    flies = memory.bools(types.flying)
     kept = memory.new_ints(len(live))
     cloaks = memory.new_ints(len(live))
     clears = memory.new_ints(len(live))
@@ -158,10 +158,10 @@ def _units_seen(world: World, types: Types, player: int, show_cloaked: bool, thr
     cloak = memory.ints(cloaks)
     clear = memory.ints(clears)
     n = 0
-    for flying in range(2):
+    for last in range(2):
         for i in range(len(live)):
-            slot = slots[i]
-            if flies[c.type[slot]] != flying:
+            slot = slots[len(live) - 1 - i if last else i]
+            if c.listed_last[slot] != last:
                 continue
             own = c.owner[slot] == player and not observes
             hides = _cloak(c, slot, own, observes or c.visible[player * c.capacity + slot])

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from khala_simulator.economy.power import SUPPLIES
-from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -88,9 +87,9 @@ def _count(upgrades: Iterable[Upgrade], catalog: str, entries: set[str], field: 
 
 
 @functools.cache
-def types_of(version: str) -> Types:
-    """Return the arrays of a shipped catalog."""
-    return Types(load_catalog(version))
+def types_of(catalog: Catalog) -> Types:
+    """Return the arrays of a catalog."""
+    return Types(catalog)
 
 
 def _field_of_power(unit: UnitType) -> float:

@@ -47,6 +47,8 @@ def engage(world: World, slot: int, target: int) -> bool:
     c = columns.columns_of(world)
     if c.target[slot] != target:
         drop_attack(world, slot)
+        c.reached[slot] = False
+        c.in_reach[slot] = False
     c.target[slot] = target
     c.weapon[slot] = row
     measure_reach(world, slot)
@@ -90,6 +92,7 @@ def disengage(world: World, slot: int) -> None:
     drop_attack(world, slot)
     c = columns.columns_of(world)
     c.target[slot] = NOBODY
+    c.in_reach[slot] = False
     c.weapon[slot] = -1
     c.rolling[slot] = False
     c.turreted[slot] = False
@@ -101,6 +104,7 @@ def drop_attack(world: World, slot: int) -> None:
     """Drop an attack that is started and has not taken effect; it leaves no cooldown."""
     c = columns.columns_of(world)
     c.beaming[slot] = False
+    c.bursting[slot] = False
     if c.windup[slot] >= 0.0:
         c.windup[slot] = -1.0
         c.cooldown[slot] = 0.0

@@ -56,7 +56,8 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     world.acquires[slot] = bool(weapons) and not (unit.passive or unit.uncommandable) and owner != 0
     planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
     world.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
-    world.defensive[slot], world.flees[slot] = unit.defensive, unit.flees and not unit.passive
+    world.defensive[slot] = unit.defensive or (unit.passive and not unit.always_threatens)
+    world.flees[slot] = unit.flees and not unit.passive
     world.guns_walking[slot] = any(w.fires_moving and w.moves == "moving" for w in weapons)
     world.spares_structures[slot] = bool(weapons) and all(
         w.acquires == "unit" or w.excluding == "structure" for w in weapons

@@ -1,7 +1,8 @@
 """A user's own .SC2Map archive as a map that can be played.
 
-Terrain, playable area, start locations and units are read from it. The simulator can't run its script: a battle with a
-known name has the script and the units of its scenario, any other map is a plain melee game.
+Terrain, playable area, start locations, units and the mods that it depends on are read from it. The simulator can't
+run its script: a battle with a known name has the script and the units of its scenario, any other map is a plain melee
+game.
 
 Above: ``map_file``, ``install``. Below: ``terrain_file``, ``maps``.
 """
@@ -27,6 +28,7 @@ from khala_simulator.maps.game_map import GameMap, MapError, find_map, game_map,
 from khala_simulator.maps.scenario import Scenario
 from khala_simulator.maps.terrain_file import TerrainError, TerrainGrids
 from khala_simulator.tables.catalog import load_catalog
+from khala_simulator.tables.versions import DEFAULT_DATA, DataSet
 
 if TYPE_CHECKING:
     from khala_simulator.maps.game_map import MapTerrain
@@ -36,6 +38,18 @@ OBJECTS: Final = "Objects"
 CLOSED: Final = ("CellAttribute_Pnp", "CellAttribute_Pwd")  # unwalkable paint
 QUARTER_TURN: Final = np.pi / 2.0  # from the editor's rotation, 0 downwards, to the API's facing, 0 eastwards
 FAMILY: Final = "user"
+DEPENDENCIES: Final = ("DocumentInfo", "DocumentHeader")
+"""Where an archive names the mods that it depends on; both say the same."""
+MOD: Final = re.compile(rb"file:Mods[/\\](\w+)\.SC2Mod", re.IGNORECASE)
+DATA_OF_MODS: Final[dict[frozenset[bytes], DataSet]] = {
+    frozenset({b"liberty"}): "liberty",
+    frozenset({b"void"}): "void",
+    frozenset({b"swarm", b"void"}): "void",
+    frozenset({b"liberty", b"swarm", b"void"}): "void",
+}
+"""The data set of a map by its mods; Void brings Swarm and Liberty with it, any others are taken as multiplayer."""
+PLAYERS: Final = 2
+"""Of a map without start locations, whose own script would make what is there."""
 
 
 class ArchiveError(ValueError):
@@ -58,11 +72,20 @@ def read_archive(data: bytes, path: str) -> GameMap:
         raise
     digest = content + name.encode()
     if known is not None and not known.scenario.melee and known.terrain.size == terrain.size:
-        return game_map(known.scenario, terrain, digest)
+        return game_map(_with_data(known.scenario, data), terrain, digest)
     try:
-        return game_map(_melee(_member(_open(data), OBJECTS), name, terrain.size), terrain, digest)
+        melee = _melee(_member(_open(data), OBJECTS), name, terrain.size)
+        return game_map(_with_data(melee, data), terrain, digest)
     except MapError as error:
         raise ArchiveError(str(error)) from error
+
+
+def _with_data(scenario: Scenario, data: bytes) -> Scenario:
+    """Return a scenario with the data set of the mods that an archive depends on, where it names any."""
+    archive = _open(data)
+    text = next((found for name in DEPENDENCIES if (found := _find(archive, name))), b"")
+    mods = frozenset(name.lower() for name in MOD.findall(text))
+    return scenario.model_copy(update={"data": DATA_OF_MODS.get(mods, DEFAULT_DATA)}) if mods else scenario
 
 
 def _known(path: str) -> GameMap | None:
@@ -121,23 +144,24 @@ def _member(archive: Any, name: str) -> bytes:
 
 
 def _melee(objects: bytes, name: str, size: tuple[int, int]) -> Scenario:
-    """Return a melee game on the start locations of a map, with the units of the map."""
+    """Return a melee game on the start locations of a map, with its units; without any, two players with nothing."""
     try:
         root = _tree(objects)
         starts = [_point(o) for o in root.iter("ObjectPoint") if o.get("Type") == "StartLoc"]
-        units = [unit for o in root.iter("ObjectUnit") if (unit := _unit(o, len(starts), size)) is not None]
+        players = len(starts) or PLAYERS
+        units = [unit for o in root.iter("ObjectUnit") if (unit := _unit(o, players, size)) is not None]
     except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
         raise ArchiveError(f"{OBJECTS} in the archive can't be read: {error}") from error
-    slots = {number: {"race": "random", "control": "open", "ai": "melee"} for number in range(1, len(starts) + 1)}
+    slot = {"race": "random", "control": "open", **({"ai": "melee"} if starts else {})}
     return Scenario.model_validate(
         {
             "name": re.sub(r"\W", "_", name, flags=re.ASCII) or "map",
             "family": FAMILY,
-            "title": f"Melee on {name}",
+            "title": f"{'Melee' if starts else 'An open field'} on {name}",
             "terrain": "archive",
             "melee": bool(starts),
             "start_locations": starts,
-            "players": slots or {1: {"race": "random", "control": "open"}},
+            "players": dict.fromkeys(range(1, players + 1), slot),
             "units": units,
         }
     )

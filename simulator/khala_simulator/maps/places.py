@@ -237,6 +237,9 @@ class Shape(Model):
     def _one_form(self) -> Shape:
         if (self.rect is None) == (self.circle is None):
             raise ValueError("give either rect: [x0, y0, x1, y1] or circle: [x, y, radius]")
+        x0, y0, x1, y1 = self.box
+        if not (x0 <= x1 and y0 <= y1):
+            raise ValueError("a rect has its lower left corner first, and a radius is not negative")
         return self
 
     def covers(self, points: Floats) -> Bools:

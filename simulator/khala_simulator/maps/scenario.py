@@ -29,8 +29,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UpgradeName
+from khala_simulator.maps.places import Model, Names, PlayerId, Point, Region, UnitName, UpgradeName
 from khala_simulator.maps.script import At, Create, CreateSpec, Enters, Every, Made, Touches, Trigger
+from khala_simulator.tables.versions import DEFAULT_DATA, DataSet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,6 +88,8 @@ class Scenario(Model):
         Annotated[str, Tag("name")] | Annotated[Flat, Tag("flat")],
         Discriminator(lambda value: "name" if isinstance(value, str) else "flat"),
     ]
+    data: DataSet = DEFAULT_DATA
+    """Whose numbers units have: those of the mods that the map depends on."""
     playable: Box | None = None
     """The playable part of the terrain, ``[x0, y0, x1, y1]``; by default the terrain's own."""
     visibility: Visibility = Visibility()
@@ -98,6 +101,8 @@ class Scenario(Model):
     """Whether every player starts with a town hall and twelve workers, and loses with their last structure."""
     start_locations: tuple[Point, ...] = ()
     players: dict[PlayerId, PlayerSpec]
+    own_types: tuple[UnitName, ...] = ()
+    """The map's own unit types in the order of their API ids; by default that of the tables."""
     points: dict[str, Point] = Field(default_factory=dict)
     regions: dict[str, Region] = Field(default_factory=dict)
     groups: dict[str, tuple[CreateSpec, ...]] = Field(default_factory=dict)

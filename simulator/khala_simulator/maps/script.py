@@ -225,11 +225,11 @@ class Remove(Model):
     remove: Who | Literal["touched"]
 
 
-ORDERS: Final = ("attack_move", "move", "attack_units_of", "unload_at", "gather_near")
+ORDERS: Final = ("attack_move", "move", "attack_units_of", "attack_nearest_of", "unload_at", "gather_near")
 
 
 class OrderSpec(Model):
-    """One order to a player's units; ``unit``, ``group``, ``inside`` and ``unless`` narrow them down.
+    """One order to a player's units; ``unit``, ``group``, ``inside``, ``idle`` and ``unless`` narrow them down.
 
     ``gather_near`` is for the mineral field nearest to the place, ``unload_at`` for transports. ``queue`` says whether
     it replaces what they do, goes before that, or after it.
@@ -239,10 +239,12 @@ class OrderSpec(Model):
     unit: UnitName | None = None
     group: GroupName | None = None
     inside: RegionName | None = None
+    idle: bool = False
     unless: tuple[Trait, ...] = ()
     attack_move: Place | None = None
     move: Place | None = None
     attack_units_of: Owner | None = None
+    attack_nearest_of: Owner | None = None
     unload_at: Place | None = None
     gather_near: Place | None = None
     queue: Literal["replace", "front", "append"] = "replace"

@@ -32,17 +32,18 @@ class ArrivalCrowd:
         self.slots = memory.ints(self.live)
         self.units = len(self.live)
         self.loop = world.loop
-        self.area = 0.0  # that all of them fill
+        self.area = 0.0  # that all of them fill that can walk
         for i in range(self.units):
             slot = self.slots[i]
-            self.area += c.separation[slot] * c.separation[slot]
+            if c.step_max[slot] > 0.0:
+                self.area += c.separation[slot] * c.separation[slot]
 
 
 def is_packed(c: Columns, crowd: ArrivalCrowd, slot: int) -> bool:
     """Return whether a walker has come as near to its goal as the crowd allows.
 
     That is when it stands before others close to the goal, when friends fill the ground between it and the goal, or
-    when it is within the area that all of them would fill and has come no nearer for long.
+    when it is within the area that all who walk would fill and has come no nearer for long.
     """
     x = c.nav_goal[slot].x - c.pos[slot].x
     y = c.nav_goal[slot].y - c.pos[slot].y
@@ -91,11 +92,11 @@ def _is_inside(c: Columns, slot: int, other: int, squared: float) -> bool:
 
 
 def _area(c: Columns, crowd: ArrivalCrowd, slot: int, squared: float) -> float:
-    """Return the area of the bodies between a walker and its goal, or of all bodies for NOBODY, summed in pairs."""
+    """Return the area of the bodies between a walker and its goal, or of all who walk for NOBODY, summed in pairs."""
     areas = memory.new_floats(crowd.units)
     cells = memory.floats(areas)
     for i in range(crowd.units):
         other = crowd.slots[i]
-        is_inside = slot == NOBODY or _is_inside(c, slot, other, squared)
+        is_inside = c.step_max[other] > 0.0 if slot == NOBODY else _is_inside(c, slot, other, squared)
         cells[i] = c.separation[other] * c.separation[other] if is_inside else 0.0
     return memory.pairwise_sum(cells, crowd.units)

@@ -28,6 +28,10 @@ FULL_ARMY: Final = 20.0
 EASY: Final = 1.4
 """An army so many times the enemy's is an easy win, with at least so much supply."""
 LEAST_EASY: Final = 16.0
+LEAST: Final = 2.0
+"""Supply of the smallest attack."""
+READY: Final = 0.5
+"""An attack begins with this share of the army that the level wants at that time."""
 COUNTER_S: Final = 15.0
 BATTLE: Final = 0.5
 """For so long after enemies were repelled that were worth this share of the own army there may be a counter-attack."""
@@ -49,15 +53,16 @@ def set_out(side: OwnSide, enemy: Enemy) -> None:
     """Begin an attack when its time has come and the army is large enough.
 
     A level that adapts waits while it knows of a stronger army, and goes early against one that has just lost a battle
-    at the own bases; one that sees everything goes early against every weak one.
+    at the own bases.
     """
-    mind, first, own = side.mind, side.build.attack, side.army_supply
+    mind, own = side.mind, side.army_supply
     if side.world.loop < mind.attack_from:
         return
     known = enemy.army_supply() if "adapt" in side.level.skills else 0.0
-    enough = max(first.supply * side.level.wave * mind.wave, 2.0)
-    on_time = side.clock_s >= first.from_s and own >= max(enough, known)
-    easy = (side.level.vision or _won(side)) and own >= max(LEAST_EASY, EASY * known)
+    times = side.plan.attacks
+    due = mind.waves >= len(times) or side.now_s >= side.due_s(times[mind.waves])
+    on_time = due and own >= max(LEAST, READY * side.army_wanted, known)
+    easy = _won(side) and own >= max(LEAST_EASY, EASY * known)
     if on_time or easy or (side.used >= FULL and own > FULL_ARMY):
         mind.attacking = True
         mind.searched_since = side.world.loop

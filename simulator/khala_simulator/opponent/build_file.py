@@ -1,7 +1,7 @@
 """What computer players build, and when: ``data/opponents/<race>.yaml`` as frozen values.
 
-A build is an opening, followed in order, and stages by time that say what is wanted from then on. ``spending`` spends
-the money on it.
+A plan says what a level does at which time, stages what the army is made of and what is wanted late, by build.
+``spending`` spends the money on it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from khala_simulator.opponent.levels import Line
 from khala_simulator.tables.loader import read_data
 
 NAMES: Final = {2: "macro", 3: "power", 4: "rush", 5: "timing", 6: "air"}
@@ -23,64 +24,54 @@ class Data(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class OpeningStep(NamedTuple):
-    """One step of an opening: with so much supply in use, make this."""
+class TimedStep(NamedTuple):
+    """One step of a plan: from this time on, one more of this is wanted."""
 
-    supply: float
+    at_s: float
     what: str
 
 
 class BuildStage(Data):
-    """The wishes of a build from a time on; those of earlier stages stay, except the army and the workers.
+    """The wishes of a build from a time on; those of earlier stages stay, except the army.
 
-    ``army`` has shares, ``units`` numbers of single units, ``gas`` is the number of gas structures. ``workers`` is a
-    limit below that of the level, 0 for none.
+    ``army`` has shares, ``units`` numbers of single units.
     """
 
     from_s: float
-    bases: int
-    gas: int
     army: dict[str, float]
     structures: dict[str, int] = {}
     units: dict[str, int] = {}
     research: tuple[str, ...] = ()
-    workers: int = 0
 
 
-class Attack(Data):
-    """From when on, and with how much army supply, the first attack begins."""
+class GamePlan(Data):
+    """What some levels do in some builds, by seconds of game time; without builds it is for all.
 
-    from_s: float
-    supply: float
-
-
-class ArmyGuard(NamedTuple):
-    """Below how much army supply the army comes first: m minutes after ``from_s`` it is growth * m * (m + 1)."""
-
-    from_s: float
-    growth: float
-
-    def supply(self, at_s: float) -> float:
-        """Return that army supply at a time of the build's clock."""
-        minutes = max(0.0, at_s - self.from_s) / 60.0
-        return self.growth * minutes * (minutes + 1.0)
-
-
-class BuildOrder(Data):
-    """One way to play a race.
-
-    With ``saves``, a step of the opening whose time has come is paid before more workers are.
+    ``opening`` and ``later`` are steps, ``attacks`` the times of the first attacks. ``army`` is a line of times and
+    supply for an army larger than the level's, ``workers`` one of the most workers. Until ``hold_s`` there are as many
+    workers as the level holds.
     """
 
-    opening: tuple[OpeningStep, ...]
-    attack: Attack
-    guard: ArmyGuard
-    saves: bool = False
-    stages: tuple[BuildStage, ...]
+    levels: tuple[int, ...]
+    builds: tuple[str, ...] = ()
+    opening: tuple[TimedStep, ...]
+    later: tuple[TimedStep, ...] = ()
+    attacks: tuple[float, ...] = ()
+    army: Line = ()
+    workers: Line = ()
+    hold_s: float = 0.0
+
+    @property
+    def steps(self) -> tuple[TimedStep, ...]:
+        """All steps in order."""
+        return *self.opening, *self.later
 
 
 class Race(Data):
-    """The builds of a race, and the names of the types with a role of their own."""
+    """How a race is played, and the names of the types with a role of their own.
+
+    Of ``plans`` the first counts that is for the level and the build; ``stages`` are for every build.
+    """
 
     race: str
     worker: str
@@ -90,7 +81,9 @@ class Race(Data):
     producer: str
     detector: str
     transport: str
-    builds: dict[str, BuildOrder]
+    plans: tuple[GamePlan, ...]
+    stages: tuple[BuildStage, ...]
+    builds: dict[str, tuple[BuildStage, ...]]
 
 
 @lru_cache(maxsize=3)
@@ -105,19 +98,32 @@ def name_of(ai_build: int, draw: float) -> str:
     return NAMES.get(ai_build, names[int(draw * len(names))])
 
 
+def plan_of(race: str, level: int, build: str) -> GamePlan:
+    """Return the plan of a level, by the API's number, for a build."""
+    plans = load_race(race).plans
+    return next(p for p in plans if level in p.levels and build in (p.builds or (build,)))
+
+
 def stage_at(race: str, build: str, at_s: float) -> BuildStage:
     """Return what a build wants at a time of its own clock."""
-    stages = load_race(race).builds[build].stages
-    return _join_stages(race, build, sum(stage.from_s <= at_s for stage in stages))
+    return _join_stages(race, build, sum(stage.from_s <= at_s for stage in _stages(race, build)))
+
+
+def _stages(race: str, build: str) -> list[BuildStage]:
+    facts = load_race(race)
+    return sorted((*facts.stages, *facts.builds[build]), key=lambda stage: stage.from_s)
 
 
 @lru_cache(maxsize=128)
 def _join_stages(race: str, build: str, count: int) -> BuildStage:
     """Return what the first stages of a build want together."""
-    reached = load_race(race).builds[build].stages[:count]
+    reached = _stages(race, build)[:count]
     structures: dict[str, int] = {}
+    units: dict[str, int] = {}
     research: dict[str, None] = {}
     for stage in reached:
         structures |= stage.structures
+        units |= stage.units
         research |= dict.fromkeys(stage.research)
-    return reached[-1].model_copy(update={"structures": structures, "research": tuple(research)})
+    wishes = {"structures": structures, "units": units, "research": tuple(research)}
+    return reached[-1].model_copy(update=wishes)

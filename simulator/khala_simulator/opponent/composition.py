@@ -23,6 +23,11 @@ GAS_PILE: Final = 300.0
 PILE_SHIFT: Final = 0.5
 
 
+def supply_made(side: OwnSide) -> float:
+    """Return the supply of the army and of what is being made for it: all that no worker uses, so Queens too."""
+    return side.cap - side.purse.room - side.count(side.race.worker)
+
+
 def shares(side: OwnSide) -> dict[str, float]:
     """Return the shares of the army that a side wants now."""
     shares = {name: share * _for_money(side, name) for name, share in side.stage.army.items()}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from khala_simulator.opponent.side import OwnSide
     from khala_simulator.world.casts import Point
 
-FIRST_S: Final = 330.0
+FIRST_S: Final = 480.0
 BETWEEN_S: Final = 110.0
 LOAD_S: Final = 14.0
 FLY_S: Final = 90.0
@@ -106,8 +106,8 @@ def _load(side: OwnSide) -> None:
     if outside and not late:
         return
     drop.squad = [tag for tag in drop.squad if world.slot_of(tag) not in outside]
-    unload = next(a for a in world.catalog.abilities_of(int(world.type[transport])) if a.effect == UNLOAD)
-    if not drop.squad:
+    unload = next((a for a in world.catalog.abilities_of(int(world.type[transport])) if a.effect == UNLOAD), None)
+    if not drop.squad or unload is None:  # it has become something that carries nothing
         _end(side)
     elif hands.use(side, [transport], unload, point=drop.target):
         drop.phase = "fly"

@@ -8,6 +8,7 @@ import numpy as np
 
 from khala_simulator.economy import construction, harvesting, supply
 from khala_simulator.opponent import hands, products
+from khala_simulator.opponent.levels import along
 from khala_simulator.opponent.products import MakeOutcome
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import OrderKind
@@ -20,8 +21,6 @@ MOVED_AT_ONCE: Final = 4
 """How many workers change to another base in one thought."""
 GAS_ENOUGH: Final = 200.0
 """With so much vespene unspent, and fewer minerals, gas structures get one worker only."""
-A_HALL: Final = 16
-"""Workers on the minerals of one base."""
 AHEAD_S: Final = 22.0
 """Supply is made for so many seconds of production ahead; a Pylon takes 18, a Supply Depot 21."""
 A_WORKER_S: Final = 12.0
@@ -33,8 +32,9 @@ MANY: Final = 800.0
 """With so many minerals unspent, larvae have piled up that will be used at once."""
 NEARLY: Final = 0.7
 """A town hall takes 71 seconds, so AHEAD_S before it is there this part of it is done."""
-TWO_HALLS: Final = 1.5
-"""With a second town hall a level makes workers so much faster."""
+MOST_WORKERS: Final = 72
+SPARSE: Final = 4
+"""A base that wants so few workers on its minerals is mined out."""
 
 
 class Staff:
@@ -125,15 +125,17 @@ def _even_out(side: OwnSide, staff: Staff) -> None:
 
 
 def keep_supply_ahead(side: OwnSide) -> None:
-    """Make more supply before it runs out."""
+    """Make more supply before it runs out, once the first one of the plan is due."""
     name = side.race.supply
+    first = side.plan.opening[0]
+    if first.what == name and side.now_s < first.at_s:
+        return
     provides = side.world.catalog.unit(name).provides
     coming = provides * (side.count(name) - len(side.kind(name)))
     hall = side.world.catalog.unit(side.race.hall).provides
     coming += hall * sum(side.world.build_progress[s] >= NEARLY for s in side.begun.get(side.race.hall, ()))
-    planned = any(step.what == name for step in side.build.opening[side.mind.step : side.mind.step + 1])
     soon = side.cap + coming
-    if (planned and side.cap > side.used) or soon >= supply.LIMIT or soon - side.used > _ahead(side):
+    if soon >= supply.LIMIT or soon - side.used > _ahead(side):
         return
     products.make(side, name)
 
@@ -151,17 +153,23 @@ def _ahead(side: OwnSide) -> float:
 
 
 def train_workers(side: OwnSide, staff: Staff) -> None:
-    """Make workers until the bases are full, as fast as the level can."""
-    world, name = side.world, side.race.worker
-    most = min(side.level.workers, side.stage.workers or side.level.workers, _workers_needed(side, staff))
-    halls = max(len(side.halls), 1)
-    while side.count(name) < most and world.loop >= side.mind.next_worker:
+    """Make workers until there are as many as wanted."""
+    name = side.race.worker
+    most = workers_wanted(side, staff)
+    while side.count(name) < most:
         if products.make(side, name) is not MakeOutcome.DONE:
             return
-        side.mind.next_worker = side.after(side.level.worker_s / (1.0 if halls < 2 else TWO_HALLS))
 
 
-def _workers_needed(side: OwnSide, staff: Staff) -> int:
+def workers_wanted(side: OwnSide, staff: Staff) -> float:
+    """Return how many workers a side wants: what its level wants for each base, held or limited early by its plan."""
+    if side.now_s < side.plan.hold_s:
+        return side.level.hold
     begun = len(side.begun.get(side.race.hall, ()))
-    gas = len(side.begun.get(side.race.gas, ()))
-    return staff.places + A_HALL * begun + GAS_WORKERS * gas + 2
+    most = min(MOST_WORKERS, side.level.workers * (len(staff.halls) - mined_out(staff)) + side.level.site * begun)
+    return min(most, along(side.plan.workers, side.now_s)) if side.plan.workers else most
+
+
+def mined_out(staff: Staff) -> int:
+    """Return how many bases have nearly no minerals left."""
+    return sum(ideal <= SPARSE for _, ideal in staff.halls.values())

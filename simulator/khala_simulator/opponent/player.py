@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from khala_simulator.world.casts import Point
     from khala_simulator.world.world import World
 
-PATIENCE: Final = 0.08
-"""How much earlier or later than its build a player does everything, drawn from the seed."""
+PATIENCE: Final = 0.1
+"""By this share of the time since its opening a player is early or late, drawn from the seed."""
 
 
 def think(world: World, player: int) -> None:

@@ -10,17 +10,17 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from khala_simulator.economy import building_sites, harvesting, supply
 from khala_simulator.economy.requirements import counts_as
-from khala_simulator.opponent.build_file import load_race, stage_at
-from khala_simulator.opponent.levels import FASTER_LOOPS, level_of
+from khala_simulator.opponent.build_file import load_race, plan_of, stage_at
+from khala_simulator.opponent.levels import FASTER_LOOPS, along, level_of
 
 if TYPE_CHECKING:
-    from khala_simulator.opponent.build_file import BuildOrder, BuildStage, Race
+    from khala_simulator.opponent.build_file import BuildStage, GamePlan, Race
     from khala_simulator.opponent.levels import OpponentLevel
     from khala_simulator.tables.abilities import Ability
     from khala_simulator.tables.catalog import Catalog
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.opponent_memory import OpponentMemory
     from khala_simulator.world.world import World
+
+EXACT_S: Final = 120.0
+"""Until then all players of a plan do everything at the same time, give or take a few seconds."""
 
 
 @dataclass(slots=True)
@@ -68,7 +71,7 @@ class OwnSide:
         self.mind: OpponentMemory = self.owner.mind
         self.level: OpponentLevel = level_of(self.owner.difficulty)
         self.race: Race = load_race(self.owner.race)
-        self.build: BuildOrder = self.race.builds[self.mind.build]
+        self.plan: GamePlan = plan_of(self.owner.race, self.level.number, self.mind.build)
         self.slots: Ints = world.units_of(player)
         self.whole: dict[str, list[int]] = {}
         self.begun: dict[str, list[int]] = {}
@@ -76,6 +79,8 @@ class OwnSide:
             self.slots.tolist(), world.type[self.slots].tolist(), world.build_progress[self.slots].tolist(), strict=True
         ):
             (self.whole if done >= 1.0 else self.begun).setdefault(world.catalog.units[row].name, []).append(slot)
+        inside = [at for slot in self.slots.tolist() for at in world.passengers(slot)]
+        self.aboard = Counter(world.unit_type(slot).name for slot in inside)  # such as workers in gas structures
         self.used = supply.in_use(world, player)
         self.cap = supply.cap(world, player)
         self.purse = SidePurse(self.owner.minerals, self.owner.vespene, self.cap - self.used)
@@ -88,11 +93,16 @@ class OwnSide:
     @property
     def clock_s(self) -> float:
         """Seconds of game time on the clock of its build; a weak player's clock is slow."""
-        return self.world.loop / FASTER_LOOPS / (self.level.tempo * self.mind.patience)
+        return self.now_s / (self.level.tempo * self.mind.patience)
 
-    def after(self, seconds: float) -> int:
-        """Return the game loop so many seconds from now."""
-        return self.world.loop + round(seconds * FASTER_LOOPS)
+    @property
+    def now_s(self) -> float:
+        """Seconds of game time."""
+        return self.world.loop / FASTER_LOOPS
+
+    def due_s(self, at_s: float) -> float:
+        """Return when this player does what its plan says for a time: at that time early on, later sooner or later."""
+        return at_s + (self.mind.patience - 1.0) * max(0.0, at_s - EXACT_S)
 
     @cached_property
     def stage(self) -> BuildStage:
@@ -112,7 +122,7 @@ class OwnSide:
     def count(self, name: str) -> int:
         """Return how many of a type, or of types that count as it, exist, are being made, or are ordered."""
         names = names_of(self.world.catalog, name)
-        exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) for n in names)
+        exist = sum(len(self.whole.get(n, ())) + len(self.begun.get(n, ())) + self.aboard[n] for n in names)
         return exist + sum(self.underway[n] for n in names if n not in self.begun) + self.ordered[name]
 
     @cached_property
@@ -143,6 +153,11 @@ class OwnSide:
     def army_supply(self) -> float:
         """Supply of the army."""
         return sum(self.world.unit_type(slot).supply for slot in self.army)
+
+    @property
+    def army_wanted(self) -> float:
+        """Army supply that its level and its plan have at this time."""
+        return max(along(self.level.army, self.now_s), along(self.plan.army, self.now_s))
 
     def place(self, slot: int) -> Point:
         """Return where a unit is."""

@@ -1,7 +1,8 @@
 """Sites: where a computer player puts its structures.
 
-Around a base, with a way around each of them; not between a town hall and its resources, not where another base's town
-hall will stand, and not on a ramp. Candidates are found on grids of the whole map, then judged by the game's rules.
+Around a base, with a way around each of them unless the creep is too small for that; not between a town hall and its
+resources, not where another base's town hall will stand, and not on a ramp. Candidates are found on grids of the whole
+map, then judged by the game's rules.
 """
 
 from __future__ import annotations
@@ -62,11 +63,6 @@ def place_for(side: OwnSide, unit: UnitType, near: Point | None = None) -> Point
     return next((place for base in around if (place := _nearest(side, unit, base)) is not None), None)
 
 
-def beside(side: OwnSide, hall: UnitType) -> Point | None:
-    """Return where one more town hall can stand at a base that has one, for its larvae."""
-    return _nearest(side, hall, side.mind.bases[0])
-
-
 def _forward(side: OwnSide) -> Point:
     """Return a point in front of the base nearest to the enemy."""
     (x, y), (ex, ey) = bases.front(side), side.mind.enemy_start
@@ -79,6 +75,8 @@ def _nearest(side: OwnSide, unit: UnitType, near: Point) -> Point | None:
     if footprint is None:
         return None
     at = _centres(side, unit, footprint.size)
+    if unit.needs_creep and not len(at):
+        at = _centres(side, unit, footprint.size, way=0)
     offset = np.hypot(*(at - np.array(near)).T)
     far = (offset >= (NEAREST if near in side.mind.bases else 0.0)) & (offset <= FARTHEST)
     at, offset = at[far], offset[far]
@@ -115,8 +113,8 @@ def _room(side: OwnSide, at: Floats) -> Ints:
 # grids ----------------------------------------------------------------------------------------------------------------
 
 
-def _centres(side: OwnSide, unit: UnitType, size: tuple[int, int]) -> Floats:
-    """Return (k, 2) the centres where a structure and a way around it find room."""
+def _centres(side: OwnSide, unit: UnitType, size: tuple[int, int], way: int = 1) -> Floats:
+    """Return (k, 2) the centres where a structure and a way of so many cells around it find room."""
     world = side.world
     open_ground = world.map.terrain.build & ~building_sites.taken(world)
     open_ground = open_ground & ~_kept_free(world.map, side.mind.bases, side.mind.resources) & ~_for_addons(side)
@@ -125,11 +123,11 @@ def _centres(side: OwnSide, unit: UnitType, size: tuple[int, int]) -> Floats:
     elif unit.name != side.race.hall and (side.owner.race == "zerg" or world.creep.any()):
         open_ground = open_ground & ~world.creep
     extra = ADDON_CELLS if unit.name in WITH_ADDON else 0
-    width, height = size[0] + 2 + extra, size[1] + 2
+    width, height = size[0] + 2 * way + extra, size[1] + 2 * way
     sums = np.pad(np.cumsum(np.cumsum(open_ground, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
     inside = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width] + sums[:-height, :-width]
     y, x = np.nonzero(inside == width * height)
-    return np.stack([x + 1 + size[0] / 2.0, y + 1 + size[1] / 2.0], axis=1)
+    return np.stack([x + way + size[0] / 2.0, y + way + size[1] / 2.0], axis=1)
 
 
 def _for_addons(side: OwnSide) -> Bools:

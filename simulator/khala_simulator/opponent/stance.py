@@ -17,11 +17,8 @@ if TYPE_CHECKING:
 RALLY_AHEAD: Final = 7.0
 """How far in front of its town hall the army waits."""
 RALLY_NEAR: Final = 9.0
-REST_S: Final = 45.0
+REST_S: Final = 60.0
 """Between two attacks."""
-NEXT_WAVE: Final = 1.25
-"""Each attack that failed makes the next one larger by this factor, up to MOST_WAVE times the first."""
-MOST_WAVE: Final = 3.0
 
 
 def rally(side: OwnSide) -> Point:
@@ -40,11 +37,11 @@ def gather_up(side: OwnSide, army: list[int]) -> None:
 
 
 def call_off(side: OwnSide) -> None:
-    """End the attack; the army goes home and the next attack is larger."""
+    """End the attack; the army goes home."""
     mind = side.mind
     mind.attacking = False
-    mind.wave = min(MOST_WAVE, mind.wave * NEXT_WAVE)
-    mind.attack_from = side.world.loop + round(REST_S * FASTER_LOOPS * side.level.tempo)
+    mind.waves += 1
+    mind.attack_from = side.world.loop + round(REST_S * FASTER_LOOPS)
     point = rally(side)
     away = [s for s in side.army if math.dist(side.place(s), point) > RALLY_NEAR]
     if away:

@@ -21,7 +21,7 @@ from pathlib import Path
 from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION
 
 OWN_FOLDER = "user"
-"""Folder below `Maps` for maps without a folder of their own."""
+"""Folder below `Maps` for maps without a folder that clients look into."""
 
 _MARK = "# The simulator of Khala stands in for the game here."
 _REAL = (".build.info", "SC2Data", "StarCraft II.exe", "StarCraft II.app", "Support64")
@@ -68,7 +68,8 @@ class OwnMap:
 def link_maps(root: Path, directory: Path | str) -> list[OwnMap]:
     """Link every .SC2Map file below a directory into an install, and return which ones can be played.
 
-    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. A map of the user
+    The directory may be one of maps, of folders of maps, or a StarCraft II with its folder `Maps`. It may also be a
+    folder that clients look into, such as `SMAC_Maps`, whose maps then go into that of the install. A map of the user
     replaces a shipped one of the same path; none replaces a file that the user put there.
 
     Raises:
@@ -162,9 +163,9 @@ def _write_maps(maps: Path) -> None:
 
 def _link(maps: Path, top: Path, file: Path) -> OwnMap:
     """Link one map; clients look for maps exactly one folder below `Maps`."""
-    from khala_simulator.maps.map_file import MapDataError, is_placeholder, read_file, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
+    from khala_simulator.maps.map_file import FOLDERS, MapDataError, is_placeholder, read_file, read_map  # noqa: PLC0415  # numpy: 0.1 s of any --help
 
-    folder = file.parent.name if file.parent != top else OWN_FOLDER
+    folder = file.parent.name if file.parent != top or top.name in FOLDERS else OWN_FOLDER
     path = f"{folder}/{file.stem}.SC2Map"
     target = maps / path
     try:

@@ -15,16 +15,16 @@ cdef int64_t PATROL
 cdef double PRIORITY_WEIGHT
 cdef double THREAT_WEIGHT
 cdef double TOP_RANK
-cdef double RANK_STEP
 cdef double OUT_OF_SIGHT
 cdef double ROUNDING
 cdef int64_t SCAN_PERIOD
-cdef int64_t LOOK_UP_PERIOD
 cdef int64_t HELP_PERIOD
 cdef double HELP_RADIUS
 cdef double LEASH_RADIUS
 cdef double LEASH_RESET
-cdef double SWITCH_GAIN
+cdef double GUARD_MARGIN
+cdef int64_t BLOCKED_LOOPS
+cdef int64_t ANYBODY
 
 
 cdef class _Foes:
@@ -35,17 +35,19 @@ cdef class _Foes:
     cdef int64_t* planes
     cdef double* rank
     cdef int64_t* threatens
+    cdef int64_t* only
     cdef Py_ssize_t count
     cdef double widest
-    cdef Py_ssize_t weapons
     cdef double* ranges
     cdef bint filters
     cdef bint zones
 
 
-@cython.locals(loop=int64_t, looks_up=bint, slot=int64_t, player=int64_t)
+@cython.locals(loop=int64_t, slot=int64_t, player=int64_t)
 cpdef choose_targets(object world)
-cdef bint _is_due(Columns c, int64_t slot, int64_t loop, bint looks_up) noexcept
+@cython.locals(target=int64_t)
+cdef bint _is_due(Columns c, int64_t slot, int64_t loop) noexcept
+cdef bint _loses(Columns c, int64_t slot) noexcept
 cdef bint _seeks_fights(Columns c, int64_t slot) noexcept
 cdef bint _stays(Columns c, int64_t slot) noexcept
 cdef double _squared_distance_from_guard(Columns c, int64_t slot) noexcept
@@ -54,19 +56,18 @@ cdef bint _gives_up(Columns c, int64_t slot) noexcept
 @cython.locals(away=bint)
 cdef void _slip_leash(Columns c, int64_t slot) noexcept
 cdef bint is_foe(Columns c, int64_t player, int64_t slot) noexcept
-@cython.locals(threat=double)
+cdef int64_t _foe_of(Columns c, int64_t slot) noexcept
+@cython.locals(threatens=bint)
 cdef double rank_of(Columns c, int64_t seeker, int64_t foe) noexcept
-cdef int64_t _threatened_planes(Columns c, int64_t foe) noexcept
-@cython.locals(slot=int64_t, now=int64_t, foe=int64_t, rank_now=double, gap=double, worth=double, rank=double)
+@cython.locals(slot=int64_t, foe=int64_t)
 cdef _seek(object world, Columns c, int64_t player, list seekers)
-cdef bint _is_better(Columns c, _Foes foes, int64_t slot, int64_t foe, double gap, double rise) noexcept
-@cython.locals(planes=int64_t, on_ground=double, in_air=double, longest=double, best=int64_t, best_gap=double,
-               best_worth=double, place=Point, radius=double, farthest=double, i=Py_ssize_t, foe=int64_t, x=double, y=double, gap=double,
-               sight=double, worth=double)
-cdef (int64_t, double, double) _find_best(Columns c, _Foes foes, int64_t slot) noexcept
+@cython.locals(now=int64_t, is_free=bint, best=int64_t, rank=double, rank_now=double)
+cdef int64_t _choose(Columns c, _Foes foes, int64_t slot) noexcept
+@cython.locals(planes=int64_t, margin=double, on_ground=double, in_air=double, best=int64_t, best_gap=double,
+               best_rank=double, place=Point, radius=double, farthest=double, i=Py_ssize_t, foe=int64_t, x=double,
+               y=double, gap=double, sight=double, only=int64_t, threat=double, rank=double)
+cdef (int64_t, double) _find_best(Columns c, _Foes foes, int64_t slot, bint in_reach) noexcept
 cdef bint _may_aim(Columns c, int64_t slot, int64_t foe, double gap) noexcept
-@cython.locals(ground=double, air=double)
-cdef double _longest_reach(Columns c, _Foes foes, int64_t slot) noexcept
 @cython.locals(on_ground=bint, row=int64_t, touch=double)
 cdef bint _reaches(Columns c, _Foes foes, int64_t slot, int64_t foe, double gap) noexcept
 cdef _take(object world, Columns c, int64_t slot, int64_t target)

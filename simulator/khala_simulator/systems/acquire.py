@@ -2,10 +2,16 @@
 
 Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk do not. The best target
 is the one with the highest attack priority, then one that threatens the unit before one that is harmless to it, then
-the nearest. A unit that fires at something of a lower rank checks now and then for something better. An idle unit
-remembers where it stood and goes back there; at the end of its leash it gives up and ignores enemies until it is nearly
-back. One that is attacked from farther than it looks turns on the attacker, and so do its idle friends; a type that
-does not fight back runs.
+the nearest. A type that does not fight of its own accord threatens only its target, from when it first has it in reach.
+
+A unit keeps its target until that dies, hides or leaves the reach in which it was; until its next look it fires on
+within the weapon's slop. Before, the unit changes only for a higher rank: at once on its way, between two shots when it
+fires. A unit that bodies keep from its target takes an equal one that it reaches. One that fought its way to a point
+looks farther there.
+
+An idle unit remembers where it stood and goes back there; at the end of its leash it gives up and ignores enemies until
+it is nearly back. One that is attacked from farther than it looks turns on the attacker, and so do its idle friends; a
+type that does not fight back runs. ``docs/design/battles.md`` has the sources of these rules.
 """
 
 from __future__ import annotations
@@ -31,16 +37,16 @@ PATROL: Final = int(OrderKind.PATROL)
 PRIORITY_WEIGHT: Final = 1000.0
 THREAT_WEIGHT: Final = 500.0
 TOP_RANK: Final = 20 * PRIORITY_WEIGHT + THREAT_WEIGHT  # an army unit that threatens: nothing is better
-RANK_STEP: Final = 250.0  # less than any difference in rank, more than any distance
 OUT_OF_SIGHT: Final = -1e9
 ROUNDING: Final = 1e-6  # more than roundings make of a distance on any map
+ANYBODY: Final = -2
 SCAN_PERIOD: Final = MECHANICS.scan_period
-LOOK_UP_PERIOD: Final = MECHANICS.look_up_period
+GUARD_MARGIN: Final = MECHANICS.guard_margin
 HELP_PERIOD: Final = MECHANICS.help_period
 HELP_RADIUS: Final = MECHANICS.help_radius
 LEASH_RADIUS: Final = MECHANICS.leash_radius
 LEASH_RESET: Final = MECHANICS.leash_reset
-SWITCH_GAIN: Final = MECHANICS.switch_gain
+BLOCKED_LOOPS: Final = MECHANICS.switch_blocked
 
 
 def choose_targets(world: World) -> None:
@@ -52,12 +58,11 @@ def choose_targets(world: World) -> None:
     if not world.scan_now and loop % SCAN_PERIOD:
         return
     world.scan_now = False
-    looks_up = loop % LOOK_UP_PERIOD == 0
     seekers = []
     for slot in range(world.top):
         if c.leashed[slot]:
             _slip_leash(c, slot)
-        if _is_due(c, slot, loop, looks_up):
+        if _is_due(c, slot, loop):
             seekers.append(slot)
     if not seekers:
         return
@@ -69,15 +74,23 @@ def choose_targets(world: World) -> None:
         _seek(world, c, player, seekers)
 
 
-def _is_due(c: Columns, slot: int, loop: int, looks_up: bool) -> bool:
-    """Return whether a unit looks for a target now: the best one there is, if it has one in reach, rarely."""
+def _is_due(c: Columns, slot: int, loop: int) -> bool:
+    """Return whether a unit looks for a target now."""
     if not (c.looks_around[slot] or (c.guns_walking[slot] and c.walks[slot])):
         return False
     if not c.acquires[slot] or c.scan_loop[slot] > loop or not c.windup[slot] < 0.0 or c.leashed[slot]:
         return False
     if c.defensive[slot] and not _seeks_fights(c, slot):
         return False
-    return not (c.in_reach[slot] and c.target[slot] != NOBODY and (not looks_up or c.rank[slot] >= TOP_RANK))
+    target = c.target[slot]
+    if target == NOBODY or not c.in_reach[slot]:
+        return True
+    return c.cooldown[slot] > 0.0 and rank_of(c, slot, target) < TOP_RANK
+
+
+def _loses(c: Columns, slot: int) -> bool:
+    """Return whether a unit's target has left the reach in which it was."""
+    return c.reached[slot] and c.gap[slot] > c.reach[slot]
 
 
 def _seeks_fights(c: Columns, slot: int) -> bool:
@@ -128,13 +141,15 @@ class _Foes:
             memory.new_ints(len(live)),
             memory.new_floats(len(live)),
             memory.new_ints(len(live)),
+            memory.new_ints(len(live)),
         )
         self.slot = memory.ints(self.arrays[0])
         self.place = memory.points(self.arrays[1])
         self.radius = memory.floats(self.arrays[2])
         self.planes = memory.ints(self.arrays[3])
         self.rank = memory.floats(self.arrays[4])
-        self.threatens = memory.ints(self.arrays[5])
+        self.threatens = memory.ints(self.arrays[5])  # planes
+        self.only = memory.ints(self.arrays[6])  # the slot of the only unit that it threatens, or ANYBODY
         self.count = 0
         self.widest = 0.0
         for i in range(len(live)):
@@ -145,10 +160,10 @@ class _Foes:
                 self.radius[self.count] = c.radius[slot]
                 self.planes[self.count] = c.plane_bits[slot]
                 self.rank[self.count] = c.priority[slot] * PRIORITY_WEIGHT
-                self.threatens[self.count] = _threatened_planes(c, slot)
+                self.threatens[self.count] = c.threat_bits[slot]
+                self.only[self.count] = _foe_of(c, slot) if c.defensive[slot] else ANYBODY
                 self.widest = max(self.widest, c.radius[slot])
                 self.count += 1
-        self.weapons = world.stats.weapons
         self.ranges = memory.floats(world.stats.range[player])
         self.filters = census.census(world).weapons_with_filters
         self.zones = bool(world.area_effects)
@@ -161,19 +176,19 @@ def is_foe(c: Columns, player: int, slot: int) -> bool:
     )
 
 
+def _foe_of(c: Columns, slot: int) -> int:
+    """Return the target of a unit that has had it in reach, NOBODY if there is none."""
+    return c.target[slot] if c.reached[slot] else NOBODY
+
+
 def rank_of(c: Columns, seeker: int, foe: int) -> float:
     """Return the rank that comes before distance: the foe's priority, and whether it threatens its seeker."""
-    threat = THREAT_WEIGHT if _threatened_planes(c, foe) & c.plane_bits[seeker] else 0.0
-    return c.priority[foe] * PRIORITY_WEIGHT + threat
-
-
-def _threatened_planes(c: Columns, foe: int) -> int:
-    """Return the planes that a foe threatens; workers are no threat as long as they do not fight."""
-    return 0 if c.defensive[foe] and c.target[foe] == NOBODY else c.threat_bits[foe]
+    threatens = c.threat_bits[foe] & c.plane_bits[seeker] != 0 and (not c.defensive[foe] or _foe_of(c, foe) == seeker)
+    return c.priority[foe] * PRIORITY_WEIGHT + (THREAT_WEIGHT if threatens else 0.0)
 
 
 def _seek(world: World, c: Columns, player: int, seekers: list[int]) -> None:
-    """Give each seeker of a player the best target it can see, if that is better than what it has."""
+    """Give each seeker of a player the best target it can see, if it takes it for what it has."""
     mine = [slot for slot in seekers if c.owner[slot] == player]
     if not mine:
         return
@@ -182,67 +197,71 @@ def _seek(world: World, c: Columns, player: int, seekers: list[int]) -> None:
         return
     chosen = []
     for slot in mine:
-        now = c.target[slot]
-        rank_now = rank_of(c, slot, now) if now != NOBODY else OUT_OF_SIGHT
-        c.rank[slot] = rank_now
-        foe, gap, worth = _find_best(c, foes, slot)
-        if foe not in (NOBODY, now) and _is_better(c, foes, slot, foe, gap, worth + gap - rank_now):
-            chosen.append((slot, foe, worth + gap))
-    for slot, foe, rank in chosen:
+        foe = _choose(c, foes, slot)
+        if foe not in (NOBODY, c.target[slot]):
+            chosen.append((slot, foe))
+    for slot, foe in chosen:
         _take(world, c, slot, foe)
-        c.rank[slot] = rank
 
 
-def _is_better(c: Columns, foes: _Foes, slot: int, foe: int, gap: float, rise: float) -> bool:
-    """Return whether a foe is better than the target that a unit has, whose rank it exceeds by ``rise``."""
-    if rise > RANK_STEP:
-        return True
-    if not rise > -RANK_STEP or c.in_reach[slot]:
-        return False
-    return c.gap[slot] - gap > SWITCH_GAIN or _reaches(c, foes, slot, foe, gap)
+def _choose(c: Columns, foes: _Foes, slot: int) -> int:
+    """Return the foe that a seeker turns on now, NOBODY if it goes on as it does."""
+    now = c.target[slot]
+    is_free = now == NOBODY or _loses(c, slot)
+    rank_now = OUT_OF_SIGHT if is_free else rank_of(c, slot, now)
+    if rank_now < TOP_RANK:
+        best, rank = _find_best(c, foes, slot, _stays(c, slot))
+        if is_free or rank > rank_now:
+            return best
+    if not c.in_reach[slot] and c.blocked[slot] >= BLOCKED_LOOPS:
+        best, rank = _find_best(c, foes, slot, True)
+        if rank >= rank_now:
+            return best
+    return NOBODY
 
 
-def _find_best(c: Columns, foes: _Foes, slot: int) -> tuple[int, float, float]:
-    """Return the foe that is worth most to a seeker, the first of several, its distance and its worth.
+def _find_best(c: Columns, foes: _Foes, slot: int, in_reach: bool) -> tuple[int, float]:
+    """Return the best foe that a seeker sees, or reaches from where it stands, and its rank.
 
-    NOBODY if there is none in sight.
+    NOBODY if there is none.
     """
     planes = c.plane_bits[slot]
+    margin = GUARD_MARGIN if c.on_guard[slot] else 0.0
     on_ground = c.ground_scan[slot]
     in_air = c.air_scan[slot]
-    if _stays(c, slot):
-        longest = _longest_reach(c, foes, slot)
-        on_ground = min(on_ground, longest)
-        in_air = min(in_air, longest)
     best = NOBODY
     best_gap = 0.0
-    best_worth = OUT_OF_SIGHT
+    best_rank = OUT_OF_SIGHT
     place = c.pos[slot]
     radius = c.radius[slot]
-    farthest = max(on_ground, in_air) + radius + foes.widest + ROUNDING
-    if farthest < 0.0:
-        return best, best_gap, best_worth
+    farthest = max(on_ground, in_air) + margin + radius + foes.widest + ROUNDING
+    if max(on_ground, in_air) < 0.0:
+        return best, best_rank
     for i in range(foes.count):
         x = place.x - foes.place[i].x
         y = place.y - foes.place[i].y
         if x * x + y * y > farthest * farthest:
             continue
+        only = foes.only[i]
+        threat = THREAT_WEIGHT if foes.threatens[i] & planes and only in (ANYBODY, slot) else 0.0
+        rank = foes.rank[i] + threat
         gap = memory.length(x, y) - radius - foes.radius[i]
+        if rank < best_rank or (rank == best_rank and gap >= best_gap):
+            continue
         sight = max(
             on_ground if foes.planes[i] & GROUND_PLANE else -1.0, in_air if foes.planes[i] & AIR_PLANE else -1.0
         )
-        worth = ((THREAT_WEIGHT if foes.threatens[i] & planes else 0.0) + foes.rank[i]) - gap
-        if gap > sight or worth <= best_worth:
-            continue
         foe = foes.slot[i]
+        if sight < 0.0 or (not _reaches(c, foes, slot, foe, gap) if in_reach else gap > sight + margin):
+            continue
         if foes.filters and not _may_aim(c, slot, foe, gap):
             continue
         if foes.zones and not targets.inside_zone(c, slot, foe):
             continue
         best = foe
         best_gap = gap
-        best_worth = worth
-    return best, best_gap, best_worth
+        best_rank = rank
+    return best, best_rank
 
 
 def _may_aim(c: Columns, slot: int, foe: int, gap: float) -> bool:
@@ -252,19 +271,10 @@ def _may_aim(c: Columns, slot: int, foe: int, gap: float) -> bool:
     )
 
 
-def _longest_reach(c: Columns, foes: _Foes, slot: int) -> float:
-    """Return how far the farther of a unit's weapons reaches."""
-    ground = foes.ranges[c.ground_weapon[slot]] if c.ground_weapon[slot] >= 0 else 0.0
-    air = foes.ranges[c.air_weapon[slot]] if c.air_weapon[slot] >= 0 else 0.0
-    return max(ground, air) + c.range_add[slot]
-
-
 def _reaches(c: Columns, foes: _Foes, slot: int, foe: int, gap: float) -> bool:
-    """Return whether a unit could fire at a foe from where it stands."""
+    """Return whether a unit could fire from where it stands at a foe that one of its weapons fits."""
     on_ground = c.plane_bits[foe] & GROUND_PLANE != 0 and c.ground_weapon[slot] >= 0
     row = c.ground_weapon[slot] if on_ground else c.air_weapon[slot]
-    if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
-        row += foes.weapons
     touch = c.separation[slot] + c.separation[foe] - c.radius[slot] - c.radius[foe]
     return gap <= max(foes.ranges[row] + c.range_add[slot], touch)
 
@@ -274,7 +284,6 @@ def _take(world: World, c: Columns, slot: int, target: int) -> None:
     if c.order_kind[slot] == IDLE and c.target[slot] == NOBODY and not c.returning[slot]:
         c.guard[slot] = c.pos[slot]
         c.returning[slot] = True
-    c.rank[slot] = OUT_OF_SIGHT  # a scan that found it knows better
     targets.engage(world, slot, target)
 
 

@@ -17,6 +17,7 @@ cdef double TOLERANCE
 cdef int64_t STRIPES
 cdef int64_t AIR
 cdef int64_t LED
+cdef int64_t CROWD_STALL
 cdef double DETOUR_LOOK
 cdef int64_t DETOUR_PERIOD
 cdef int64_t DETOUR_LOOPS
@@ -29,7 +30,7 @@ cpdef find_headings(object world)
 cdef bint _flows(Columns c, int64_t slot) noexcept
 @cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double, standing=_Standing)
 cpdef begin(object world, object slots, object shift)
-@cython.locals(slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
+@cython.locals(loop=int64_t, stalled=int64_t, slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
 cdef _look(object world, Columns c, list turning)
 @cython.locals(turn=int64_t)
 cdef int64_t _first_free(Columns c, _Crowd crowd, SurfaceGrid grid, int64_t slot, Point way) noexcept

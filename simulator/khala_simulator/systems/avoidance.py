@@ -2,9 +2,10 @@
 
 Melee units go where ``flanking`` leads them. Any other blocked walker goes round those who stand ahead of it, on the
 side where fewer of them are: so a crowd parts in two, and ranged units spread into an arc. It looks in a fan of
-headings around its way, on that side first, takes the free one that turns it least, and keeps the side until it has
-made progress for a while. Bodies that stand or come towards it and the terrain count as obstacles, ``collision``
-handles those that go the same way. The game's own local avoidance is not known; all of this is an estimate.
+headings around its way, on that side first, and takes the free one that turns it least. It keeps the side until it has
+made progress for a while; one without a target that comes no nearer tries the other side. Bodies that stand or come
+towards it and the terrain count as obstacles, ``collision`` handles those that go the same way. The game's own local
+avoidance is not known; all of this is an estimate.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ TOLERANCE: Final = 0.02
 STRIPES: Final = 256
 AIR: Final = int(Layer.AIR)
 LED: Final = flanking.LED
+CROWD_STALL: Final = MECHANICS.crowd_stall
 DETOUR_LOOK: Final = MECHANICS.detour_look
 DETOUR_PERIOD: Final = MECHANICS.detour_period
 DETOUR_LOOPS: Final = MECHANICS.detour_loops
@@ -68,7 +70,7 @@ def find_headings(world: World) -> None:
         for slot in turning:
             if _flows(c, slot):
                 c.detour[slot] = 1 if c.detour[slot] > 0 else -1
-        flanking.lead(world)
+        flanking.lead(world, turning)
     _look(world, c, turning)
 
 
@@ -140,9 +142,13 @@ def _look(world: World, c: Columns, turning: list[int]) -> None:
     """Choose the heading of every walker that follows no flow: the free one that turns it least."""
     crowd = _Crowd(world)
     ground = world.ground
+    loop = world.loop
     for slot in turning:
         if _flows(c, slot):
             continue
+        stalled = loop - c.nav_best_loop[slot]
+        if c.target[slot] == NOBODY and stalled >= CROWD_STALL and stalled % CROWD_STALL < DETOUR_PERIOD:
+            c.detour[slot] = -c.detour[slot]  # that side leads nowhere
         x = c.nav_point[slot].x - c.pos[slot].x
         y = c.nav_point[slot].y - c.pos[slot].y
         size = max(memory.length(x, y), 1e-12)

@@ -26,7 +26,7 @@ cpdef measure(object world)
 @cython.locals(slot=Py_ssize_t, count=Py_ssize_t)
 cdef void _note_fighters(Columns c, Py_ssize_t n, int64_t* fighters) noexcept
 @cython.locals(beams=bint, rolling_guns=bint, guns_walking=bint, hides=bint, zones=bint, i=Py_ssize_t, slot=int64_t,
-               target=int64_t, gap=double, reach=double, swings=bint, is_beyond=bint, is_near=bint)
+               target=int64_t, gap=double, reach=double, is_beyond=bint, is_near=bint)
 cdef _close_in(object world, Columns c, Census kinds, int64_t* slots, Py_ssize_t fighting)
 @cython.locals(gap=double)
 cdef double _measure_gap(Columns c, int64_t slot, int64_t target) noexcept

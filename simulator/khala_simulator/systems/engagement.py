@@ -53,7 +53,6 @@ def measure(world: World) -> None:
         c.wants[slot] = c.walks[slot]
         c.goal[slot] = c.order_point[slot]
         c.stop_at[slot] = 0.0
-        c.in_reach[slot] = False
         follows |= c.needs_target[slot]
         approaches |= c.casts[slot]
         goes_back |= c.returning[slot]
@@ -99,10 +98,9 @@ def _close_in(world: World, c: Columns, kinds: Census, slots: Cells, fighting: i
         target = c.target[slot]
         reach = c.reach[slot]
         gap = _measure_gap(c, slot, target)
-        swings = c.windup[slot] >= 0.0 or (beams and c.beaming[slot])
         is_beyond = gap > reach + EDGE_TOLERANCE
         is_near = (
-            (not is_beyond or (swings and gap <= reach + c.slop[slot]))
+            (not is_beyond or (c.in_reach[slot] and gap <= reach + c.slop[slot]))
             and gap >= c.reach_min[slot]
             and c.can_attack[slot]
             and (not hides or c.visible[c.owner[slot] * c.capacity + target])
@@ -112,6 +110,7 @@ def _close_in(world: World, c: Columns, kinds: Census, slots: Cells, fighting: i
             c.beaming[slot] = c.beaming[slot] and is_near
         c.gap[slot] = gap
         c.in_reach[slot] = is_near
+        c.reached[slot] = c.reached[slot] or is_near
         if guns_walking and c.walks[slot] and not c.looks_around[slot]:
             continue  # a unit that fires while it walks stays on its way
         c.goal[slot] = c.pos[target]

@@ -18,16 +18,18 @@ cdef double CHASE_SLACK
 cdef int64_t DETOUR_LOOPS
 
 
-@cython.locals(slot=int64_t, first=int64_t, blocked=bint)
-cdef lead(object world)
+@cython.locals(slot=int64_t, first=int64_t)
+cdef lead(object world, list turning)
 cdef bint _pursues(Columns c, int64_t slot) noexcept
 cdef bint _chooses(Columns c, int64_t slot) noexcept
 cdef bint _are_alike(Columns c, int64_t slot, int64_t other) noexcept
-@cython.locals(first=int64_t, slot=int64_t, walker=Walker, around=Flow, width=double, reach=double, best=double,
+@cython.locals(first=int64_t, slot=int64_t, walker=Walker, around=Flow, width=double, reach=double, best=int64_t,
                picks=bint, i=Py_ssize_t, loop=int64_t)
 cdef _follow(object world, Columns c, list kind)
 cdef Walker _walker(Columns c, int64_t slot)
 @cython.locals(slot=int64_t, x=double, y=double, distance=double)
 cdef void _head_for(Columns c, Walker walker, int64_t loop) noexcept
 cdef bint _is_in_the_way(Columns c, int64_t first, int64_t slot) noexcept
-cdef bint _is_good(Columns c, int64_t first, int64_t slot, double best) noexcept
+cdef bint _is_good(Columns c, int64_t first, int64_t slot, int64_t best) noexcept
+@cython.locals(fights=bint)
+cdef int64_t _danger(Columns c, int64_t foe) noexcept

@@ -1,10 +1,9 @@
 """Flanking: how melee units that others keep from their targets find another place to fight from.
 
-As soon as one of them is blocked, all of its owner and size that are near follow the flow of ``movement.flow``: round
-the units that stand, to the nearest free places from which they reach a target. Those that choose for themselves go for
-any enemy that is as good as theirs, the others for their own; ``acquire`` changes the target of a unit that reaches
-another. So a second row finds the flanks. Ranged units are left to ``avoidance``. The game's own rule is not known; all
-of this is an estimate.
+Those that bodies block follow the flow of ``movement.flow``: round the units that stand, to the nearest free places
+from which they reach a target. Units that choose for themselves go for any enemy that is as good as theirs, the others
+for their own; ``acquire`` changes the target of a unit that reaches another. So a second row finds the flanks. Ranged
+units are left to ``avoidance``. The game's own rule is not known; all of this is an estimate.
 """
 
 from __future__ import annotations
@@ -34,34 +33,27 @@ CHASE_SLACK: Final = MECHANICS.chase_slack
 DETOUR_LOOPS: Final = MECHANICS.detour_loops
 
 
-def lead(world: World) -> None:
-    """Write ``aside`` and ``detour`` of pursuers for whom there is a way, of the same kind as some that are blocked.
-
-    Those that have a side to go round on are blocked.
-    """
+def lead(world: World, turning: list[int]) -> None:
+    """Write ``aside`` and ``detour`` of those walkers that turn aside, and pursue somebody to whom there is a way."""
     c = columns.columns_of(world)
-    pursuers = [slot for slot in range(world.top) if _pursues(c, slot)]
+    pursuers = [slot for slot in turning if _pursues(c, slot)]
     while pursuers:  # those of one kind after the other
         first: int = pursuers[0]
         kind = []
         others = []
-        blocked = False
         for slot in pursuers:
             if slot == first or _are_alike(c, first, slot):
                 kind.append(slot)
-                blocked = blocked or c.detour[slot] != 0
             else:
                 others.append(slot)
         pursuers = others
-        if blocked:
-            _follow(world, c, kind)
+        _follow(world, c, kind)
 
 
 def _pursues(c: Columns, slot: int) -> bool:
-    """Return whether a melee unit is on its way to a target that is near; structures are reached at their walls."""
+    """Return whether a walker is a melee unit near to its target; structures are reached at their walls."""
     return (
-        c.wants[slot]
-        and c.target[slot] != NOBODY
+        c.target[slot] != NOBODY
         and c.layer[slot] != AIR
         and (not c.walks[slot] or c.looks_around[slot])
         and c.reach[slot] <= REACH
@@ -93,10 +85,10 @@ def _follow(world: World, c: Columns, kind: list[int]) -> None:
     around = flow.flow_around(grids.grid_of(world.ground, c.layer[first]), walkers)
     width = c.separation[first]
     reach = c.radius[first] + c.reach[first]
-    best = 0.0
+    best = 0
     for slot in kind:
         reach = min(reach, c.radius[slot] + c.reach[slot])
-        best = max(best, acquire.rank_of(c, slot, c.target[slot]))
+        best = max(best, _danger(c, c.target[slot]))
     picks = _chooses(c, first)
     live = world.live
     slots = memory.ints(live)
@@ -138,11 +130,17 @@ def _is_in_the_way(c: Columns, first: int, slot: int) -> bool:
     )
 
 
-def _is_good(c: Columns, first: int, slot: int, best: float) -> bool:
+def _is_good(c: Columns, first: int, slot: int, best: int) -> bool:
     """Return whether a unit is an enemy that is as good as the best target of its pursuers."""
     return (
         acquire.is_foe(c, c.owner[first], slot)
         and not c.walled[slot]
         and c.plane_bits[slot] & GROUND_PLANE != 0
-        and acquire.rank_of(c, first, slot) > best - acquire.RANK_STEP
+        and _danger(c, slot) >= best
     )
+
+
+def _danger(c: Columns, foe: int) -> int:
+    """Return the attack priority of a foe, doubled, and 1 more if it fights."""
+    fights = c.threat_bits[foe] != 0 and (not c.defensive[foe] or c.target[foe] != NOBODY)
+    return 2 * int(c.priority[foe]) + fights

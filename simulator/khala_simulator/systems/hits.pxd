@@ -10,7 +10,7 @@ from khala_simulator.world.shots cimport PendingHit, Shot
 
 cdef int64_t NOBODY
 
-@cython.locals(loop=int64_t, pending=PendingHit)
+@cython.locals(loop=int64_t, pending=PendingHit, source=int64_t, c=Columns)
 cpdef fall_due(object world)
 cdef bint _is_due(PendingHit pending, int64_t loop) noexcept
 cdef void _follow(Columns c, boolean* kamikaze, PendingHit pending) noexcept

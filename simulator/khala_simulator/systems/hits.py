@@ -2,7 +2,7 @@
 
 Between ``weapons``, which puts hits into ``pending`` at the damage point, and the rules that carry them out:
 ``damage``, ``missiles``, ``sweeps``. Hits happen in the order in which they are due and were fired; those of a dead
-attacker are lost.
+attacker are lost. A burst is a channel: its later hits are lost when the attacker drops the attack.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ def fall_due(world: World) -> None:
         return
     c = columns.columns_of(world)
     kamikaze = memory.bools(world.stats.kamikaze)
+    bursts = memory.bools(world.stats.bursts)
     for pending in world.pending:
         _follow(c, kamikaze, pending)
     world.pending = [pending for pending in world.pending if not _is_due(pending, loop)]
     for pending in due:
-        if pending.shot.source != NOBODY:
+        source = pending.shot.source
+        if source != NOBODY and not (bursts[pending.shot.weapon] and not c.bursting[source]):
             _carry_out(world, pending)
+            c = columns.columns_of(world)
 
 
 def _is_due(pending: PendingHit, loop: int) -> bool:

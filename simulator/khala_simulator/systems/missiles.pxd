@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.combat cimport damage
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.systems cimport weapons
 from khala_simulator.world.shots cimport Missile, Shot
 
 cdef int64_t NOBODY
@@ -12,6 +13,8 @@ cdef double NO_DISTANCE
 @cython.locals(missile=Missile, shot=Shot)
 cpdef fly(object world)
 cdef bint _step(Columns c, Missile missile) noexcept
+@cython.locals(delay=double)
+cdef _cool_down(object world, Shot shot)
 cdef launch(object world, Shot shot, object hit)
 @cython.locals(after=Shot, slot=int64_t)
-cdef _bounce(object world, Shot shot)
+cdef _bounce(object world, Shot shot, tuple hits)

@@ -1,6 +1,7 @@
 """Missiles: they follow their target and hit when they reach its edge, or the last place of a target that died.
 
-A missile that bounces goes on from its victim to the next enemy near it that it has not hit yet.
+A missile that bounces goes on from its victim to the next enemy near it that it has not hit yet. One that returns, the
+Spine Crawler's tentacle, has to be back before the next attack: its weapon's cooldown begins with the hit.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from khala_simulator.combat import damage
 from khala_simulator.native import columns, memory
+from khala_simulator.systems import weapons
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.stats import INSTANT_ACCELERATION_N
 from khala_simulator.world.columns import NOBODY
@@ -38,7 +40,10 @@ def fly(world: World) -> None:
     world.missiles = onward
     for shot in arrived:
         damage.hit_with(world, shot)
-        _bounce(world, shot)
+        hits = world.catalog.weapons[shot.weapon].hits
+        if hits[shot.hit].returns and shot.source != NOBODY:
+            _cool_down(world, shot)
+        _bounce(world, shot, hits)
 
 
 def _step(c: Columns, missile: Missile) -> bool:
@@ -66,14 +71,21 @@ def launch(world: World, shot: Shot, hit: Hit) -> None:
     gain = math.inf
     gain_n = hit.missile_acceleration_n
     if gain_n is not None and gain_n < INSTANT_ACCELERATION_N:
-        step = 0.0
+        step = hit.missile_start_n / LOOPS_PER_NORMAL_SECOND
         gain = gain_n / LOOPS_PER_NORMAL_SECOND**2
     world.missiles.append(Missile(shot, shot.start_x, shot.start_y, step, top, gain))
 
 
-def _bounce(world: World, shot: Shot) -> None:
+def _cool_down(world: World, shot: Shot) -> None:
+    """Begin the cooldown of the attacker's weapon anew, with its random delay."""
+    c = columns.columns_of(world)
+    stats = world.stats
+    delay = weapons.draw_delay(world, memory.points(stats.jitter)[shot.weapon])
+    c.cooldown[shot.source] = stats.period[shot.owner, shot.weapon] / c.attack_rate[shot.source] + delay
+
+
+def _bounce(world: World, shot: Shot, hits: tuple[Hit, ...]) -> None:
     """Send on a missile that bounces; one whose target died on the way is lost."""
-    hits = world.catalog.weapons[shot.weapon].hits
     if shot.target == NOBODY or shot.hit + 1 >= len(hits) or not hits[shot.hit + 1].bounce:
         return
     onward = hits[shot.hit + 1]

@@ -11,7 +11,10 @@ cdef int64_t CROWD_PERIOD
 cdef int64_t CROWD_STALL
 cdef int64_t SCAN_PERIOD
 cdef double ARRIVAL_RADIUS_SQUARED
+cdef int64_t ATTACK_MOVE
+cdef int64_t IDLE
 
+@cython.locals(slot=int64_t, fought=bint)
 cpdef carry_out(object world)
 @cython.locals(slot=Py_ssize_t)
 cdef list _find_lost(object world, Columns c)

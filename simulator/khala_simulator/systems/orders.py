@@ -10,6 +10,7 @@ from khala_simulator.movement.arrival import ArrivalCrowd
 from khala_simulator.native import columns
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import OrderKind
 
 if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
@@ -19,6 +20,8 @@ CROWD_PERIOD: Final = 2
 """How often the density of the crowd at a goal is checked; units that look for targets check after each look."""
 CROWD_STALL: Final = MECHANICS.crowd_stall
 SCAN_PERIOD: Final = MECHANICS.scan_period
+ATTACK_MOVE: Final = int(OrderKind.ATTACK_MOVE)
+IDLE: Final = int(OrderKind.IDLE)
 ARRIVAL_RADIUS_SQUARED: Final = MECHANICS.arrival_radius**2
 
 
@@ -28,7 +31,9 @@ def carry_out(world: World) -> None:
     finished = _find_lost(world, c)
     _find_arrived(world, c, finished)
     for slot in finished:
+        fought = c.order_kind[slot] == ATTACK_MOVE
         commands.begin_next(world, slot)
+        c.on_guard[slot] = fought and c.order_kind[slot] == IDLE
 
 
 def _find_lost(world: World, c: Columns) -> list[int]:

@@ -94,6 +94,7 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]
     exact = spec.model_copy(update={"at": (point_of(world, spec.at),)}) if alone else spec
     for x, y, facing in _places(world, unit, exact):
         slot = lifecycle.spawn(world, unit, spec.player, (x, y), facing)
+        world.listed_last[slot] = spec.player > 0 and bool(world.rng.integers(2))
         slots.append(slot)
         if spec.life is not None:
             world.life[slot] = min(spec.life, float(world.life_max[slot]))
@@ -224,7 +225,8 @@ def _addressees(world: World, spec: OrderSpec) -> list[int]:
         slots = slots[world.map.scenario.regions[spec.inside].covers(world.pos[slots])]
     if spec.group is not None:
         slots = slots[np.isin(world.tag[slots], world.script.groups.get(spec.group, []))]
-    return [s for s in slots.tolist() if _fits(world.unit_type(s), spec.unit, spec.unless)]
+    idle = [s for s in slots.tolist() if not (spec.idle and world.orders_of(s))]
+    return [s for s in idle if _fits(world.unit_type(s), spec.unit, spec.unless)]
 
 
 def _fits(unit: UnitType, name: str | None, unless: tuple[str, ...]) -> bool:
@@ -244,7 +246,9 @@ def _command(world: World, spec: OrderSpec, slots: list[int], *, queue: bool) ->
     elif spec.unload_at is not None:
         _unload(world, slots, point_of(world, spec.unload_at), queue=queue)
     elif spec.attack_units_of is not None:
-        _attack_all(world, slots, world.units_of(spec.attack_units_of), queue=queue)
+        _attack_group(world, slots, world.units_of(spec.attack_units_of), queue=queue)
+    elif spec.attack_nearest_of is not None:
+        _attack_nearest(world, slots, world.units_of(spec.attack_nearest_of), queue=queue)
 
 
 def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> None:
@@ -256,13 +260,21 @@ def _unload(world: World, slots: list[int], point: Point, *, queue: bool) -> Non
             casting.use(world, [slot], ability, point=point, queue=queue)
 
 
-def _attack_all(world: World, slots: list[int], victims: Ints, *, queue: bool) -> None:
-    """Make each of the slots attack every victim, the nearest first."""
+def _attack_group(world: World, slots: list[int], victims: Ints, *, queue: bool) -> None:
+    """Make each of the slots attack every victim, in an order that chance draws."""
+    for slot in slots:
+        for rank, victim in enumerate(world.rng.permutation(victims).tolist()):
+            commands.attack_unit(world, [slot], world.tag_of(victim), queue=queue or rank > 0)
+
+
+def _attack_nearest(world: World, slots: list[int], victims: Ints, *, queue: bool) -> None:
+    """Make each of the slots attack the nearest victim."""
+    if not victims.size:
+        return
     for slot in slots:
         offset = world.pos[victims] - world.pos[slot]
-        nearest_first = victims[np.argsort(offset[:, 0] ** 2 + offset[:, 1] ** 2, kind="stable")]
-        for rank, victim in enumerate(nearest_first.tolist()):
-            commands.attack_unit(world, [slot], world.tag_of(victim), queue=queue or rank > 0)
+        nearest = int(victims[np.argmin(offset[:, 0] ** 2 + offset[:, 1] ** 2)])
+        commands.attack_unit(world, [slot], world.tag_of(nearest), queue=queue)
 
 
 # the rest -------------------------------------------------------------------------------------------------------------

@@ -65,6 +65,9 @@ def _draw(world: World, sweep: Sweep) -> None:
     if sweep.ahead == first:
         return
     c = columns.columns_of(world)
+    if line.follows and shot.target != NOBODY:
+        shot.goal_x = c.pos[shot.target].x
+        shot.goal_y = c.pos[shot.target].y
     room = memory.new_points(sweep.ahead - first)
     places = memory.points(room)
     drawn = _place(world, shot, line, first, sweep.ahead, places)

@@ -5,6 +5,7 @@ from khala_simulator.combat cimport census
 from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.native.memory cimport Point
 from khala_simulator.world.shots cimport PendingHit, Shot
 
 cdef double NOT_STARTED
@@ -17,6 +18,7 @@ cdef bint _is_under_way(Columns c, int64_t slot) noexcept
 cdef bint _takes_effect(Columns c, int64_t slot) noexcept
 @cython.locals(i=Py_ssize_t, slot=int64_t, row=int64_t, weapons=int64_t, turrets=bint, delay=double)
 cdef _start_attacks(object world, Columns c)
+cdef double draw_delay(object world, Point jitter) except? -1.0
 cdef bint _is_aimed(Columns c, int64_t slot) noexcept
 cdef int64_t _choose_weapon(Columns c, int64_t slot) noexcept
 @cython.locals(slot=int64_t, is_beam=bint, backswing=double, slots=list)

@@ -100,9 +100,14 @@ def _start_attacks(world: World, c: Columns) -> None:
             row += weapons
         delay = 0.0
         if not beam[row]:
-            delay = jitter[row].x + (jitter[row].y - jitter[row].x) * float(world.rng.random())
+            delay = draw_delay(world, jitter[row])
         c.cooldown[slot] += period[c.owner[slot] * weapons + row] / c.attack_rate[slot] + delay
         c.windup[slot] = damage_point[row] / c.attack_rate[slot]
+
+
+def draw_delay(world: World, jitter: memory.Point) -> float:
+    """Return a random delay of a weapon's period in loops, between the two of its ``jitter``."""
+    return jitter.x + (jitter.y - jitter.x) * float(world.rng.random())
 
 
 def _is_aimed(c: Columns, slot: int) -> bool:
@@ -136,6 +141,7 @@ def _take_effect(world: World, attackers: list[int]) -> None:
         for slot in slots:
             c.backswing[slot] = backswing
             c.beaming[slot] = is_beam
+            c.bursting[slot] = True
         launcher = LAUNCHERS.get(weapon.id)
         if launcher is not None:
             for slot in slots:

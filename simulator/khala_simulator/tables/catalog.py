@@ -1,7 +1,9 @@
 """The game's tables: what a unit, a weapon and an upgrade are in one version of StarCraft II.
 
-Reads ``data/tables/<version>`` into the records of ``records``, once per process. Nothing here is about one
-particular game: which upgrades a player has is applied in ``stats``, where the records become arrays.
+Reads ``data/tables/<version>`` into the records of ``records``, once per process and data set. A data set is what the
+mods that a map depends on make of the game: the tables are those of the multiplayer, and ``data/tables/<set>.yaml`` has
+the values that another set has instead (see ``data/tables/SOURCES.md``). Nothing here is about one particular game:
+which upgrades a player has is applied in ``stats``, where the records become arrays.
 """
 
 from __future__ import annotations
@@ -9,12 +11,13 @@ from __future__ import annotations
 import dataclasses
 import json
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Any, Final
 
 from khala_simulator.tables.abilities import Ability, ability_from
 from khala_simulator.tables.buffs import Buff, buff_from
+from khala_simulator.tables.loader import read_data
 from khala_simulator.tables.prices import add_price
 from khala_simulator.tables.records import (
     Affects,
@@ -29,7 +32,14 @@ from khala_simulator.tables.records import (
     Upgrade,
     Weapon,
 )
-from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION, VERSION_OF_BUILD
+from khala_simulator.tables.versions import (
+    BUILD_OF_VERSION,
+    DATA_SETS,
+    DEFAULT_DATA,
+    DEFAULT_VERSION,
+    VERSION_OF_BUILD,
+    DataSet,
+)
 
 __all__ = [
     "LOOPS_PER_NORMAL_SECOND",
@@ -44,6 +54,7 @@ __all__ = [
     "Upgrade",
     "Weapon",
     "load_catalog",
+    "renumber",
 ]
 
 LOOPS_PER_NORMAL_SECOND: Final = 16
@@ -55,14 +66,15 @@ class CatalogError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Catalog:
-    """All tables of one game version, with look-up by id and by name.
+    """All tables of one game version and data set, with look-up by id and by name.
 
-    ``cards`` and ``ordinary`` are by unit row: the commands of a type, and the ability ids by which it moves, attacks,
-    patrols, holds and stops.
+    Rows and ids are the same in all data sets of a version. ``cards`` and ``ordinary`` are by unit row: the commands of
+    a type, and the ability ids by which it moves, attacks, patrols, holds and stops.
     """
 
     version: str
     build: int
+    data: DataSet
     units: tuple[UnitType, ...]
     weapons: tuple[Weapon, ...]
     upgrades: tuple[Upgrade, ...]
@@ -110,33 +122,43 @@ class Catalog:
         raise CatalogError(f"no upgrade {key!r} in the tables of version {self.version}")
 
 
-@lru_cache(maxsize=4)
-def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
-    """Return the tables of a game version, given as "4.10" or as its build number 75689.
+def load_catalog(version: str | int = DEFAULT_VERSION, data: DataSet = DEFAULT_DATA) -> Catalog:
+    """Return the tables of a game version, given as "4.10" or as its build number 75689, with the values of a data set.
 
     Raises:
-        CatalogError: no tables for this version are shipped.
+        CatalogError: no tables for this version or data set are shipped.
     """
     name = VERSION_OF_BUILD.get(version) if isinstance(version, int) else version
     if name is None or name not in VERSION_OF_BUILD.values():
         known = ", ".join(f"{v} (build {b})" for b, v in VERSION_OF_BUILD.items())
         raise CatalogError(f"no tables for game version {version!r}; shipped are {known}")
-    weapons = tuple(_weapon(row, raw) for row, raw in enumerate(_rows(name, "weapons")))
+    if data not in DATA_SETS:
+        raise CatalogError(f"no data set {data!r}; shipped are {', '.join(DATA_SETS)}")
+    return _catalog(name, data)
+
+
+@cache
+def _catalog(name: str, data: DataSet) -> Catalog:
+    def rows(kind: str) -> list[dict[str, Any]]:
+        return _with_differences(_rows(name, kind), kind, data)
+
+    weapons = tuple(_weapon(row, raw) for row, raw in enumerate(rows("weapons")))
     weapon_of_id = {w.id: w for w in weapons}
-    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(_rows(name, "units"))))
-    upgrades = tuple(_upgrade(raw) for raw in _rows(name, "upgrades"))
+    units = tuple(_unit(row, raw, weapon_of_id) for row, raw in enumerate(_alike(rows("units"))))
+    upgrades = tuple(_upgrade(raw) for raw in rows("upgrades"))
     unit_of = {unit.name: unit for unit in units}
     upgrade_of = {upgrade.name: upgrade for upgrade in upgrades}
-    abilities = tuple(add_price(ability_from(raw), unit_of, upgrade_of) for raw in _rows(name, "abilities"))
+    abilities = tuple(add_price(ability_from(raw), unit_of, upgrade_of) for raw in rows("abilities"))
     cards = _cards(units, abilities)
-    buffs = tuple(buff_from(row, raw) for row, raw in enumerate(_rows(name, "buffs")))
+    buffs = tuple(buff_from(row, raw) for row, raw in enumerate(rows("buffs")))
     return Catalog(
         version=name,
         build=BUILD_OF_VERSION[name],
+        data=data,
         units=units,
         weapons=weapons,
         upgrades=upgrades,
-        footprints={raw["id"]: _footprint(raw) for raw in _rows(name, "footprints")},
+        footprints={raw["id"]: _footprint(raw) for raw in rows("footprints")},
         row_of_id={u.id: u.row for u in units},
         row_of_name={u.name: u.row for u in units},
         abilities=abilities,
@@ -149,8 +171,20 @@ def load_catalog(version: str | int = DEFAULT_VERSION) -> Catalog:
     )
 
 
+@lru_cache(maxsize=8)
+def renumber(catalog: Catalog, names: tuple[str, ...]) -> Catalog:
+    """Return the tables with the ids of these types dealt out anew, the lowest first: a map numbers its own types."""
+    if not names:
+        return catalog
+    ids = dict(zip(names, sorted(catalog.unit(name).id for name in names), strict=True))
+    units = tuple(dataclasses.replace(unit, id=ids.get(unit.name, unit.id)) for unit in catalog.units)
+    return dataclasses.replace(catalog, units=units, row_of_id={unit.id: unit.row for unit in units})
+
+
 WALK_BY_UPGRADE: Final = frozenset({"RoachBurrowed"})
 """Types without a speed of their own that get one by upgrade."""
+KEY: Final = {"units": "name", "upgrades": "name"}
+"""The field by which a data set names the rows of a table; all others have an ``id``."""
 BASICS: Final = ("stop", "move", "patrol", "hold_position", "scan_move", "attack")
 
 
@@ -189,6 +223,26 @@ def _rows(version: str, kind: str) -> list[dict[str, Any]]:
     return rows
 
 
+def _with_differences(rows: list[dict[str, Any]], kind: str, data: DataSet) -> list[dict[str, Any]]:
+    """Return the rows of a kind of table with the values of a data set in place of the multiplayer's."""
+    changes: dict[str | int, dict[str, Any]] = {} if data == DEFAULT_DATA else dict(_differences(data).get(kind, {}))
+    return [_with(row, changes[key]) if (key := row.get(KEY.get(kind, "id"))) in changes else row for row in rows]
+
+
+@cache
+def _differences(data: DataSet) -> dict[str, Any]:
+    found: dict[str, Any] = read_data("tables", f"{data}.yaml")
+    return found
+
+
+def _with(row: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with other values; ``hits`` by effect are values of the row's own hits of that effect."""
+    hits = change.get("hits")
+    if isinstance(hits, dict):
+        change = {**change, "hits": [{**hit, **hits.get(hit["effect"], {})} for hit in row["hits"]]}
+    return {**row, **change}
+
+
 def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the rows, with missing values of a row that is ``like`` another filled in from that one."""
     of_name = {row["name"]: row for row in rows}
@@ -221,6 +275,7 @@ def _hit(raw: dict[str, Any]) -> Hit:
         bonus=_pairs(raw.pop("bonus", {})),
         missile_speed_n=raw.pop("missile_speed", None),
         missile_acceleration_n=raw.pop("missile_acceleration", None),
+        missile_start_n=raw.pop("missile_start", 0.0),
         area=tuple(Area(**ring) for ring in raw.pop("area", ())),
         area_affects=_affects(raw.pop("area_affects", {})),
         sweep=sweep and _sweep(sweep),

@@ -36,9 +36,10 @@ class Mechanics:
     help_period: int
     scan_period: int
     leash_reset: float
-    look_up_period: int
+    scan_margin: float
+    guard_margin: float
     flee_distance: float
-    switch_gain: float
+    switch_blocked: int
     guard_slack: float
     arrival_radius: float
     path_period: int

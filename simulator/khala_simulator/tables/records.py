@@ -39,7 +39,7 @@ class SweepRecord:
     Each point is ``(delay_loops, across, along)``: the offset from the ``origin`` ("target" or "source") is in the
     frame of the shot, ``across`` to its right, ``along`` backwards from the target to the attacker (the catalog's own
     axes). A unit is hit once per sweep, ``lag_loops`` after it was touched; the delays include the lag. A sweep from
-    the attacker ends ``past_range`` beyond the weapon's range.
+    the attacker ends ``past_range`` beyond the weapon's range. One that ``follows`` goes with its target.
     """
 
     radius: float
@@ -48,6 +48,7 @@ class SweepRecord:
     origin: str = "target"
     lag_loops: float = 0.0
     past_range: float = 0.0
+    follows: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,8 @@ class Hit:
 
     ``delay_loops`` counts from the weapon's damage point. A hit with a ``missile_speed_n`` is carried by a missile
     that leaves then. ``when`` names a branch of the game's own switch (branches exclude each other). A hit with a
-    ``beam_tick_n`` repeats as long as the attack goes on, once per period. A ``bounce`` leaves from the last victim.
+    ``beam_tick_n`` repeats as long as the attack goes on, once per period. A ``bounce`` leaves from the last victim. A
+    missile that ``returns`` hangs on its attacker, whose cooldown begins anew with the hit.
     """
 
     effect: str
@@ -84,12 +86,14 @@ class Hit:
     when: str = ""
     missile_speed_n: float | None = None
     missile_acceleration_n: float | None = None
+    missile_start_n: float = 0.0
     beam_tick_n: float | None = None
     area: tuple[Area, ...] = ()
     area_affects: Affects = Affects()
     sweep: SweepRecord | None = None
     search: Search | None = None
     bounce: bool = False
+    returns: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,8 @@ class Weapon:
     ``hidden`` ones are not in the API (a Roach's bite), ``disabled`` ones need to be switched on, ``passive`` ones only
     aim. ``moves`` says what the body does while it fires: it stands (""), glides on ("slowing") or goes where it wants
     ("moving"). ``excluding`` is an attribute it can't be aimed at, ``acquires`` what it picks by itself ("any" or
-    "unit", which is no structure), ``launches`` the unit type that an attack sends out.
+    "unit", which is no structure), ``launches`` the unit type that an attack sends out. One that ``bursts`` loses the
+    hits that are still to come when its attack ends.
     """
 
     row: int
@@ -116,6 +121,7 @@ class Weapon:
     shown_bonus: tuple[tuple[str, float], ...]
     min_range: float = 0.0
     slop: float = 0.0
+    bursts: bool = False
     scan: float = 5.0
     arc_deg: float = 0.0
     arc_slop_deg: float = 11.25

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
+from khala_simulator.tables.mechanics import MECHANICS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -110,6 +111,7 @@ class Stats:
         self.layer_bits: NDArray[np.int64] = np.array([bit_set(u.collide, LAYERS) for u in catalog.units])
         self.plane_bits: NDArray[np.int64] = np.array([_plane_bits(u) for u in catalog.units])
         self.beam: NDArray[np.bool_] = np.array([w.is_beam for w in catalog.weapons])
+        self.bursts: NDArray[np.bool_] = np.array([w.bursts for w in catalog.weapons])
         self.kamikaze: NDArray[np.bool_] = np.array([w.is_kamikaze for w in catalog.weapons])
         self.damage_point: Floats = np.array([w.damage_point_loops for w in catalog.weapons], dtype=np.float64)
         self.least_range: Floats = np.array([w.min_range for w in catalog.weapons], dtype=np.float64)
@@ -182,7 +184,7 @@ class Stats:
         at = (player, weapon.row)
         self.range[at] = changes.value("weapon", weapon.id, "Range", weapon.range)
         scan = changes.value("weapon", weapon.id, "MinScanRange", weapon.scan)
-        self.scan[at] = max(scan, self.range[at])
+        self.scan[at] = max(scan, self.range[at] + MECHANICS.scan_margin)
         rate = changes.value("weapon", weapon.id, "RateMultiplier", 1.0)
         self.period[at] = weapon.period_loops / rate
         self.damage[player][weapon.row] = tuple(_damage(hit, changes) for hit in weapon.hits)

@@ -89,17 +89,20 @@ class UnitColumns:
     cast_begun: Floats = state(float, -1)  # loop at which it began to prepare that
     channels: Bools = state(bool)  # that effect has come and goes on
     bound: Bools = state(bool)  # what it does can't be broken off: other orders wait behind it
+    listed_last: Bools = state(bool)  # in an observation; see api.sight
     target: Ints = state(int, NOBODY)  # slot the weapon is engaged with, or NOBODY
     attacker: Ints = state(int, NOBODY)  # slot that damaged it last, or NOBODY
     scan_loop: Ints = state(int)  # loop from which it looks for a target again
+    on_guard: Bools = state(bool)  # it has been idle since it fought its way to a point
     guard: Floats = state(float, width=2)  # where an idle unit stood when it engaged a target by itself
     returning: Bools = state(bool)  # an idle unit that will go back there after the fight
     leashed: Bools = state(bool)  # it gave up a chase and ignores enemies until it is nearly back
-    rank: Floats = state(float)  # of the target it has chosen by itself; see acquire
+    bursting: Bools = state(bool)  # later hits of its last attack are still to come; they end with the attack
+    reached: Bools = state(bool)  # the target has been in reach since it was chosen
     weapon: Ints = state(int, -1)  # row of the weapon for that target, or -1
     reach: Floats = state(float)  # its range, edge to edge
     reach_min: Floats = state(float)  # and the range below which it can't fire, -inf without one
-    slop: Floats = state(float)  # how far beyond its range a started attack still takes effect
+    slop: Floats = state(float)  # how far beyond its range it fires on at a target that it has had in reach
     aim_cos: Floats = state(float, -1)  # cosine of the largest angle between body or turret and target
     turreted: Bools = state(bool)  # that weapon sits on a turret
     rolling: Bools = state(bool)  # the body goes where it wants while that weapon fires
@@ -170,7 +173,7 @@ class UnitColumns:
     air_scan: Floats = trait(float)
     acquires: Bools = trait(bool)  # it picks fights by itself
     threat_bits: Ints = trait(int)  # planes on which units fear it
-    defensive: Bools = trait(bool)  # it picks fights only on order, and no unit fears it while it does not fight
+    defensive: Bools = trait(bool)  # it picks fights only on order, and threatens only the unit that it attacks
     flees: Bools = trait(bool)  # attacked while idle it runs
     targetable: Bools = trait(bool)  # it may be a target at all
     cloaked: Bools = trait(bool)  # seen by detectors only

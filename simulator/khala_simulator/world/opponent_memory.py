@@ -27,18 +27,14 @@ class OpponentMemory:
     """One computer player's plan, and how far it is."""
 
     build: str  # name of the build that it plays
-    patience: float  # factor on the times of that build, drawn at the start
+    patience: float  # factor on the later times of its plan, drawn at the start
     bases: tuple[Point, ...]  # where town halls can stand, the nearest to its own start first
     resources: tuple[Point, ...]  # where mineral fields and geysers were at the start
     enemy_start: Point
-    step: int = 0  # of the opening
-    step_since: int = 0  # since when that step is the next one
     actions: float = 0.0  # orders that it may give before it has to wait
     thought: int = 0  # when it thought last
-    next_worker: int = 0  # when it may order the next worker
-    next_army: int = 0  # when it may order the next unit of its army
     attacking: bool = False
-    wave: float = 1.0  # factor on the size of the next attack
+    waves: int = 0  # attacks that are over
     wave_value: float = 0.0  # of the army at the start of the attack
     attack_from: int = 0  # no attack before
     searched: int = 0  # how many places the army has found empty

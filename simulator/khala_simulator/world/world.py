@@ -111,7 +111,7 @@ class World(UnitColumns, WorldCaches):
         UnitColumns.__init__(self)
         WorldCaches.__init__(self)
         self.map: GameMap = game_map
-        self.catalog: Catalog = catalog or load_catalog()
+        self.catalog: Catalog = catalog or load_catalog(data=game_map.scenario.data)
         self.seed = seed
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.loop = 0

@@ -17,6 +17,7 @@ from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.verdict import AnswerParts, judge
 from khala_agents.scripted.canned import Canned, Given, completion
 from khala_protocol.messages import ChatMessage, Usage
+from khala_protocol.speech import parse, render
 
 if TYPE_CHECKING:
     from khala_agents.llm.client import LLMClient
@@ -44,7 +45,6 @@ def anthropic(base_url: str) -> Anthropic:
 
 
 RAISE = "the model used all 99 tokens on its reasoning: raise max_tokens in the model file, or have it think less"
-TOOL: Any = {"id": "1", "type": "function", "function": {"name": "Attack_Unit", "arguments": "{}"}}
 VERDICTS: list[tuple[str, Given, str, str]] = [
     ("words", completion(ORDERS), "ok", ""),
     ("words that were cut", completion(ORDERS, "length"), "ok", ""),
@@ -62,8 +62,6 @@ VERDICTS: list[tuple[str, Given, str, str]] = [
     ("nothing", completion(None), "empty", "the model said nothing (it ended with 'stop')"),
     ("blanks", completion(" \n"), "empty", "the model said nothing"),
     ("no content", Given({"choices": [{"message": {}}]}), "empty", "the model said nothing"),
-    ("tools", completion(None, "tool_calls", tool_calls=[TOOL]), "empty", "none are offered: Attack_Unit"),
-    ("a function", completion(None, function_call={"name": "Stop"}), "empty", "none are offered: Stop"),
     ("a refusal", completion(None, refusal="I will not."), "refused", "the model declined: I will not."),
     ("a refusal in parts", completion([{"type": "refusal", "refusal": "No."}]), "refused", "the model declined: No."),
     ("a refusal in prose", completion("I'm sorry, but I can't assist with that."), "refused", "I'm sorry"),
@@ -90,6 +88,34 @@ async def test_a_cut_answer_without_a_limit_of_ours_says_where_to_set_one() -> N
     assert found.reason.endswith(
         "all tokens that its endpoint allows before it said anything: set max_tokens in the model file"
     )
+
+
+TOOL: Any = {
+    "id": "1",
+    "type": "function",
+    "function": {"name": "Attack_Unit", "arguments": '{"team": "A-1", "tag": "0x1"}'},
+}
+
+
+@pytest.mark.parametrize(
+    ("answer", "orders"),
+    [
+        (completion(None, "tool_calls", tool_calls=[TOOL, TOOL]), ["A-1 <Attack_Unit(0x1)>"] * 2),
+        (completion("Analysis: it is weak.", "tool_calls", tool_calls=[TOOL]), ["A-1 <Attack_Unit(0x1)>"]),
+        (completion(None, function_call={"name": "Stop"}), ["None <Stop()>"]),
+    ],
+)
+async def test_tools_that_a_model_calls_unasked_are_its_orders(answer: Given, orders: list[str]) -> None:
+    found = await asked(answer)
+    assert (found.verdict, found.reason.endswith("they are read as its orders")) == ("ok", True)
+    assert [f"{call.team} {render(call)}" for call in parse(found.text).calls] == orders
+
+
+async def test_tools_that_anthropics_models_call_are_its_orders() -> None:
+    used = {"type": "tool_use", "id": "1", "name": "Move_Screen", "input": {"team": "A-1", "screen": [3, 4]}}
+    async with Canned(Given({"content": [used], "stop_reason": "tool_use"})) as server:
+        found = await ask(anthropic(server.base_url))
+    assert [f"{call.team} {render(call)}" for call in parse(found.text).calls] == ["A-1 <Move_Screen([3, 4])>"]
 
 
 NO_REFUSALS = [
@@ -213,7 +239,6 @@ OF_ANTHROPIC: list[tuple[Given, str, str]] = [
     (message(), "empty", "the model said nothing (it ended with 'end_turn')"),
     (message(stop="refusal"), "refused", "the model declined: it gave no reason"),
     (message({"type": "text", "text": "I will not."}, stop="refusal"), "refused", "declined: I will not."),
-    (message({"type": "tool_use", "name": "Stop"}, stop="tool_use"), "empty", "none are offered: Stop"),
     (message({"type": "text", "text": None}, "?", WORDS), "ok", ""),
 ]
 

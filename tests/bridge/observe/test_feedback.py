@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from khala_bridge.observe import shorten
 from khala_bridge.observe.feedback import MAX_CHARACTERS
 from khala_bridge.observe.text import reply
-from khala_protocol.messages import Received, Rejection
+from khala_protocol.messages import Received, Rejection, count_refusals
 
 
 def rejection(text: str = "<Go()>", **fields: Any) -> Rejection:
@@ -19,14 +19,23 @@ def rejection(text: str = "<Go()>", **fields: Any) -> Rejection:
 
 
 def test_few_rejections_are_listed_as_they_are() -> None:
-    assert shorten([rejection()] * 10) == (rejection(),) * 10
+    few = [rejection(f"<Go{number}()>") for number in range(10)]
+    assert shorten(few) == tuple(few)
 
 
 def test_of_many_rejections_the_others_are_counted_by_reason() -> None:
-    *listed, last = shorten([rejection()] * 4_600 + [rejection(reason="malformed")])
-    assert listed == [rejection()] * 10
+    many = [rejection(f"<Go{number}()>") for number in range(4_600)]
+    *listed, last = shorten([*many, rejection(reason="malformed")])
+    assert listed == many[:10]
     assert (last.reason, last.text) == ("unknown_action", "")
     assert last.message == "4591 more are not listed: 4590 unknown_action, 1 malformed."
+    assert count_refusals([*listed, last]) == {"unknown_action": 4_600, "malformed": 1}
+
+
+def test_the_same_rejection_is_listed_once_and_counted() -> None:
+    one, other = shorten([rejection()] * 3 + [rejection("<Run()>")])
+    assert one.message == "There is no action Go. (so 3 times in this answer)"
+    assert (other, count_refusals([one, other])) == (rejection("<Run()>"), {"unknown_action": 4})
 
 
 def test_long_words_are_cut() -> None:

@@ -175,4 +175,4 @@ def test_what_is_only_too_dear_stands_together(base_task: Any, look: Any, unit: 
     nexus = unit(2, "Nexus", 30, 16, is_powered=True)
     poor = {"minerals": 40, "food_used": 10, "food_cap": 30}
     text = Observer(base_task).observe(look([gateway, nexus], abilities={}, player=poor)).agents["Developer"].text
-    assert "        too few minerals: Train_Probe (10 missing)\n" in text
+    assert "        not enough minerals: Train_Probe (10 missing)\n" in text

@@ -117,8 +117,8 @@ def test_it_is_told_which_unit_has_a_skill_ready(unit: Any, team: Any) -> None:
     [
         ([], RICH, (), "no TwilightCouncil"),
         ([("TwilightCouncil", {"build_progress": 0.5})], RICH, (), "TwilightCouncil is not finished"),
-        ([("TwilightCouncil", {})], RICH | {"minerals": 100}, (), "50 minerals too few"),
-        ([("TwilightCouncil", {})], {}, (), "150 minerals too few, 150 vespene too few"),
+        ([("TwilightCouncil", {})], RICH | {"minerals": 100}, (), "50 more minerals needed"),
+        ([("TwilightCouncil", {})], {}, (), "150 more minerals needed, 150 more vespene needed"),
         ([("TwilightCouncil", {})], RICH, (87,), "researched already"),
         ([("TwilightCouncil", {"orders": (1593,)})], RICH, (), "being researched"),
         ([("TwilightCouncil", {"is_powered": True})], RICH, (), "every TwilightCouncil is busy or not ready"),
@@ -148,7 +148,7 @@ def test_a_required_structure_that_is_being_built_is_said_to_be(unit: Any, team:
 def test_supply_that_is_used_up_is_named(unit: Any, team: Any) -> None:
     gateway = unit(1, "Gateway", 16, 16, is_powered=True)
     view = team([gateway], "Train_Zealot", abilities={}, player=RICH | {"food_used": 49})
-    assert reasons(view) == {"Train_Zealot": "1 supply too few"}
+    assert reasons(view) == {"Train_Zealot": "1 more supply needed"}
 
 
 @pytest.mark.parametrize("asked", [True, False])
@@ -186,7 +186,7 @@ def test_of_several_levels_the_next_one_is_offered(level: int, unit: Any, team: 
     assert [(offer.minerals, offer.vespene) for offer in view.offers] == [(price.minerals, price.vespene)]
     council = unit(2, "TwilightCouncil", 20, 16)
     poor = team([forge, council], "Research_ProtossGroundWeapons", abilities={}, upgrades=done)
-    missing = f"{price.minerals:g} minerals too few, {price.vespene:g} vespene too few"
+    missing = f"{price.minerals:g} more minerals needed, {price.vespene:g} more vespene needed"
     assert reasons(poor) == {"Research_ProtossGroundWeapons": missing}
 
 
@@ -209,7 +209,7 @@ def test_what_a_worker_is_on_its_way_to_build_is_promised(unit: Any, look: Any, 
     assert developer.view.resources.promised == (150, 0)
     line = "    Minerals: 150, vespene: 75 (150 minerals of it for what workers are on their way to build)\n"
     assert line in developer.text
-    assert reasons(developer.view.teams[0])["Train_Probe"] == "50 minerals too few"
+    assert reasons(developer.view.teams[0])["Train_Probe"] == "50 more minerals needed"
 
 
 # --- what a rule would find, and which arguments will do ------------------------------------------------------

@@ -257,7 +257,7 @@ NO_TARGET = re.compile(
 )
 """Reasons about the place or the target: the screen shows none, and a call is judged by the one that it names."""
 MEANINGS = (
-    ("price", r"(?P<price>\d+(\.\d+)?) (?P<what>\w+) too few"),
+    ("price", r"(?P<price>\d+(\.\d+)?) more (?P<what>\w+) needed"),
     (
         "price",
         r"it (takes|costs|needs) (?P<of>\d+(\.\d+)?) (?P<what>minerals|vespene|supply) and (?P<has>-?[\d.]+) (are|is)",

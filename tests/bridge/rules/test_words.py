@@ -53,13 +53,13 @@ ROWS = [
     ),
     (
         Unavailable("price", "Gateway", missing=POOR),
-        "40 minerals too few, 6 supply too few",
+        "40 more minerals needed, 6 more supply needed",
         "it takes 100 minerals and 60 are left, 150 more are for what workers are on their way to build",
         "it costs 100 minerals and 60 are left, 150 more are for what workers are on their way to build.",
     ),
     (
         Unavailable("price", "Hatchery", missing=POOR[1:]),
-        "6 supply too few",
+        "6 more supply needed",
         "it takes 2 supply and -4 is left",
         "it needs 2 supply and -4 is free; get an Overlord first.",
     ),

@@ -53,15 +53,17 @@ def test_units_walk_where_actions_say_and_stop() -> None:
     env = StarCraft2Env("3m", seed=1)
     env.reset()
     before = env.get_state_dict()["allies"]
-    env.step([NORTH, SOUTH, EAST])
+    south, middle, north = np.argsort(before[:, 3]).tolist()  # nobody is in another's way
+    orders = {south: SOUTH, middle: EAST, north: NORTH}
+    env.step([orders[agent] for agent in range(3)])
     env.step([1, 1, 1])
     moved = (env.get_state_dict()["allies"] - before)[:, 2:4]
-    assert moved[0, 1] > 0 > moved[1, 1]
-    assert moved[2, 0] > 0
+    assert moved[north, 1] > 0 > moved[south, 1]
+    assert moved[middle, 0] > 0
 
 
 def test_a_win_is_worth_20_in_all() -> None:
-    env = StarCraft2Env("3m", seed=1, difficulty="1")
+    env = StarCraft2Env("3m", seed=2, difficulty="1")
     total, info = play(env, common_target)
     assert info == {"battle_won": True, "dead_allies": info["dead_allies"], "dead_enemies": 3}
     assert env.max_reward == 3 * 10 + 200 + 3 * 45
@@ -245,11 +247,52 @@ def test_smacs_own_interface_refuses_what_is_not_available() -> None:
         ("3s_vs_6z", {}, "SMAC has no map '3s_vs_6z': did you mean 3s_vs_"),
         ("3m", {"difficulty": "B"}, "difficulty 'B' is not a level: give one of 1, 2, 3"),
         ("3m", {"step_mul": 0}, "step_mul is 0: a step has at least one game loop"),
+        ("3m", {"heuristic_ai": True}, r"heuristic_ai is True and can only be False: step\(\) takes the actions"),
+        ("3m", {"replay_dir": "replays"}, "replay_dir is 'replays' and can only be '': no replay is written"),
+        ("3m", {"window_size_x": 640}, "window_size_x is 640 and can only be 1920: there is no window"),
+        ("3m", {"debug": True}, "debug is True and can only be False: nothing is logged"),
+        ("3m", {"game_version": "4.6.2"}, "no tables of game_version '4.6.2', only of 4.10 and 5.0.13: leave it out"),
+        ("3m", {"reward_scal": True}, "there is no option 'reward_scal': did you mean reward_scale"),
+        ("3m", {"use_unit_ranges": True}, "use_unit_ranges is an option of SMACv2: play its own package"),
     ],
 )
 def test_what_cannot_be_played_is_said(name: str, options: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         StarCraft2Env(name, **options)
+
+
+def test_files_of_settings_that_name_every_option_of_smac_are_taken() -> None:
+    defaults: dict[str, Any] = {"game_version": None, "replay_dir": None, "replay_prefix": "", "window_size_x": 1920,
+                "window_size_y": 1200, "heuristic_ai": False, "heuristic_rest": True, "debug": False}  # fmt: skip
+    env = StarCraft2Env("3m", seed=1, **defaults)
+    np.testing.assert_array_equal(env.reset()[1], StarCraft2Env("3m", seed=1).reset()[1])
+    newer = StarCraft2Env("3m", seed=1, game_version="5.0.13")
+    newer.reset()
+    assert newer.battle.digest() != env.battle.digest()
+
+
+def test_names_of_smac_tell_of_an_observations_parts_the_units_and_the_map() -> None:
+    env = StarCraft2Env("MMM", seed=1, obs_last_action=True, obs_pathing_grid=True, obs_terrain_height=True)
+    with pytest.raises(RuntimeError, match="no episode has begun"):
+        _ = env.agents
+    with pytest.raises(AttributeError, match="no attribute 'n_allies'"):
+        _ = env.n_allies
+    env.reset()
+    assert env.obs_terrain_height
+    assert (env.n_actions_no_attack, env.unit_type_bits, env.map_type, env.shield_bits_enemy) == (6, 3, "MMM", 0)
+    many = [rows * width for rows, width in (env.get_obs_enemy_feats_size(), env.get_obs_ally_feats_size())]
+    assert env.get_obs_move_feats_size() + sum(many) + env.get_obs_own_feats_size() == env.get_obs_size()
+    healer = max(env.agents.values(), key=lambda unit: unit.unit_type)
+    assert (healer.health_max, env.get_unit_type_id(healer, ally=True), env.unit_max_cooldown(healer)) == (150, 2, 200)
+    assert env.unit_max_shield(healer) is None
+    around = env.get_surrounding_pathing(healer)
+    first = next(number for number, unit in env.agents.items() if unit == healer)
+    np.testing.assert_array_equal(env.get_obs_agent(first)[4:12], np.array(around, dtype=np.float32))
+    env.battle.kill([unit.tag for unit in env.agents.values() if unit != healer])
+    env.step([1] * env.n_agents)
+    assert env.death_tracker_ally.sum() == env.n_agents - 1
+    assert [unit.health > 0 for unit in env.agents.values()].count(True) == 1
+    assert (env.only_medivac_left(ally=True), env.only_medivac_left(ally=False)) == (True, False)
 
 
 def test_a_battle_without_messages_needs_a_map_without_fog() -> None:

@@ -109,7 +109,7 @@ def test_an_episode_follows_in_the_same_match_and_a_picture_shows_it(pair: TextP
 @pytest.mark.slow
 @game
 def test_new_matches_share_a_process_and_are_those_of_new_processes() -> None:
-    env, read = words.parallel_env("2s3z", max_cycles=3), list[list[str]]()
+    env, read = words.parallel_env("2s3z", max_cycles=20), list[list[str]]()  # until the fight draws its first lots
     before, used = set(psutil.Process().children()), set()
     for seed in (1, 2, 1):
         seen, _ = env.reset(seed=seed)

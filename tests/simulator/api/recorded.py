@@ -62,7 +62,7 @@ def game(name: str, loops: int = LOOPS) -> Iterator[World]:
 
 def seats_of(world: World) -> list[PlayerSeat]:
     """Return an interface for an observer and for each player; they differ in what they ask for."""
-    types = types_of(world.catalog.version)
+    types = types_of(world.catalog)
     sizes = ((128, 64), (40, 21), (64, 33))
     return [
         PlayerSeat(

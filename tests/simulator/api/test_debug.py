@@ -42,7 +42,7 @@ def test_units_are_made_at_the_place_and_for_the_owner(client: Client) -> None:
     client.debug(make(MARINE, 1, 4.0, 28.0, 5), make(MARINE, 16, 28.0, 28.0))
     assert not units(client, MARINE)
     client.step(2)
-    assert [unit.alliance for unit in units(client, MARINE)] == [raw_pb2.Self] * 5 + [raw_pb2.Neutral]
+    assert sorted(unit.alliance for unit in units(client, MARINE)) == [raw_pb2.Self] * 5 + [raw_pb2.Neutral]
 
 
 def test_a_single_unit_stands_exactly_where_it_was_made(client: Client) -> None:

@@ -95,8 +95,9 @@ def test_a_unit_with_orders_and_a_target_tells_them_to_its_owner_only() -> None:
     first = client.play("3s_vs_3z")
     tags = [unit.tag for unit in first.observation.raw_data.units if unit.alliance == raw_pb2.Self]
     client.act(command(3674, tags, point=(20.0, 16.0)), command(16, tags, point=(9.0, 16.0), queue=True))
-    orders = [unit.orders for unit in client.step().observation.raw_data.units]
-    own, enemy = orders[: len(tags)], orders[len(tags) :]
+    seen = client.step().observation.raw_data.units
+    own = [unit.orders for unit in seen if unit.alliance == raw_pb2.Self]
+    enemy = [unit.orders for unit in seen if unit.alliance == raw_pb2.Enemy]
     for some in own:
         assert [order.ability_id for order in some] == [23, 16]
         assert (some[0].target_world_space_pos.x, some[0].target_world_space_pos.y) == (20.0, 16.0)

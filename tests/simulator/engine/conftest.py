@@ -12,7 +12,7 @@ from khala_simulator.maps.game_map import GameMap, map_from
 from khala_simulator.maps.scenario_file import parse_scenario
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.catalog import load_catalog
-from khala_simulator.tables.versions import DEFAULT_VERSION
+from khala_simulator.tables.versions import DEFAULT_DATA, DEFAULT_VERSION, DataSet
 from khala_simulator.tick import advance
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
@@ -45,9 +45,15 @@ class Field:
     """A world with short names for what tests do to it."""
 
     def __init__(
-        self, terrain: str = "agria_open", *, seed: int = 0, fog: bool = False, version: str = DEFAULT_VERSION
+        self,
+        terrain: str = "agria_open",
+        *,
+        seed: int = 0,
+        fog: bool = False,
+        version: str = DEFAULT_VERSION,
+        data: DataSet = DEFAULT_DATA,
     ) -> None:
-        self.world = World(bare_map(terrain, fog=fog), PLAYERS, seed=seed, catalog=load_catalog(version))
+        self.world = World(bare_map(terrain, fog=fog), PLAYERS, seed=seed, catalog=load_catalog(version, data))
 
     def put(self, name: str, owner: int, x: float, y: float, facing: float = 0.0) -> int:
         unit = self.world.catalog.unit(name)

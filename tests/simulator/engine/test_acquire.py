@@ -22,7 +22,7 @@ def test_an_idle_unit_engages_an_enemy_within_its_scan_range(field: Any) -> None
 
 @pytest.mark.parametrize(
     ("name", "scan"),
-    [("Zealot", 5.0), ("Stalker", 6.5), ("Colossus", 7.5), ("Zergling", 5.0), ("Marine", 5.5), ("SiegeTankSieged", 13)],
+    [("Zealot", 5), ("Stalker", 6.5), ("Colossus", 7.5), ("Zergling", 5), ("Marine", 5.5), ("SiegeTankSieged", 13.5)],
 )
 def test_the_scan_range_is_the_larger_of_range_and_the_least_scan(field: Any, name: str, scan: float) -> None:
     world = field.world
@@ -198,18 +198,45 @@ def test_an_idle_unit_gives_a_chase_up_at_the_end_of_its_leash(field: Any) -> No
     assert math.dist(world.pos[zealot], (3, 16)) < 0.6
 
 
-def test_a_chaser_prefers_a_target_in_reach(field: Any) -> None:
+def test_a_chaser_takes_an_equal_one_in_reach_only_if_bodies_stop_it(field: Any) -> None:
     world = field.world
     zealot, runner = field.put("Zealot", 1, 10, 16), field.put("Zergling", 2, 14.0, 16)
     world.acquires[runner] = False
     commands.attack_move(world, [zealot], (30, 16))
     field.play(4)
-    assert world.target[zealot] == runner
     commands.move(world, [runner], (30, 16))
-    blocker = field.put("Zergling", 2, 13.5, 16.6)
-    world.acquires[blocker] = False
-    field.play(80)
-    assert not world.alive[blocker]
+    beside = field.put("Zergling", 2, 13.0, 17.0)
+    world.acquires[beside] = False
+    for _ in field.loops(30):
+        assert world.target[zealot] == runner
+    for y in (15.5, 16.25, 17.0):
+        world.acquires[field.still("Zergling", 2, world.pos[zealot, 0] + 1.0, y)] = False
+    field.until(lambda: world.target[zealot] != runner)
+    assert world.gap[zealot] <= world.reach[zealot] + 0.2
+
+
+def test_a_target_that_leaves_the_reach_is_lost_to_a_nearer_one(field: Any) -> None:
+    world = field.world
+    marine, first = field.put("Marine", 1, 10, 16), field.put("Zealot", 2, 14, 16)
+    second = field.still("Zealot", 2, 15, 14)
+    world.step_max[marine] = 0.0
+    world.acquires[first] = False
+    field.play(8)
+    assert world.target[marine] == first
+    commands.move(world, [first], (30, 16))
+    field.until(lambda: world.target[marine] == second)
+    assert world.alive[first]
+
+
+def test_a_unit_that_never_fights_by_itself_threatens_only_whom_it_fights(field: Any) -> None:
+    world = field.world
+    victim, onlooker = field.put("Marine", 1, 10, 16), field.put("Marine", 1, 10, 18)
+    tame, prism = field.put("Probe", 2, 10.8, 16), field.put("WarpPrism", 2, 10, 17)
+    world.step_max[[victim, onlooker, tame, prism]] = 0.0
+    commands.attack_unit(world, [tame], world.tag_of(victim))
+    field.play(30)
+    assert world.target[victim] == tame
+    assert world.target[onlooker] == prism
 
 
 def test_an_order_to_attack_one_unit_does_not_change_its_target(field: Any) -> None:
@@ -278,10 +305,13 @@ def test_a_worker_that_fights_is_a_threat(field: Any) -> None:
     world.step_max[[calm, fighting, marine]] = 0.0
     commands.attack_unit(world, [fighting], world.tag_of(marine))
     field.play(1)
+    assert world.target[marine] == calm, "before it is in reach, a fighter threatens nobody"
+    world.pos[fighting] = (10.8, 16)
+    field.play(30)
     assert world.target[marine] == fighting
 
 
-def test_a_unit_that_fires_at_a_structure_looks_up_when_an_army_comes(field: Any) -> None:
+def test_a_unit_that_fires_at_a_structure_turns_to_an_army_between_two_shots(field: Any) -> None:
     world = field.world
     stalker, pylon = field.put("Stalker", 1, 10, 16), field.put("Pylon", 2, 15, 16)
     commands.attack_move(world, [stalker], (24, 16))
@@ -290,7 +320,7 @@ def test_a_unit_that_fires_at_a_structure_looks_up_when_an_army_comes(field: Any
     assert world.shields[pylon] < 200
     zealot = field.put("Zealot", 2, 14, 13)
     world.acquires[zealot] = False
-    field.play(MECHANICS.look_up_period + 4)
+    field.play(34)
     assert world.target[stalker] == zealot
 
 

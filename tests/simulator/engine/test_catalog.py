@@ -4,8 +4,10 @@ import pytest
 
 from khala_simulator.systems.weapons import CONDITIONS
 from khala_simulator.tables.catalog import Catalog, CatalogError, load_catalog
+from khala_simulator.tables.loader import read_data
 from khala_simulator.tables.mechanics import MECHANICS, entries
 from khala_simulator.tables.stats import ATTRIBUTES, LAYERS
+from khala_simulator.tables.versions import DATA_SETS, DataSet
 
 # read off the 4.10 game: life, shields, armor, speed per normal second, sight, supply, minerals, vespene
 UNITS_4_10 = {
@@ -34,6 +36,64 @@ def test_tables_are_found_by_version_and_by_build() -> None:
     assert load_catalog("4.10") is not load_catalog("5.0.13")
     assert load_catalog(75689).version == "4.10"
     assert load_catalog(92440).build == 92440
+
+
+# period and scan range, damage, bonus against armored, range: Stalker and Colossus; life of a Hydralisk
+OF_DATA: dict[DataSet, tuple[tuple[float, ...], tuple[float, ...], float]] = {
+    "liberty": ((23.04, 5, 10, 4, 6), (35.2, 5, 20, 0, 6), 80),
+    "void": ((23.04, 5, 10, 4, 6), (26.4, 5, 15, 0, 6), 80),
+    "multi": ((29.92, 6.5, 13, 5, 6), (24, 7.5, 10, 0, 7), 90),
+}
+
+
+def numbers(catalog: Catalog, name: str) -> tuple[float, ...]:
+    (weapon,) = catalog.unit(name).weapons
+    hit = weapon.hits[-1]
+    return weapon.period_loops, weapon.scan, hit.damage, dict(hit.bonus).get("armored", 0), weapon.range
+
+
+@pytest.mark.parametrize("version", ["4.10", "5.0.13"])
+@pytest.mark.parametrize("data", DATA_SETS)
+def test_a_data_set_has_its_numbers_in_every_version(version: str, data: DataSet) -> None:
+    catalog = load_catalog(version, data)
+    found = numbers(catalog, "Stalker"), numbers(catalog, "Colossus"), catalog.unit("Hydralisk").life
+    assert found == OF_DATA[data]
+    assert numbers(catalog, "Stalker_RL") == found[0]  # a map's own type
+
+
+def test_a_catalog_is_loaded_once_for_a_version_and_data_set() -> None:
+    assert load_catalog() is load_catalog("4.10", "multi") is load_catalog(75689)
+    assert load_catalog(data="liberty") is load_catalog("4.10", "liberty")
+    assert load_catalog(data="liberty") is not load_catalog()
+
+
+@pytest.mark.parametrize("version", ["4.10", "5.0.13"])
+@pytest.mark.parametrize("data", [data for data in DATA_SETS if data != "multi"])
+def test_a_data_set_changes_rows_and_fields_that_are_there(version: str, data: DataSet) -> None:
+    for kind, changes in read_data("tables", f"{data}.yaml").items():
+        rows = {
+            row.get("name" if kind == "units" else "id"): row
+            for row in read_data("tables", version, f"{kind}.json")["rows"]
+        }
+        assert set(changes) <= set(rows)
+        known = {field for row in rows.values() for field in row}
+        for key, change in changes.items():
+            assert set(change) <= known
+            if isinstance(hits := change.get("hits"), dict):
+                assert set(hits) <= {hit["effect"] for hit in rows[key]["hits"]}
+
+
+@pytest.mark.parametrize("data", DATA_SETS)
+def test_the_numbers_that_clients_see_of_a_weapon_are_those_of_its_hits(data: DataSet) -> None:
+    """Apart from damage that is split, dealt by another effect than the one that is shown, or launched."""
+    for weapon in load_catalog(data=data).weapons:
+        if weapon.id in ("ParticleDisruptors", "ThermalLances", "Adept", "NeedleSpines", "LiberatorMissileLaunchers"):
+            assert {(hit.damage, hit.bonus) for hit in weapon.hits} == {(weapon.shown_damage, weapon.shown_bonus)}
+
+
+def test_only_these_data_sets_are_shipped() -> None:
+    with pytest.raises(CatalogError, match="shipped are liberty, void, multi"):
+        load_catalog(data="swarm")  # type: ignore[arg-type]  # as a caller might
 
 
 @pytest.mark.parametrize("version", ["4.9", 1, "", "../4.10"])
@@ -78,7 +138,7 @@ def test_every_weapon_is_sound(catalog: Catalog) -> None:
 
 def test_a_weapon_says_which_of_its_numbers_are_estimates() -> None:
     by_id = {w.id: w for w in load_catalog().weapons}
-    assert by_id["ImpalerTentacle"].estimates == ("missile speed",)
+    assert by_id["VolatileBurst"].estimates == ("structures are not acquired",)
     assert by_id["ParticleDisruptors"].estimates == ()
 
 

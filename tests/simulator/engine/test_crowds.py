@@ -183,3 +183,15 @@ def test_a_hundred_mirrors_favour_no_side_owner_or_order() -> None:
     assert len(decided) > 90
     odds = {factor: binomial(sum(won[factor] for won in decided), len(decided)) for factor in decided[0]}
     assert min(odds.values()) > 0.001, odds
+
+
+def test_a_walker_that_comes_no_nearer_tries_the_other_side(field: Any) -> None:
+    """Bodies that stay, such as eggs beside a Hatchery, leave open the half of a gap that is not straight ahead."""
+    world = field.world
+    world.ground.block(WALLS, np.array([(12, y) for y in range(32) if y not in (14, 15, 16)]))
+    for y in (15.9, 16.6):
+        egg = field.still("Zealot", 2, 12.5, y)
+        world.life[egg] = world.life_max[egg] = 1e6
+    pair = [field.put("Adept", 1, 6, 16.4), field.put("Adept", 1, 5, 16.6)]
+    commands.move(world, pair, (20, 16.5))
+    field.until(lambda: bool((world.pos[pair, 0] > 14).all()), most=300)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 VERSIONS = ("4.10", "5.0.13")
 LIFE, SHIELDS = 60.0, 30.0
 NO_OWN_ATTACK = {"90mmCannonsFake", "CycloneFakeWeapon", "PointDefenseLaser"}  # they only aim, or shoot missiles down
+RHYTHM_OF_THEIR_OWN = {"VolatileBurst", "VolatileBurstBuilding", "BroodlingEscort", "ImpalerTentacle"}
 GAPS = 8
 
 
@@ -173,7 +174,7 @@ def struck(unit: UnitType, shields: float, life: float, damage: float, armored: 
     return shields, max(life, 0.0)
 
 
-@pytest.mark.parametrize("case", cases())
+@pytest.mark.parametrize("case", [p for p in cases() if p.values[0].weapon != "ImpalerTentacle"])  # it comes back first
 def test_attacks_take_what_the_tables_say_until_the_target_is_dead(make_field: Callable[..., Any], case: Case) -> None:
     duel = Duel(make_field, case)
     world, unit = duel.world, duel.target_type
@@ -196,7 +197,7 @@ def test_attacks_take_what_the_tables_say_until_the_target_is_dead(make_field: C
 
 @pytest.mark.parametrize(
     "case",
-    [p for p in cases() if p.values[0].weapon not in ("VolatileBurst", "VolatileBurstBuilding", "BroodlingEscort")],
+    [p for p in cases() if p.values[0].weapon not in RHYTHM_OF_THEIR_OWN],
 )
 def test_attacks_follow_each_other_after_the_period_of_the_tables(make_field: Callable[..., Any], case: Case) -> None:
     duel = Duel(make_field, case)

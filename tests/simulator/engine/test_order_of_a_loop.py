@@ -32,6 +32,7 @@ def hit(field: Field, attacker: str, victim: int, *, loops: int) -> int:
     weapon = world.catalog.unit(attacker).weapons[0]
     shot = Shot(source, 2, victim, NOBODY, weapon.row, 0, world.pos[source], world.pos[victim])
     world.pending.append(PendingHit(shot, world.loop + loops, single=True))
+    world.bursting[source] = True
     return source
 
 

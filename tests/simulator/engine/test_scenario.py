@@ -59,8 +59,8 @@ MISTAKES = [
         ", move: middle",
         "",
         (
-            "duel.yaml:16: triggers[0].do[2].order: give exactly one of attack_move, move, attack_units_of, unload_at, "
-            "gather_near"
+            "duel.yaml:16: triggers[0].do[2].order: give exactly one of attack_move, move, attack_units_of, "
+            "attack_nearest_of, unload_at, gather_near"
         ),
     ),
     (

@@ -104,7 +104,7 @@ PURSES = [
     ("BuildMarines", (50, 0), [], []),
 ]
 
-FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 23, "llm_smac": 9, "mini_games": 7, "Melee": 9, "duels": 3}
+FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 24, "llm_smac": 9, "mini_games": 7, "Melee": 9, "duels": 3}
 
 
 def army(world: World, player: int) -> dict[str, int]:

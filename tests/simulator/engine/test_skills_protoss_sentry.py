@@ -248,8 +248,9 @@ def test_an_image_takes_double_without_armor_and_deals_none(make_field: Any, ver
     slot = sentry(field, 10.0, 10.0)
     field.order(slot, 164)  # two Zealots
     field.play(1)
-    image = next(s for s in field.world.live.tolist() if s != slot)
-    field.world.remove(slot)
+    image, other = (s for s in field.world.live.tolist() if s != slot)
+    for gone in (slot, other):
+        field.world.remove(gone)
     marine = field.put("Marine", 2, 11.0, 11.0)
     commands.attack_unit(field.world, [image], field.world.tag_of(marine))
     before = field.vitals(image)

@@ -15,7 +15,6 @@ PERIODS = [  # attacker, target, distance between centres, period in loops as 16
     ("Zealot", "SpineCrawler", 1.4, 1.2 * 16),
     ("Stalker", "SpineCrawler", 5.0, 1.87 * 16),
     ("Zergling", "SpineCrawler", 1.3, 0.696 * 16),
-    ("SpineCrawler", "Zealot", 5.0, 1.85 * 16),
     ("Colossus", "Zealot", 6.0, 1.5 * 16),
     ("Marine", "Zealot", 4.0, 0.8608 * 16),
 ]
@@ -41,6 +40,22 @@ def starts_of(field: Any, attacker: int, loops: int) -> list[int]:
             starts.append(loop)
         before = now
     return starts
+
+
+@pytest.mark.parametrize(("data", "period"), [("liberty", 1.6 * 16), ("multi", 1.85 * 16)])
+def test_a_tentacle_has_its_cooldown_from_the_hit(make_field: Callable[..., Any], data: str, period: float) -> None:
+    """From hit to hit: the period and 0.5 loops of delay in the mean, the damage point, a flight of 5.5 units."""
+    field = make_field(data=data)
+    _, target = duel(field, "SpineCrawler", "Stalker", 6.125)
+    hits, before = [], field.vitals(target)
+    for loop in field.loops(4000):
+        now = field.vitals(target)
+        if now < before:
+            hits.append(loop)
+        before = now
+    flight = (math.sqrt(12**2 + 2 * 140 * 5.5) - 12) / 140 * 16
+    assert len(hits) > 90
+    assert np.diff(hits).mean() == pytest.approx(period + 0.5 + 0.3332 * 16 + flight, abs=1.0)
 
 
 @pytest.mark.parametrize(

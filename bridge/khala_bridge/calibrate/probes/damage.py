@@ -54,7 +54,7 @@ def pair(lab: Lab) -> Samples:
     resolution=0.3,
 )
 def splash(lab: Lab) -> Samples:
-    """Put one bystander for each shot, at growing distances."""
+    """Put one bystander for each shot, at growing distances, and count until half a period after the shot."""
     places = lab.ground.places(20, 10)
     for kind in known(lab, _SPLASHERS):
         air = all(weapon.targets == "air" for weapon in fact(kind).weapons)
@@ -69,14 +69,21 @@ def splash(lab: Lab) -> Samples:
                 at = (x - far, y) if side == "behind" else (x, y - far)
                 puts += [Put(target, (x, y), ENEMY), Put(kind, (x + near, y)), Put(other, at, ENEMY)]
             tags = lab.make(*puts)
-            before = [lab.life(tag) for tag in tags[2::3]]
-            lab.hold([*tags[::3], *tags[2::3]])
-            for victim, attacker in zip(tags[::3], tags[1::3], strict=True):
+            half = 0.5 * period_loops(lab, kind)
+            victims, others = tags[::3], tags[2::3]
+            whole, before = [[lab.life(tag) for tag in some] for some in (victims, others)]
+            lab.hold([*victims, *others])
+            for victim, attacker in zip(victims, tags[1::3], strict=True):
                 lab.order(ATTACK, attacker, target=victim)
-            lost = [0.0] * len(before)
-            for _ in range(int(period_loops(lab, kind))):
+            lost = [0.0] * len(batch)
+            left = [_WAIT_LOOPS + half] * len(batch)  # the attacker may have turned on the bystander first
+            for loop in range(int(_WAIT_LOOPS + half)):
                 lab.step()
-                lost = [max(a, b - lab.life(tag)) for a, b, tag in zip(lost, before, tags[2::3], strict=True)]
+                for i, (victim, bystander) in enumerate(zip(victims, others, strict=True)):
+                    if loop <= left[i]:
+                        lost[i] = max(lost[i], before[i] - lab.life(bystander))
+                    if lab.life(victim) < whole[i]:
+                        left[i] = min(left[i], loop + half)
             for ((side, ring), _), life in zip(batch, lost, strict=True):
                 yield f"{kind} {side} {ring * _STEP:.2f}", life
             lab.clear()

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _PLACE = (24, 16)
 _TRIALS = 16
+_BODIES = 0.375 + 1.125  # radii of a Marine and a Pylon
 _CANDIDATES = (
     ("Zealot", "Pylon"), ("Zealot", "Probe"), ("Zealot", "HighTemplar"), ("Zealot", "Immortal"), ("Zealot", "Overlord"),
     ("Zealot", "Observer"), ("Zealot", "PhotonCannon"), ("Zealot", "Larva"), ("Marine", "Medivac"), ("Marine", "SCV"),
@@ -85,7 +86,7 @@ def _attacks(lab: Lab, tag: int) -> bool:
 @probe(
     "target.look_up",
     measures="Loops from when an enemy that fights comes, to the first hit on it by a Marine that shot at a structure.",
-    settles="How often a unit with a target looks for a better one.",
+    settles="When a unit that fires turns to a better target.",
     unit="loops",
     exact=False,
 )
@@ -107,16 +108,14 @@ def look_up(lab: Lab) -> Samples:
 
 @probe(
     "target.switch",
-    measures="World units by which an enemy must be nearer for a Zealot on its way to another to change to it.",
-    settles="When a pursuer changes to a nearer target.",
-    unit="world units",
-    resolution=0.26,
+    measures="1 if a Zealot on its way to a target changes to an equal one that is nearer, 0 if it goes on.",
+    settles="Whether a pursuer that nothing stops changes to a nearer target.",
+    unit="share",
 )
 def switch(lab: Lab) -> Samples:
-    """Offer second targets at growing distances, and take the farthest that is chosen."""
+    """Offer second targets that are nearer by more and more."""
     places = lab.ground.places(30, 14)
     gains = [0.25 * i for i in range(14)]
-    best = math.inf
     for start in range(0, len(gains), len(places)):
         batch = list(zip(gains[start : start + len(places)], places, strict=False))
         tags = lab.make(
@@ -132,12 +131,36 @@ def switch(lab: Lab) -> Samples:
             extra.append(Put("Pylon", (zx + 0.5 * away, zy + math.sqrt(0.75) * away), ENEMY))
         second = lab.make(*extra)
         lab.step(16)
-        for (gain, _), zealot, other in zip(batch, tags[::2], second, strict=True):
-            if other and lab.units[zealot].engaged_target_tag == other:
-                best = min(best, gain)
+        for zealot, other in zip(tags[::2], second, strict=True):
+            if other:
+                yield "Zealot", float(lab.units[zealot].engaged_target_tag == other)
         lab.clear()
-    if best < math.inf:
-        yield "Zealot", best
+
+
+@probe(
+    "target.guard",
+    measures="Farthest gap at which a Marine that has attacked its way to a point notices an enemy.",
+    settles="How much farther a unit looks at the end of an attack-move.",
+    unit="world units",
+    resolution=0.26,
+)
+def guard(lab: Lab) -> Samples:
+    """Make structures at growing distances from Marines that have arrived, and take the farthest that is attacked."""
+    places = lab.ground.places(*_PLACE)
+    gaps = [4.5 + 0.25 * i for i in range(16)]
+    farthest = 0.0
+    for start in range(0, len(gaps), len(places)):
+        batch = list(zip(gaps[start : start + len(places)], places, strict=False))
+        marines = lab.make(*(Put("Marine", (x, y)) for _, (x, y) in batch))
+        for marine, (_, (x, y)) in zip(marines, batch, strict=True):
+            lab.order(ATTACK, marine, point=(x + 1, y))
+        lab.step(40)
+        tried = [(marine, gap) for marine, (gap, _) in zip(marines, batch, strict=True)]
+        lab.make(*(Put("Pylon", (lab.at(m)[0] + gap + _BODIES, lab.at(m)[1]), ENEMY) for m, gap in tried))
+        lab.step(16)
+        farthest = max([farthest, *(gap for marine, gap in tried if _attacks(lab, marine))])
+        lab.clear()
+    yield "Marine", farthest
 
 
 @probe(
@@ -244,4 +267,4 @@ def structure(lab: Lab) -> Samples:
     yield from ((kind, float(tag in gone)) for kind, tag in zip(kinds, tags[::2], strict=False))
 
 
-PROBES = (choice, scan, look_up, switch, flee, leash, turret, structure)
+PROBES = (choice, scan, look_up, switch, guard, flee, leash, turret, structure)

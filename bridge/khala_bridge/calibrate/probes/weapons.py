@@ -7,7 +7,7 @@ from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
 from khala_bridge.calibrate.cast import apart, fact, known, sturdy
-from khala_bridge.calibrate.lab import ATTACK, MOVE, SMART, STOP, Put
+from khala_bridge.calibrate.lab import ATTACK, ENEMY, HOLD, MOVE, SMART, STOP, Put
 from khala_bridge.calibrate.probe import Samples, probe
 from khala_bridge.calibrate.probes.pairs import (
     LONG_PAIR,
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 _SHOTS = 10
 _APPROACH_LOOPS = 160
 """In which the slowest, a Queen, walks three world units and fires."""
+_LEAVING_LOOPS = 80
+_TENTHS = 8
 _LONGEST_LOOPS = 70
 """The Tempest fires every 53 loops, and its missile flies."""
 _MISSILES = (
@@ -114,6 +116,34 @@ def reach(lab: Lab) -> Samples:
                 del waiting[pair]
                 distance = math.dist(lab.at(pair.attacker), lab.at(pair.target))
                 yield pair.kind, distance - apart(pair.kind, sturdy(pair.kind), 0)
+
+
+@probe(
+    "weapon.slop",
+    measures="World units between the edges of a Marine that holds and an Overlord that flies away, at its last shot.",
+    settles="How far beyond its range a unit fires on at a target that it has had in range.",
+    unit="world units",
+    resolution=0.15,
+)
+def slop(lab: Lab) -> Samples:
+    """Let Overlords leave from starts one tenth apart, so that some shot falls on every tenth of the way."""
+    x, y = lab.ground.places(30, 6)[0]
+    last = 0.0
+    for tenth in range(_TENTHS):
+        gap = 4 + tenth / 10
+        marine, overlord = lab.make(
+            Put("Marine", (x - 8, y)), Put("Overlord", (x - 8 + apart("Marine", "Overlord", gap), y), ENEMY)
+        )
+        lab.order(HOLD, marine)
+        lab.order(MOVE, overlord, point=(x + 7, y))
+        life = lab.life(overlord)
+        for _ in range(_LEAVING_LOOPS):
+            lab.step()
+            if lab.life(overlord) < life - NOTICEABLE:
+                life = lab.life(overlord)
+                last = max(last, math.dist(lab.at(marine), lab.at(overlord)) - apart("Marine", "Overlord", 0))
+        lab.clear()
+    yield "Marine", last
 
 
 def _until_hit(lab: Lab, victim: int) -> bool:
@@ -256,4 +286,4 @@ def bunker(lab: Lab) -> Samples:
     yield "Marine", farthest
 
 
-PROBES = (period, delay, missile, reach, interrupt, backswing, dead_attacker, share, bunker)
+PROBES = (period, delay, missile, reach, slop, interrupt, backswing, dead_attacker, share, bunker)

@@ -26,7 +26,7 @@ def _calls(page: Page) -> Iterator[str]:
     if page.teams:
         yield "Valid actions"
     for team in page.teams:
-        calls = ", ".join([f"<{action.name}({', '.join(action.args)})>" for action in team.actions])
+        calls = ", ".join([action.form for action in team.actions])
         yield f"{INDENT}Team {team.name}: {calls or 'none'}"
     for team in page.teams:
         if team.arguments:
@@ -77,7 +77,7 @@ def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a sectio
     yield from ()
 
 
-_TOO_FEW = re.compile(r"(\d+) (\w+) too few")
+_TOO_FEW = re.compile(r"(\d+) more (\w+) needed")
 
 
 def _reasons(team: TeamView) -> dict[str, list[str]]:
@@ -85,7 +85,7 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
     reasons: dict[str, list[str]] = {}
     for barred in team.barred:
         if too_few := _TOO_FEW.fullmatch(barred.reason):
-            reasons.setdefault(f"too few {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
+            reasons.setdefault(f"not enough {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
         else:
             reasons.setdefault(barred.reason, []).append(barred.action)
     return reasons

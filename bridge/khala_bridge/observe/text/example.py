@@ -13,6 +13,7 @@ from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.knowledge import is_armed, knowledge
 from khala_bridge.observe.observation import AgentObservation
 from khala_bridge.observe.text.page import Page, find_sections, render
+from khala_bridge.observe.text.words import plural
 from khala_protocol.messages import (
     Army,
     ArmyPart,
@@ -138,7 +139,7 @@ def _fight(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     reply = _fighting(kind, can if len(own) > 1 else can - {"Select_Unit_Move_Screen"}, foe)
     if reply is None:
         return None
-    said = _first_contact(task, agent, f"{agent.name} meets 2 {foe} at [30, 22] of the minimap.")
+    said = _first_contact(task, agent, f"2 {plural(foe)} at [30, 22] of the minimap.")
     calls = reply.calls[: task.max_actions_of(agent)]
     return view, ("game", "teams"), reply._replace(team=_team_name(team), calls=calls, message=said)
 
@@ -152,9 +153,11 @@ def _fighting(kind: str, can: frozenset[str], foe: str) -> _Reply | None:
     if "Attack_Unit" in can and is_armed(kind):
         calls = [f"<Attack_Unit({_FOE_TAGS[1]})>", *([back] if "Select_Unit_Move_Screen" in can else [])]
         saved = f" My {kind} {_OWN_TAGS[1]} has a quarter of its life left and steps back." if len(calls) > 1 else ""
-        return _Reply(f"Two {foe} are in reach; {_FOE_TAGS[1]} is nearly dead, so all attack it first.{saved}", calls)
+        return _Reply(
+            f"Two {plural(foe)} are in reach; {_FOE_TAGS[1]} is nearly dead, so all attack it first.{saved}", calls
+        )
     if "Move_Screen" in can:
-        analysis = f"Two {foe} come nearer, and {kind} cannot fight them: away from here."
+        analysis = f"Two {plural(foe)} come nearer, and a {kind} cannot fight them: away from here."
         return _Reply(analysis, ["<Move_Screen([4, 12])>"])
     return None
 
@@ -217,7 +220,9 @@ def _army(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     seen = ArmyPart(minimap=(36, 38), units={foe: 4}, value=round(4 * knowledge()[foe].value), unseen_s=20, away=31)
     resources = Resources(minerals=120, vespene=40, supply_used=47, supply_cap=54)
     view = View(time_s=300, resources=resources, places=places, army=Army(parts=(part,), enemies=(seen,), value=worth))
-    analysis = f"12 {kind} stand idle at Base 1, and only 4 {foe} were seen: strong enough to attack Base 2."
+    analysis = (
+        f"12 {plural(kind)} stand idle at Base 1, and only 4 {plural(foe)} were seen: strong enough to attack Base 2."
+    )
     reply = _attack(task, agent, analysis)
     return (view, ("game", "map", "army"), reply) if reply else None
 

@@ -45,6 +45,21 @@ def count_words(numbers: dict[str, int]) -> str:
     return ", ".join(f"{count} {what}" for what, count in numbers.items())
 
 
+def plural(kind: str) -> str:
+    """Return the name of a type of unit for several of them: `Zealots`, `Sentries`, `Colossi`."""
+    for end, ends in (
+        ("ossus", "ossi"),
+        ("ry", "ries"),
+        ("arva", "arvae"),
+        ("Templar", "Templar"),
+        ("us", "uses"),
+        ("x", "xes"),
+    ):
+        if kind.endswith(end):
+            return kind.removesuffix(end) + ends
+    return f"{kind}s"
+
+
 def under_heading(heading: str, lines: Iterable[str]) -> Iterator[str]:
     """Yield a heading with lines below it; nothing without lines."""
     found = list(lines)

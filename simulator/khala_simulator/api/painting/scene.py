@@ -59,7 +59,7 @@ class ScenePainter:
     def __init__(self, screen: ScreenView, types: Types) -> None:
         self._screen, self._types = screen, types
         self._scale = 1 / screen.scale
-        self._wardrobe = wardrobe(types.catalog.version, self._scale)
+        self._wardrobe = wardrobe(types.catalog, self._scale)
         self._level = np.array([_level(unit) for unit in types.catalog.units])
         self._bare = np.array([class_of(unit) in BARE for unit in types.catalog.units])
         self._ground = PaintedGround(screen.columns, screen.rows, self._scale, grid=self._scale >= GRID_FROM)

@@ -17,12 +17,12 @@ import numpy as np
 
 from khala_simulator.api.painting import palette
 from khala_simulator.api.painting.silhouettes import Class, class_of, code_of, outline_of
-from khala_simulator.tables.catalog import load_catalog
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_simulator.api.painting.palette import Colour, PlayerColors
+    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
 
     Image = NDArray[np.uint8]
@@ -136,9 +136,9 @@ class Wardrobe:
 
 
 @functools.lru_cache(maxsize=4)
-def wardrobe(version: str, pixels_per_cell: float) -> Wardrobe:
+def wardrobe(catalog: Catalog, pixels_per_cell: float) -> Wardrobe:
     """Return the sprites of a catalog at this scale, shared by all games of the process."""
-    return Wardrobe(load_catalog(version).units, pixels_per_cell)
+    return Wardrobe(catalog.units, pixels_per_cell)
 
 
 # images of four channels: red, green, blue, all times the cover, and the cover, 0 to 255 ------------------------------
