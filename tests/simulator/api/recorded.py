@@ -12,7 +12,7 @@ import hashlib
 import json
 import random
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from s2clientprotocol import common_pb2
@@ -31,6 +31,8 @@ from tests.simulator.engine.random_orders import give_orders
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from numpy.typing import NDArray
 
     from khala_simulator.api.sight import Sight
     from khala_simulator.world.world import World
@@ -109,11 +111,17 @@ def shown(seat: PlayerSeat, *, through_fog: bool) -> dict[str, bytes]:
         seat.selection.choose(chosen)
         panels.append(ui.panel(world, seat.types, seat.selection, seat.player).SerializeToString())
     return {
-        "sight": b"".join(str(column.dtype).encode() + column.tobytes() for column in columns),
+        "sight": b"".join(map(_as_sent, columns)),
         "units": units.encode(),
         "layers": b"".join(seat.layers.encode(frame)),
         "panels": b"".join(panels),
     }
+
+
+def _as_sent(column: NDArray[Any]) -> bytes:
+    """Return a column as bytes, floats in the precision of the API: an angle's last bits depend on the processor."""
+    sent = column.astype(np.float32) if column.dtype.kind == "f" else column
+    return str(sent.dtype).encode() + sent.tobytes()
 
 
 def digests(name: str, loops: int = LOOPS) -> list[dict[str, str]]:
