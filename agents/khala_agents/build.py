@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from khala_agents.answers.form import AnswerRule
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
 from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
@@ -130,6 +131,7 @@ class Workshop:
             try_timeout_s=config.try_timeout_s,
             vision=config.vision,
             pace=config.pace,
+            answer=config.answer,
             breaker=self._breakers.setdefault(config.base_url, Breaker(config.base_url, config.breaker)),
         )
         return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model
@@ -185,9 +187,16 @@ def replay_policies(exchanges: Iterable[ModelCall], *, memory: MemoryRule | None
         by_agent.setdefault(exchange.agent, []).append(exchange)
     at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
     return {
-        agent: LLMPolicy(ReplayClient(made), memory=memory, retry=at_once, vision=_vision_of(made))
+        agent: LLMPolicy(
+            ReplayClient(made), memory=memory, retry=at_once, vision=_vision_of(made), answer=_answer_of(made)
+        )
         for agent, made in by_agent.items()
     }
+
+
+def _answer_of(exchanges: Iterable[ModelCall]) -> AnswerRule:
+    """Return the form of the answers to these requests."""
+    return AnswerRule(form=next((form for made in exchanges if (form := made.params.get("answer"))), "text"))
 
 
 def _vision_of(exchanges: Iterable[ModelCall]) -> Vision | None:

@@ -13,6 +13,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, JsonValue, field_validator, model_validator
 
+from khala_agents.answers.form import AnswerRule
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.limits import LimitRules
@@ -106,6 +107,9 @@ class ModelConfig(Frozen):
     system_role: SystemRole | None = None
     """Role of the system message; `fold` puts it in front of the first message of the user. None: as the profile says.
     Where an endpoint refuses one, Khala finds the next by itself."""
+    answer: AnswerRule = AnswerRule()
+    """The form of its answers: `text`, `json`, `tools` or `grammar`, or `{form: json, exact: false}` for a schema that
+    is the same in all steps."""
     max_tokens: int | None = Field(default=None, ge=1)
     """Limit of generated tokens."""
     temperature: float | None = Field(default=None, ge=0)
@@ -182,6 +186,10 @@ class ModelConfig(Frozen):
         needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
         if needs_key and self.api_key_env is None:
             raise ValueError(f"{self.profile} needs a key: name the environment variable that holds it in api_key_env")
+        takes_grammars = self.profile != "anthropic" and PROFILES[self.profile].grammar_field
+        if self.answer.form == "grammar" and not takes_grammars:
+            takers = " and ".join(name for name, profile in PROFILES.items() if profile.grammar_field)
+            raise ValueError(f"{self.profile} takes no grammar: {takers} do; write `answer: json` or `answer: tools`")
         if self.profile == "anthropic" and self.system_role is not None:
             raise ValueError("system_role is for chat completions: Anthropic's messages have a field for it")
         return self

@@ -13,6 +13,8 @@ import logging
 import random
 from typing import TYPE_CHECKING, NamedTuple
 
+from khala_agents.answers.form import AnswerRule
+from khala_agents.answers.render import shape_for
 from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.client import (
     Completion,
@@ -39,6 +41,8 @@ from khala_protocol.messages import MemoryRule, ModelCall, Usage
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from khala_agents.answers.form import AnswerShape
+    from khala_agents.llm.client import Scalar
     from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context, Said
@@ -69,6 +73,7 @@ class LLMPolicy(Policy):
             at least 45 s; 10 minutes without a deadline.
         vision: how the model sees; None if it does not see, and pictures are left out.
         pace: how fast the model is, for the clock `token`; None: the task says.
+        answer: the form of its answers.
         rng: jitter of the waits between tries.
     """
 
@@ -83,6 +88,7 @@ class LLMPolicy(Policy):
         try_timeout_s: float | None = None,
         vision: Vision | None = None,
         pace: Pace | None = None,
+        answer: AnswerRule | None = None,
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
@@ -91,6 +97,7 @@ class LLMPolicy(Policy):
         self.try_timeout_s = try_timeout_s
         self.vision = vision
         self.pace = pace
+        self.answer = answer or AnswerRule()
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
         self._answered = False
@@ -134,7 +141,8 @@ class LLMPolicy(Policy):
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
-        completion = await self._complete(_Tries(self, context, messages, pictures))
+        shape = shape_for(self.answer, context.briefing, observation.view)
+        completion = await self._complete(_Tries(self, context, messages, pictures, prompt.stable, shape))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
@@ -158,8 +166,9 @@ class LLMPolicy(Policy):
             summary.note(exchange)
             context.trace(exchange)
 
-        prompt = self._prompt_for(context.briefing).messages(summary.ask(context.observation))
-        asking = _Tries(self, dataclasses.replace(context, trace=trace), prompt, {}, purpose="summary")
+        prompt = self._prompt_for(context.briefing)
+        messages = prompt.messages(summary.ask(context.observation))
+        asking = _Tries(self, dataclasses.replace(context, trace=trace), messages, {}, prompt.stable, purpose="summary")
         try:
             await self._complete(asking)
         except LLMError as error:
@@ -203,7 +212,7 @@ class LLMPolicy(Policy):
 
     def _prompt_for(self, briefing: Briefing) -> Prompt:
         if self._prompt is None or (self._prompt[0] is not briefing and self._prompt[0] != briefing):
-            self._prompt = (briefing, Prompt(briefing))
+            self._prompt = (briefing, Prompt(briefing, self.answer.form))
             self._remember_for(briefing)
         return self._prompt[1]
 
@@ -238,6 +247,8 @@ class _Tries:
         context: Context,
         prompt: tuple[ChatMessage, ...],
         pictures: Mapping[str, bytes],
+        stable: int,
+        shape: AnswerShape | None = None,
         *,
         purpose: Purpose = "decision",
     ) -> None:
@@ -249,7 +260,9 @@ class _Tries:
         self._prompt = prompt
         self._origin = Origin(observation.agent, observation.episode, observation.step, purpose)
         self._pictures = pictures
-        self._tokens = estimated_tokens(prompt, policy.vision)
+        self._stable = stable
+        self._shape = shape
+        self._tokens = estimated_tokens(prompt, policy.vision) + (shape.estimated_tokens if shape else 0)
         self._images = Usage(
             images=sum(len(message.images) for message in prompt),
             image_tokens=estimated_image_tokens(prompt, policy.vision) if policy.vision else 0,
@@ -317,8 +330,13 @@ class _Tries:
             origin=self._origin,
             attempt=self._made,
             pictures=self._pictures,
-            stable=Prompt.STABLE,
+            stable=self._stable,
+            shape=self._shape,
         )
+
+    def _params(self) -> dict[str, Scalar]:
+        form = self._policy.answer.form
+        return {**self._policy.client.params, **({"answer": form} if form != "text" and self._shape else {})}
 
     def _trace(self, began: float, ticket: Ticket, outcome: _Outcome) -> None:
         seen, completion, usage = self._context.observation, outcome.completion, outcome.usage
@@ -335,7 +353,7 @@ class _Tries:
             model=self._policy.client.model,
             endpoint=self._policy.client.endpoint,
             prompt=self._prompt,
-            params=dict(self._policy.client.params),
+            params=self._params(),
             answered_by=completion.model if completion else "",
             completion=completion.text if completion else None,
             finish=completion.finish if completion else "",

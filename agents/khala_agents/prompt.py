@@ -9,14 +9,16 @@ message stand the summary of the game, which changes rarely, and the last steps.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
+from khala_agents.answers.wording import how_to_answer_in_json, how_to_answer_with_tools, in_json
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from khala_agents.answers.form import AnswerForm
     from khala_protocol.messages import (
         ActionSpec,
         AgentKind,
@@ -35,18 +37,26 @@ _EXAMPLE_VALUES = {"screen": "[14.5, 9]", "minimap": "[31, 22]"}
 
 
 class Prompt:
-    """The prompts of one episode."""
+    """The prompts of one episode.
 
-    STABLE: ClassVar[int] = 3
-    """Number of messages at the front that are the same in all of them."""
+    Args:
+        briefing: of the agent.
+        form: of its answers. With `tools` there is no example: an answer in words would teach the wrong form.
+    """
 
-    def __init__(self, briefing: Briefing) -> None:
+    def __init__(self, briefing: Briefing, form: AnswerForm = "text") -> None:
         seen, said = _example(briefing)
-        self._head = (
-            ChatMessage(role="system", content=system_text(briefing)),
+        example = (
             ChatMessage(role="user", content=seen),
-            ChatMessage(role="assistant", content=said),
+            ChatMessage(role="assistant", content=in_json(said, briefing.actions) if form == "json" else said),
         )
+        system = ChatMessage(role="system", content=system_text(briefing, form))
+        self._head = (system,) if form == "tools" else (system, *example)
+
+    @property
+    def stable(self) -> int:
+        """Number of messages at the front that are the same in all of them."""
+        return len(self._head)
 
     def messages(
         self,
@@ -74,9 +84,10 @@ def _line(text: str) -> str:
     return " ".join(text.split())
 
 
-def system_text(briefing: Briefing) -> str:
+def system_text(briefing: Briefing, form: AnswerForm = "text") -> str:
     """Return the part of a prompt that says everything except what the agent sees."""
     most = briefing.standing_orders
+    in_text = form in ("text", "grammar")
     sections = (
         ("Who you are", _identity(briefing)),
         ("Your task", briefing.task),
@@ -84,10 +95,10 @@ def system_text(briefing: Briefing) -> str:
         ("Rules", _rules(briefing)),
         ("Actions", manual.list_actions(briefing.actions)),
         ("Arguments", _arguments(briefing.actions, briefing.frames)),
-        ("Communication", _communication(briefing.correspondents, briefing.channels)),
-        ("Memory", _memory(briefing.memory)),
-        ("Standing orders", manual.standing_orders(briefing.actions, most) if most else ""),
-        ("How to answer", _format(briefing)),
+        ("Communication", _communication(briefing.correspondents, briefing.channels, in_text=in_text)),
+        ("Memory", _memory(briefing.memory, in_text=in_text)),
+        ("Standing orders", manual.standing_orders(briefing.actions, most) if most and in_text else ""),
+        ("How to answer", _HOW_TO_ANSWER[form](briefing)),
     )
     return "\n\n".join(f"# {title}\n{text}" for title, text in sections if text)
 
@@ -174,20 +185,19 @@ def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
     return "\n".join(f"- {name}: {meaning}" for name, meaning in meanings.items() if name in used)
 
 
-def _communication(correspondents: Sequence[Contact], channels: Sequence[str]) -> str:
+def _communication(correspondents: Sequence[Contact], channels: Sequence[str], *, in_text: bool) -> str:
     if not correspondents and not channels:
         return ""
     lines = [f"- {who.name}" + (f": {who.role}" if who.role else "") for who in correspondents]
     lines += [f"- {channel}: a channel, heard by all who listen to it" for channel in channels]
-    lines.append(manual.MESSAGE)
-    if channels:
-        lines.append(manual.LISTEN)
+    if in_text:
+        lines += [manual.MESSAGE, manual.LISTEN] if channels else [manual.MESSAGE]
     return "\n".join(lines)
 
 
-def _memory(rule: MemoryRule) -> str:
+def _memory(rule: MemoryRule, *, in_text: bool) -> str:
     lines = []
-    if rule.notes:
+    if rule.notes and in_text:
         lines += [manual.NOTE, manual.FORGET.format(notes=rule.notes)]
     if rule.messages_s:
         lines += [
@@ -208,6 +218,14 @@ def _format(briefing: Briefing) -> str:
     if briefing.correspondents or briefing.channels:
         lines.append('If you have something to say to others, end with "Communications:" and the messages.')
     return "\n".join(lines)
+
+
+_HOW_TO_ANSWER: Mapping[AnswerForm, Callable[[Briefing], str]] = {
+    "text": _format,
+    "grammar": _format,
+    "json": how_to_answer_in_json,
+    "tools": how_to_answer_with_tools,
+}
 
 
 def _example(briefing: Briefing) -> tuple[str, str]:

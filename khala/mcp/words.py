@@ -34,7 +34,8 @@ def instructions(config: MatchConfig, seat: Seat) -> str:
 
 def briefing_page(briefing: Briefing) -> str:
     """Return who an agent is, what it may do, an example, and how the tools are used."""
-    system, *example = Prompt(briefing).messages("")[: Prompt.STABLE]
+    prompt = Prompt(briefing)
+    system, *example = prompt.messages("")[: prompt.stable]
     shown = "\n\n".join(message.content for message in example)
     return f"{system.content}\n\n# Example\n{shown}\n\n{HOW}\n"
 

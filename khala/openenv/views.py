@@ -29,7 +29,8 @@ def view_of(seen: Seen, *, briefed: bool) -> AgentView:
 
 
 def _briefing(briefing: Briefing) -> list[ChatTurn]:
-    stable = Prompt(briefing).messages("")[: Prompt.STABLE]
+    prompt = Prompt(briefing)
+    stable = prompt.messages("")[: prompt.stable]
     return [ChatTurn(role=message.role, content=message.content) for message in stable]
 
 

@@ -12,7 +12,11 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.client import Request
+
+
+_REFUSED = frozenset({"minimum", "maximum", "minItems", "maxItems"})
 
 
 class _Answer(AnswerBody):
@@ -49,10 +53,16 @@ class Anthropic(HttpClient[_Answer]):
                 is_marked = place == marks - 1
                 content = _cached_content(message.content) if is_marked else self._content(message, request.pictures)
                 turns.append({"role": message.role, "content": content})
-        body: dict[str, Any] = {"model": self.model, **self._fields, "messages": turns}
+        body: dict[str, Any] = {"model": self.model, **self._fields_for(request), "messages": turns}
         if system:
             body["system"] = _cached_content(system) if marks else system
         return body
+
+    def _shape(self, shape: AnswerShape) -> dict[str, Any]:
+        if shape.schema:
+            return {"output_config": {"format": {"type": "json_schema", "schema": _without_limits(shape.schema)}}}
+        tools = ((tool.name, tool.description, tool.parameters) for tool in shape.tools)
+        return {"tools": [dict(zip(("name", "description", "input_schema"), tool, strict=True)) for tool in tools]}
 
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
         return {"type": "image", "source": {"type": "base64", "media_type": media_type, "data": data}}
@@ -86,6 +96,13 @@ class Anthropic(HttpClient[_Answer]):
             cache_write_tokens=kept,
             cost_usd=self._prices.cost_usd(prompt=prompt, completion=written, cached=cached, cache_write=kept),
         )
+
+
+def _without_limits(schema: object) -> object:
+    """Return a schema without the limits of numbers and lists, which the API refuses."""
+    if isinstance(schema, dict):
+        return {name: _without_limits(value) for name, value in schema.items() if name not in _REFUSED}
+    return [_without_limits(value) for value in schema] if isinstance(schema, list) else schema
 
 
 def _cached_content(text: str) -> list[dict[str, Any]]:

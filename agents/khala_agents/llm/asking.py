@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from pydantic import JsonValue, SecretStr
 
+    from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import ChatMessage, Usage
@@ -121,7 +122,7 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
             return Completion("", finish=verdict, verdict=verdict, reason=reason)
         if answer.status != OK:
             raise answer.error
-        completion = self._read(answer)
+        completion = self._read(answer, tools_offered=bool(request.shape and request.shape.tools))
         self._remark(request, completion)
         return completion
 
@@ -139,7 +140,11 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
 
     @abstractmethod
     def _body(self, request: Request) -> dict[str, Any]:
-        """Return the body of a request, with `self._fields` in it."""
+        """Return the body of a request, with `self._fields_for` it."""
+
+    @abstractmethod
+    def _shape(self, shape: AnswerShape) -> dict[str, Any]:
+        """Return the fields of a request that hold its answer to a form."""
 
     @abstractmethod
     def _take_apart(self, body: AnswerBodyT, url: str) -> AnswerParts:
@@ -158,6 +163,11 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         """The role of the system message, if it can change."""
         return None
 
+    def _fields_for(self, request: Request) -> dict[str, Any]:
+        """Return the fields of a request beside its model and messages, without those that the endpoint refuses."""
+        shape = self._shape(request.shape) if request.shape else {}
+        return {**self.quirks.fit(shape), **self._fields}
+
     def _content(self, message: ChatMessage, pictures: Mapping[str, bytes]) -> str | list[dict[str, Any]]:
         """Return the content of a message: its text, behind its pictures if it has any, each under its title."""
         if not message.images:
@@ -168,14 +178,14 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
             parts.append(self._picture(image.media_type, b64encode(pictures[image.sha256]).decode()))
         return [*parts, {"type": "text", "text": message.content}]
 
-    def _read(self, answer: HttpAnswer) -> Completion:
+    def _read(self, answer: HttpAnswer, *, tools_offered: bool) -> Completion:
         """Return the completion in an answer, or raise an `LLMError`."""
         try:
             body = self.ANSWER.model_validate_json(without_byte_order_mark(answer.body))
         except ValidationError:
             raise no_completion(answer.url, answer.body, self.CALLED) from None
         parts = self._take_apart(body, answer.url)
-        judged = judge(parts)
+        judged = judge(parts, tools_offered=tools_offered)
         return Completion(
             text=judged.text,
             usage=self._usage(body.usage),

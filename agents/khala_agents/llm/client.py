@@ -31,6 +31,7 @@ from khala_protocol.messages import ChatMessage, Usage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.verdict import Verdict
     from khala_agents.llm.vision import Vision
     from khala_protocol.messages import Purpose
@@ -82,6 +83,7 @@ class Request:
         attempt: number of this try for this decision, from 1.
         pictures: bytes of all images that the messages name, by their hashes.
         stable: number of messages at the front that other requests of the episode begin with, too, for caches.
+        shape: the form that the endpoint must hold the answer to; None for free text.
         delivery: how far it came.
     """
 
@@ -91,6 +93,7 @@ class Request:
     attempt: int = 1
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     stable: int = 0
+    shape: AnswerShape | None = None
     delivery: Departure = field(default_factory=Departure)
 
 

@@ -5,7 +5,7 @@ A row of `khala_agents.llm.profiles` says how an endpoint differs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack, cast
 
 from pydantic import BaseModel, Field
 
@@ -18,6 +18,7 @@ from khala_protocol.messages import Usage
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.client import Request
     from khala_agents.llm.profiles import Profile
     from khala_agents.llm.quirks import SystemRole
@@ -112,7 +113,22 @@ class OpenAICompatible(HttpClient[_Answer]):
             }
             for message in prompt
         ]
-        return {"model": self.model, **self._fields, "messages": messages}
+        return {"model": self.model, **self._fields_for(request), "messages": messages}
+
+    def _shape(self, shape: AnswerShape) -> dict[str, Any]:
+        if shape.schema:
+            named = {"name": "answer", "strict": True, "schema": shape.schema}
+            return {"response_format": {"type": "json_schema", "json_schema": named}}
+        if shape.tools:
+            functions = (
+                {"name": tool.name, "description": tool.description, "parameters": tool.parameters}
+                for tool in shape.tools
+            )
+            return {"tools": [{"type": "function", "function": function} for function in functions]}
+        field: Any = shape.grammar
+        for name in reversed(self._profile.grammar_field):
+            field = {name: field}
+        return cast("dict[str, Any]", field)
 
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
         return {"type": "image_url", "image_url": {"url": f"data:{media_type};base64,{data}", "detail": self._detail}}

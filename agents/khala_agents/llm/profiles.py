@@ -45,6 +45,7 @@ class Profile:
         reasoning_path: where in `usage` the number of reasoning tokens stands.
         needs_key: whether it requires a key.
         image_tokens: how it counts pictures, for models that see.
+        grammar_field: where in a request a grammar stands; () for an endpoint that takes none.
     """
 
     length_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
@@ -55,6 +56,7 @@ class Profile:
     reasoning_path: tuple[str, ...] = ("completion_tokens_details", "reasoning_tokens")
     needs_key: bool = False
     image_tokens: TokenRule = QWEN
+    grammar_field: tuple[str, ...] = ()
 
 
 PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
@@ -71,9 +73,9 @@ PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
         "deepseek": Profile(cached_path=("prompt_cache_hit_tokens",), seed=False, needs_key=True),
         "glm": Profile(seed=False, needs_key=True),
         "openrouter": Profile(needs_key=True),
-        "vllm": Profile(),
+        "vllm": Profile(grammar_field=("structured_outputs", "grammar")),
         "ollama": Profile(),
-        "llamacpp": Profile(),
+        "llamacpp": Profile(grammar_field=("grammar",)),
         "litellm": Profile(),
         "scripted": Profile(image_tokens=OPENAI),
         "compatible": Profile(),

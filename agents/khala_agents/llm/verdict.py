@@ -51,7 +51,7 @@ class AnswerParts:
         refusal: the words with which the model declined, in a place of their own.
         thoughts: its reasoning, in a place of its own, if that could be the answer.
         reasoned: whether it reasoned in any other place.
-        tools: the tools that it called, in words (`tool_words`); none are offered.
+        tools: the tools that it called, in words (`tool_words`).
         limit: of generated tokens, None for none.
     """
 
@@ -81,8 +81,8 @@ def tool_words(name: object, arguments: object) -> str:
     return json.dumps({"name": str(name), "arguments": arguments or {}}, ensure_ascii=False)
 
 
-def judge(said: AnswerParts) -> AnswerJudgement:
-    """Return what became of an answer."""
+def judge(said: AnswerParts, *, tools_offered: bool = False) -> AnswerJudgement:
+    """Return what became of an answer to a request that offered tools or not."""
     text = scrub("\n".join(filter(None, (said.text, *said.tools))))
     finish = said.finish.lower()
     if finish in FILTERED:
@@ -98,7 +98,7 @@ def judge(said: AnswerParts) -> AnswerJudgement:
     if words:
         if _declines(words):
             return AnswerJudgement(text, "refused", f"the model declined: {excerpt(words)}")
-        return AnswerJudgement(text, reason=_TOOLS if said.tools else "")
+        return AnswerJudgement(text, reason=_TOOLS if said.tools and not tools_offered else "")
     return _wordless(said, text, finish)
 
 

@@ -76,7 +76,9 @@ class Action(Frozen):
     @functools.cached_property
     def spec(self) -> ActionSpec:
         """The action as an agent's briefing describes it."""
-        return ActionSpec(name=self.name, args=self.args, description=self.about)
+        return ActionSpec(
+            name=self.name, args=self.args, description=self.about, actors=self.actor_count, target=self.target
+        )
 
     def fits(self, unit_type: str) -> bool:
         """Return True if units of this type have it."""

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Point
 
-MOST_TAGS = 12
-"""Tags that are listed for an action at most; the first ones."""
 MOST_POINTS = 5
 """Places that are listed for an action at most; the nearest ones."""
 TUMOR = "Build_CreepTumor_screen"
@@ -187,6 +185,6 @@ def _written(
     return ValidArguments(
         action=action.name,
         units=tuple(map(hex, units or ())),
-        tags=tuple(map(hex, (tags or ())[:MOST_TAGS])),
+        tags=tuple(map(hex, tags or ())),
         points=tuple(points or ()),
     )

@@ -17,6 +17,10 @@ class ActionSpec(Frozen):
     name: str
     args: tuple[Literal["tag", "screen", "minimap"], ...] = ()
     description: str = ""
+    actors: int = 0
+    """How many of its first arguments name the units that carry it out."""
+    target: Literal["enemy", "own"] | None = None
+    """Whose unit its last tag names; None for anybody's."""
 
     @property
     def form(self) -> str:
@@ -136,7 +140,7 @@ class ValidArguments(Frozen):
     units: tuple[str, ...] = ()
     """Tags of the units that can carry it out; () for every unit of the team."""
     tags: tuple[str, ...] = ()
-    """Tags of targets that will do, the first ones of many; () for every enemy, or every other unit, on the screen."""
+    """Tags of targets that will do; () for every enemy, or every other unit, on the screen."""
     points: tuple[Point, ...] = ()
     """Some points of the screen that will do; () if every place on the map does."""
 

@@ -1,8 +1,8 @@
 """One pass over a reply, from mark to mark and never back.
 
-Above it: `khala_protocol.speech`, which lists the rules (S1 to S40). Below: `headings`, `calls`, `arguments`,
-`quoting`, `objects` and `tools`, each of which reads one kind of thing at one place, `echoes`, which knows what repeats
-the prompt, and `said`, which decides what counts.
+Above it: `khala_protocol.speech`, which lists the rules (S1 to S42). Below: `headings`, `calls`, `arguments`,
+`quoting`, `objects` and `tools`, each of which reads one kind of thing at one place, `document`, which reads a reply
+that is JSON as a whole, `echoes`, which knows what repeats the prompt, and `said`, which decides what counts.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from khala_protocol.speech.calls import (
     segment_end,
     stands_alone,
 )
+from khala_protocol.speech.document import document_of
 from khala_protocol.speech.echoes import NOTHING_SHOWN, ShownText, has_arguments, is_form
 from khala_protocol.speech.headings import (
     JSON_KEY,
@@ -50,7 +51,7 @@ from khala_protocol.speech.headings import (
     tag_heading_at,
 )
 from khala_protocol.speech.marks import QUOTES, SHORT, MalformedCall, to_ascii, unescape
-from khala_protocol.speech.objects import TEAMS, ObjectCall, ObjectMessage, object_at
+from khala_protocol.speech.objects import TEAMS, ObjectCall, ObjectMessage, call_of, message_of, object_at
 from khala_protocol.speech.quoting import MessageReader
 from khala_protocol.speech.said import Forget, Gathering, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.standing import numbers_in, standing_at
@@ -58,9 +59,10 @@ from khala_protocol.speech.tools import BEGINS, item_at, tool_at
 from khala_protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from khala_protocol.messages import Point
+    from khala_protocol.speech.document import Part
     from khala_protocol.speech.quoting import Addressed
 
     Said: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke
@@ -142,6 +144,8 @@ _LOOKED_BACK = 24
 _OF_WORDS = MESSAGE_NAMES | {NOTE, STANDING}
 """Names of calls whose words are no list of arguments."""
 _DIRECTLY_ABOVE = 80
+_UNTIL = re.compile(r"(?:until\s+)?(?:revoked?\b.*)?", re.IGNORECASE)
+"""What may stand before the end of a standing order, and the end that it has anyway."""
 
 
 class _Walk:
@@ -165,10 +169,27 @@ class _Walk:
         self._team_end = -_DIRECTLY_ABOVE
 
     def run(self) -> None:
+        document = document_of(self._text)
+        if document is not None and self._read_document(document.parts):
+            return
         at = self._line(0)
         while place := _MAY_BEGIN.search(self._plain, at):
             mark = _NEXT.match(self._plain, place.start())
             at = place.end() if mark is None else _READS[str(mark.lastgroup)](self, mark)
+
+    def _read_document(self, parts: Sequence[Part]) -> bool:  # S41
+        """Read a reply that is JSON as a whole; return False if an item of it is something else."""
+        read = [(part, found) for part in parts if (found := _of_part(part)) is not None]
+        if len(read) < len(parts):
+            return False
+        for part, found in read:
+            self._section = ReplySection.ACTIONS if part.kind == "orders" else ReplySection.COMMUNICATIONS
+            if isinstance(found, ObjectCall):
+                self._add_object(found, part.start)
+            else:
+                self._add(found, self._section, part.start)
+        self.gathering.headed |= {ReplySection.ACTIONS, ReplySection.COMMUNICATIONS}
+        return True
 
     @cached_property
     def _last_comment_end(self) -> int:
@@ -307,7 +328,12 @@ class _Walk:
 
     def _add_object(self, called: ObjectCall, start: int) -> None:
         try:
-            self._add_call(called.name, called.args, start, called.end, team=called.team)
+            if is_talk(called.name):
+                self._listen(start, called.end, called.name, ", ".join(map(str, called.args)))
+            elif called.until is None or called.name.lower() in (FORGET, NOTE, REVOKE, STANDING):
+                self._add_call(called.name, called.args, start, called.end, team=called.team)
+            else:  # S42
+                self._stand(called.name, called.args, called.until, start, called.end, team=called.team)
         except MalformedCall as error:
             self._fault(start, called.end, called.name, str(error))
 
@@ -406,9 +432,11 @@ class _Walk:
         self._add(Note(text, start, found.end), ReplySection.NONE, start)
         return found.end
 
-    def _stand(self, name: str, args: tuple[str | Point, ...], until: str, start: int, end: int) -> None:
-        call = Call(name=name, args=args, team=self._team, start=start, end=end)
-        self._add(Standing(call, until, start, end), ReplySection.ACTIONS, start)
+    def _stand(
+        self, name: str, args: tuple[str | Point, ...], until: str, start: int, end: int, *, team: str | None = None
+    ) -> None:
+        call = Call(name=name, args=args, team=team or self._team, start=start, end=end)
+        self._add(Standing(call, _UNTIL.sub("", until), start, end), ReplySection.ACTIONS, start)
 
     def _message(self, start: int, found: Addressed) -> int:
         text = unescape(self._text[found.start : found.stop])
@@ -490,6 +518,23 @@ class _Walk:
     def _section_at(self, start: int) -> ReplySection:
         """Return the section at this place."""
         return ReplySection.ANALYSIS if start < self._aside_until else self._section
+
+
+def _of_part(part: Part) -> Said | ObjectCall | None:
+    """Return what an item of a document stands for; None if it is something else."""
+    match part.kind, part.content:
+        case "orders", dict(content):
+            return call_of(content, part.end, in_orders=True)
+        case "messages", dict(content):
+            if found := message_of(content, part.end):
+                return MessageTo(found.recipient, found.text, part.start, found.end)
+        case "listen", str(channel):
+            return ListenTo(channel.strip(), part.start, part.end)
+        case "notes", str(text):
+            return Note(text.strip(), part.start, part.end)
+        case ("forget" | "revoke") as kind, int(number):
+            return (Forget if kind == "forget" else Revoke)(number, part.start, part.end)
+    return None
 
 
 _READS: dict[str, Callable[[_Walk, re.Match[str]], int]] = {

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 from khala_protocol.messages import MAX_REPLY_CHARACTERS
+from khala_protocol.speech.document import document_of
 from khala_protocol.speech.headings import ReplySection, heading_at
 from khala_protocol.speech.marks import to_ascii
 
@@ -20,6 +21,8 @@ def thought_of(reply: str) -> str:
 
     A reasoning block belongs to it. It is all of the reply if there is no such heading.
     """
+    if document := document_of(reply):
+        return document.analysis.strip()
     text = to_ascii(reply[:MAX_REPLY_CHARACTERS])
     reasoned = _REASONED.search(text)
     begin = 0

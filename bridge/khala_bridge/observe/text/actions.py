@@ -9,10 +9,14 @@ from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2, n, point, under_heading
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from khala_bridge.observe.text.page import Page
     from khala_protocol.messages import ActionCost, TeamView
+
+
+MOST_TAGS = 12
+"""Tags that are listed for an action at most; the first ones."""
 
 
 @section("valid_actions")
@@ -39,10 +43,16 @@ def _will_do(team: TeamView) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for argument in team.arguments:
         parts = [f"unit {' or '.join(argument.units)}"] if argument.units else []
-        parts += [f"tag {' or '.join(argument.tags)}"] if argument.tags else []
+        parts += [f"tag {_first(argument.tags)}"] if argument.tags else []
         parts += [f"a place such as {' or '.join(map(point, argument.points))}"] if argument.points else []
         found.setdefault("; ".join(parts), []).append(argument.action)
     return found
+
+
+def _first(tags: Sequence[str]) -> str:
+    """Return the first of many tags, and how many there are beside them."""
+    others = f" or {len(tags) - MOST_TAGS} others" if len(tags) > MOST_TAGS else ""
+    return " or ".join(tags[:MOST_TAGS]) + others
 
 
 def _offers(page: Page) -> Iterable[ActionCost]:

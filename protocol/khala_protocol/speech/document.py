@@ -1,0 +1,137 @@
+"""A reply that is one object of JSON as a whole: the form that `answer: json` asks models for.
+
+    {
+      "analysis": "Two Zerglings are in reach.",
+      "orders": [
+        {"team": "Stalker-1", "action": "Attack_Unit", "tag": "0x1008c0001"},
+        {"team": "Nexus-1", "action": "Train_Probe", "until": "22 Probe"}
+      ],
+      "messages": [{"to": "Commander", "text": "two Roaches"}],
+      "listen": ["Channel-2"], "notes": ["their base is at [20, 9]"], "forget": [1], "revoke": [2]
+    }
+
+The keys say what is meant, so that nothing in the analysis or in a message can pass for an order. A text that is not
+such an object as a whole, one that was cut among them, is read from mark to mark instead, as any other.
+Above it: `khala_protocol.speech.reader`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Kind: TypeAlias = Literal["orders", "messages", "listen", "notes", "forget", "revoke"]
+
+_BEGIN = re.compile(r"(?:.*</think(?:ing)?>)?\s*(?:```(?:json)?\s*)?(?=\{)", re.DOTALL | re.IGNORECASE)
+_END = re.compile(r"\s*(?:```)?\s*")
+_BLANK = re.compile(r"\s*")
+_DECODER = json.JSONDecoder()
+_KINDS: Final[dict[str, Kind]] = {
+    "orders": "orders",
+    "actions": "orders",
+    "messages": "messages",
+    "communications": "messages",
+    "listen": "listen",
+    "notes": "notes",
+    "forget": "forget",
+    "revoke": "revoke",
+}
+_TEXTS = frozenset({"analysis", "thought", "thoughts", "reasoning"})
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One item of a list of the object: its kind, its content, and its place in the reply."""
+
+    kind: Kind
+    content: object
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """The content of such an object: its analysis, and the items of its lists."""
+
+    analysis: str
+    parts: tuple[Part, ...]
+
+
+def document_of(reply: str) -> Document | None:
+    """Return the content of a reply that is such an object; None for any other reply."""
+    begin = _BEGIN.match(reply)
+    if begin is None:
+        return None
+    try:
+        document, end = _read(reply, begin.end())
+    except (ValueError, RecursionError):
+        return None
+    return document if _END.fullmatch(reply, end) else None
+
+
+def _read(text: str, at: int) -> tuple[Document, int]:
+    """Return the content of the object that begins here, and the offset after it.
+
+    Raises:
+        ValueError: it is not closed, or has a key that is none of ours.
+    """
+    analysis = ""
+    parts: list[Part] = []
+    has_lists = False
+    for key, value_at in _members(text, at + 1):
+        if key is None:
+            if not has_lists:
+                raise ValueError
+            return Document(analysis, tuple(parts)), value_at
+        if key in _KINDS and text.startswith("[", value_at):
+            has_lists = True
+            parts += (Part(_KINDS[key], *item) for item in _items(text, value_at + 1))
+        elif key in _TEXTS:
+            analysis = str(_DECODER.raw_decode(text, value_at)[0])
+        else:
+            raise ValueError
+    raise ValueError
+
+
+def _members(text: str, at: int) -> Iterator[tuple[str | None, int]]:
+    """Yield the keys of an object, each with the offset of its value; at the end None, with the offset after it."""
+    at = _skip(text, at)
+    while text[at : at + 1] != "}":
+        key, at = _DECODER.raw_decode(text, at)
+        at = _skip(text, at)
+        if not isinstance(key, str) or text[at : at + 1] != ":":
+            raise ValueError
+        at = _skip(text, at + 1)
+        yield key.casefold(), at
+        at = _next(text, _DECODER.raw_decode(text, at)[1], "}")
+    yield None, at + 1
+
+
+def _items(text: str, at: int) -> Iterator[tuple[object, int, int]]:
+    """Yield the items of a list, each with the offsets before and after it."""
+    at = _skip(text, at)
+    while text[at : at + 1] != "]":
+        item, end = _DECODER.raw_decode(text, at)
+        yield item, at, end
+        at = _next(text, end, "]")
+
+
+def _next(text: str, at: int, close: str) -> int:
+    """Return the offset of what follows behind a comma, or of the end."""
+    at = _skip(text, at)
+    if text[at : at + 1] == close:
+        return at
+    if text[at : at + 1] != ",":
+        raise ValueError
+    return _skip(text, at + 1)
+
+
+def _skip(text: str, at: int) -> int:
+    blank = _BLANK.match(text, at)
+    assert blank is not None
+    return blank.end()
