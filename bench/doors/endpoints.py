@@ -186,7 +186,7 @@ QUIRKS: Final[tuple[Quirk, ...]] = (
     Quirk("reasoning that is not closed", completion(f"<think>{ORDERS}", "length"), Expected("cut", words=("99",))),
     Quirk("nothing at all", completion(None), Expected("empty", words=("said nothing",))),
     Quirk("a thought and nothing else", completion("<think>hm</think>"), Expected("empty", words=("thought",))),
-    Quirk("tools that nobody offered", completion(None, tool_calls=[TOOL]), Expected("empty", words=("Attack_Unit",))),
+    Quirk("tools that nobody offered", completion(None, tool_calls=[TOOL]), Expected("ok", words=("called tools",))),
     Quirk(
         "a refusal in its own field",
         completion(None, refusal="I will not."),

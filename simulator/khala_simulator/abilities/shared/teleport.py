@@ -83,14 +83,14 @@ def within(world: World, slot: int, point: Point, reach: float) -> Point:
 
 
 def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int]:
-    """Put new units of the maker's owner where they fit around it; return their slots."""
+    """Put new units of the maker's owner where they fit around it, facing as it does; return their slots."""
     x, y = world.pos[maker].tolist()
     owner = int(world.owner[maker])
-    facing = float(geometry.facing(world.heading[maker : maker + 1])[0])
-    return [
-        lifecycle.spawn(world, unit, owner, place, facing)
-        for place in placement.free_places(world, unit, (x, y), count)
+    made = [
+        lifecycle.spawn(world, unit, owner, place) for place in placement.free_places(world, unit, (x, y), count)
     ]
+    world.heading[made] = world.turret[made] = world.heading[maker]
+    return made
 
 
 def live_until(world: World, slot: int, loop: float) -> None:
