@@ -74,6 +74,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("environments.openenv", "docs/how-to/openenv.md", "figures"),
         Benchmark("simulator.simulator_memory", "The simulator", "table"),
         Benchmark("language.recognition", "Accuracy of the parser", "table"),
+        Benchmark("language.forms", "Forms of answers"),
         Benchmark("turns.image", "Observations and actions", "table"),
         Benchmark("turns.http_client", "agents/khala_agents/llm/transport.py", "table"),
         Benchmark("survival.orphans", "Survival", "table"),

@@ -20,17 +20,18 @@ from khala_agents.llm.verdict import tool_words
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_protocol.messages import (
     ActionSpec,
+    Briefing,
     Call,
     Contact,
     MemoryRule,
     NoteView,
+    TeamSpec,
     TeamView,
     UnitView,
     ValidArguments,
     View,
 )
 from khala_protocol.speech import parse, written
-from tests.agents.conftest import briefing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,12 +68,22 @@ VIEW = View(
     ),
     notes=(NoteView(number=3, time_s=0, text="x"),),
 )
-TOLD = briefing(
-    correspondents=(Contact(name="Commander"),), channels=("Channel-1",), memory=MemoryRule(notes=2), standing_orders=2
+TOLD = Briefing(
+    run="test",
+    agent="Zealots",
+    side="blue",
+    episode=0,
+    role="You command.",
+    teams=(TeamSpec(name="Zealot-1", unit_types=("Zealot",)), TeamSpec(name="Zealot-2", unit_types=("Zealot",))),
+    actions=(ATTACK, MOVE, LOAD, BUILD),
+    correspondents=(Contact(name="Commander"),),
+    channels=("Channel-1",),
+    memory=MemoryRule(notes=2),
+    standing_orders=2,
 )
 
 
-def samples(schema: dict[str, Any], chance: random.Random, definitions: dict[str, Any]) -> Any:  # noqa: PLR0911
+def samples(schema: dict[str, Any], chance: random.Random, definitions: dict[str, Any]) -> Any:
     """Return a value that a schema of ours allows."""
     if "$ref" in schema:
         return samples(definitions[schema["$ref"].rpartition("/")[2]], chance, definitions)
@@ -147,10 +158,6 @@ def test_all_that_a_schema_allows_is_read_as_it_is_meant(choices: Choices) -> No
         once = [order for order in answer["orders"] if order["until"] is None]
         assert [(call.team, call.name) for call in speech.calls] == [(each["team"], each["action"]) for each in once]
         assert len(speech.standing) == len(answer["orders"]) - len(once) + len(answer["revoke"])
-        assert {call.args for call in speech.calls if call.name == "Attack_Unit"} <= {
-            ("0x21",),
-            ("0x0",),
-        } or choices.notes == ()
         orders += len(once)
     assert orders > 50
 

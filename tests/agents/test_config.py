@@ -33,7 +33,21 @@ KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY")
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("name", ["anthropic", "deepseek", "ollama", "openai", "scripted", "vllm"])
+SHIPPED = [
+    "anthropic",
+    "deepseek",
+    "gemini",
+    "llamacpp",
+    "lmstudio",
+    "ollama",
+    "openai",
+    "openrouter",
+    "scripted",
+    "vllm",
+]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_model_file_makes_a_client(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for variable in KEYS:
         monkeypatch.setenv(variable, "sk-0123456789")
@@ -44,7 +58,7 @@ def test_a_shipped_model_file_makes_a_client(name: str, monkeypatch: pytest.Monk
 
 
 def test_every_shipped_model_file_is_tried() -> None:
-    assert sorted(model_files()) == ["anthropic", "deepseek", "ollama", "openai", "scripted", "vllm"]
+    assert sorted(model_files()) == SHIPPED
 
 
 def test_the_shipped_agents_file_makes_policies() -> None:

@@ -64,10 +64,10 @@ def _together(arguments: Sequence[Argument]) -> Argument:
     points = dict.fromkeys(point for argument in arguments for point in argument.points)
     bounds = [argument.bounds for argument in arguments if argument.bounds is not None]
     free = any(not (argument.points if argument.bounds else argument.tags) for argument in arguments)
-    around = tuple(pick(sides) for pick, sides in zip((min, min, max, max), zip(*bounds, strict=True), strict=True))
+    sides = list(zip(*bounds, strict=True))
     return replace(
         arguments[0],
         tags=() if free else tuple(tags),
         points=() if free else tuple(points),
-        bounds=(around[0], around[1], around[2], around[3]) if bounds else None,
+        bounds=(min(sides[0]), min(sides[1]), max(sides[2]), max(sides[3])) if bounds else None,
     )

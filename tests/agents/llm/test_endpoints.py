@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import random
 import socket
 import tracemalloc
@@ -14,6 +15,7 @@ import pytest
 from aiohttp import web
 from pydantic import SecretStr
 
+from khala_agents.answers.form import AnswerShape, Tool
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import (
     Completion,
@@ -33,6 +35,7 @@ from khala_agents.scripted.canned import Canned, Given
 from khala_agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
 from khala_agents.scripted.faults import InjectedFaults
 from khala_protocol.messages import ChatMessage, Usage
+from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
     from khala_agents.llm.client import LLMClient
@@ -269,6 +272,54 @@ async def test_a_request_is_sent_as_the_profile_says(profile: Profile, params: d
         ],
     }
     assert model.params == {**params, "top_p": 0.9}, "what is recorded"
+
+
+SCHEMA = {"type": "object", "properties": {"n": {"type": "array", "items": {"type": "number", "minimum": 0}}}}
+STOP = Tool("Stop", "Stand still.", {"type": "object", "properties": {}})
+NAMED = {"name": "answer", "strict": True, "schema": SCHEMA}
+FUNCTION = {"name": "Stop", "description": "Stand still.", "parameters": STOP.parameters}
+SHAPES: list[tuple[Any, AnswerShape, dict[str, Any]]] = [
+    ("openai", AnswerShape(schema=SCHEMA), {"response_format": {"type": "json_schema", "json_schema": NAMED}}),
+    ("openai", AnswerShape(tools=(STOP,)), {"tools": [{"type": "function", "function": FUNCTION}]}),
+    ("llamacpp", AnswerShape(grammar="root ::= x"), {"grammar": "root ::= x"}),
+    ("vllm", AnswerShape(grammar="root ::= x"), {"structured_outputs": {"grammar": "root ::= x"}}),
+]
+
+
+@pytest.mark.parametrize(("profile", "shape", "fields"), SHAPES)
+async def test_the_form_of_an_answer_is_asked_for_as_the_endpoint_wants_it(
+    profile: Any, shape: AnswerShape, fields: dict[str, Any]
+) -> None:
+    async with Recorder() as server:
+        model = OpenAICompatible(PROFILES[profile], model="m", base_url=server.base_url, prices=PRICES)
+        await model.complete(Request(PROMPT, timeout_s=10, shape=shape))
+        await model.close()
+    ((_, _, body),) = server.requests
+    assert {name: value for name, value in body.items() if name not in ("model", "messages")} == fields
+
+
+async def test_anthropic_gets_schemas_without_limits_and_tools_in_its_form() -> None:
+    answer = {"content": [{"type": "tool_use", "name": "Stop", "input": {"team": "A"}}], "stop_reason": "tool_use"}
+    async with Recorder(answer) as server:
+        model = Anthropic(model="m", base_url=server.base_url, prices=PRICES)
+        await model.complete(Request(PROMPT, timeout_s=10, shape=AnswerShape(schema=SCHEMA)))
+        completion = await model.complete(Request(PROMPT, timeout_s=10, shape=AnswerShape(tools=(STOP,))))
+        await model.close()
+    (_, _, by_schema), (_, _, by_tools) = server.requests
+    assert "minimum" not in json.dumps(by_schema["output_config"])
+    assert by_tools["tools"] == [{"name": "Stop", "description": "Stand still.", "input_schema": STOP.parameters}]
+    assert parse(completion.text).calls[0].team == "A"
+    assert completion.reason == "", "the tools were offered"
+
+
+async def test_a_form_that_an_endpoint_refuses_is_left_out() -> None:
+    refusal = {"error": {"message": "Unsupported parameter: 'response_format'"}}
+    async with Recorder(refusal, 400) as server:
+        model = OpenAICompatible(PROFILES["openai"], model="no schemas", base_url=server.base_url, prices=PRICES)
+        with pytest.raises(RequestRefused):
+            await model.complete(Request(PROMPT, timeout_s=10, shape=AnswerShape(schema=SCHEMA)))
+        await model.close()
+    assert ["response_format" in body for _, _, body in server.requests] == [True, False]
 
 
 async def test_no_key_sends_no_authorization() -> None:
