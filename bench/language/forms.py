@@ -143,7 +143,3 @@ def main() -> None:
         print(json.dumps([asdict(each) for each in found]))
     else:
         show(found)
-
-
-if __name__ == "__main__":
-    main()

@@ -25,6 +25,7 @@ from khala_protocol.messages import (
     Contact,
     MemoryRule,
     NoteView,
+    Point,
     TeamSpec,
     TeamView,
     UnitView,
@@ -113,7 +114,7 @@ def calls(text: str) -> list[tuple[Any, ...]]:
 
 def test_an_order_means_the_same_as_text_json_and_tool() -> None:
     chance = random.Random(5)
-    values = {"tag": "0x1002c0001", "screen": (3.5, 12.0), "minimap": (31.0, 22.0)}
+    values: dict[str, str | Point] = {"tag": "0x1002c0001", "screen": (3.5, 12.0), "minimap": (31.0, 22.0)}
     for action in catalogue().values():
         spec = action.spec
         team_name = chance.choice(["Zealot-1", "Main base", "Gruppe 3"])

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 from khala_agents.config import AgentsFile, ModelConfig
 
-KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY")
+KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY", "OPENROUTER_API_KEY")
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -80,7 +80,7 @@ def test_an_answer_that_is_no_completion_shows_no_part_of_a_key(kind: type[OpenA
     model = kind(model="m", base_url="http://localhost/v1", prices=Prices(), key=None, **options)
     for before in range(210):
         with pytest.raises(MalformedCompletion) as caught:
-            model._read(HttpAnswer(model.endpoint, 200, {}, b"x" * before + KEY.encode()))
+            model._read(HttpAnswer(model.endpoint, 200, {}, b"x" * before + KEY.encode()), tools_offered=False)
         assert "sk-" not in str(caught.value)
         assert "x" * min(before, 70) in str(caught.value)
 

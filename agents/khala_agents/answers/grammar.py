@@ -72,8 +72,8 @@ class _Rules:
         if argument.points:
             return self._rule("place", _any(map(written_point, argument.points)))
         x0, y0, x1, y1 = argument.bounds
-        across, down = (self._rule("number", _numbers(low, high)) for low, high in ((x0, x1), (y0, y1)))
-        return f'"[" {across} ", " {down} "]"'
+        across = self._rule("number", _numbers(x0, x1))
+        return f'"[" {across} ", " {self._rule("number", _numbers(y0, y1))} "]"'
 
     def _lines(self) -> Iterator[str]:
         """Yield what may stand under communications, without the brackets around it."""
@@ -99,10 +99,13 @@ class _Rules:
 
 
 def _numbers(low: float, high: float) -> str:
-    """Return numbers from one to another one, with a tenth or without."""
-    first, last = -int(-low // 1), int(high)
-    below = [str(number) for number in range(first, last)]
-    return f'({_any(below)} ("." [0-9])? | "{last}")' if below else f'"{last}"'
+    """Return numbers in a range, with a tenth or without."""
+    first = -int(-low // 1)
+    last = int(high)
+    if first >= last:
+        return f'"{last}"'
+    below = _any(str(number) for number in range(first, last))
+    return f'({below} ("." [0-9])? | "{last}")'
 
 
 def _any(words: Iterable[str]) -> str:

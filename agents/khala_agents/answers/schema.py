@@ -1,4 +1,4 @@
-"""An agent's choices → a JSON schema of its answer, which `khala_protocol.speech.document` reads.
+"""An agent's choices → a JSON schema of its answer, which `khala_protocol.speech.whole` reads.
 
 The schema keeps to what strict endpoints take: every property is required, there are no others, and one object is told
 from another by `anyOf`.
@@ -34,17 +34,17 @@ def answer_schema(choices: Choices) -> Schema:
         orders = [_order(choices, *alike, definitions) for alike in _alike(choices)]
         fields["orders"] = {**_list({"anyOf": orders}), "maxItems": choices.most * len(choices.teams)}
     if choices.recipients:
-        fields["messages"] = _list(closed({"to": one_of(choices.recipients), "text": TEXT}))
+        fields["messages"] = _list(object_with({"to": one_of(choices.recipients), "text": TEXT}))
     if choices.channels:
         fields["listen"] = _list(one_of(choices.channels))
     if choices.keeps_notes:
         fields |= {"notes": _list(TEXT), "forget": _list(NUMBER)}
     if choices.stands:
         fields["revoke"] = _list(NUMBER)
-    return {**closed(fields), "$defs": definitions} if definitions else closed(fields)
+    return {**object_with(fields), "$defs": definitions} if definitions else object_with(fields)
 
 
-def closed(fields: Mapping[str, Schema]) -> Schema:
+def object_with(fields: Mapping[str, Schema]) -> Schema:
     """Return the schema of an object with exactly these fields."""
     return {"type": "object", "properties": dict(fields), "required": list(fields), "additionalProperties": False}
 
@@ -64,7 +64,7 @@ def argument_schema(argument: Argument) -> Schema:
     across, down = ({"type": "number", "minimum": low, "maximum": high} for low, high in ((x0, x1), (y0, y1)))
     if across == down:
         return {"type": "array", "items": across, "minItems": 2, "maxItems": 2}
-    return closed({"x": across, "y": down})
+    return object_with({"x": across, "y": down})
 
 
 def written_point(point: Point) -> str:
@@ -88,13 +88,13 @@ def _order(
     definitions: dict[str, Schema],
 ) -> Schema:
     fields = {"team": one_of(teams), "action": one_of(names)}
-    fields |= {argument.name: _shared(argument_schema(argument), definitions) for argument in arguments}
+    fields |= {argument.name: _refer(argument_schema(argument), definitions) for argument in arguments}
     if choices.stands:
         fields["until"] = UNTIL
-    return closed(fields)
+    return object_with(fields)
 
 
-def _shared(schema: Schema, definitions: dict[str, Schema]) -> Schema:
+def _refer(schema: Schema, definitions: dict[str, Schema]) -> Schema:
     """Return a reference to the schema of many tags, which stands in several orders: endpoints count each value."""
     if len(schema.get("enum", ())) < len("AB"):
         return schema

@@ -6,7 +6,6 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from khala_agents.answers.choices import argument_names
-from khala_protocol.speech import Forget, Note, Revoke, Standing, parse, thought_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -54,6 +53,8 @@ def in_json(reply: str, actions: Iterable[ActionSpec]) -> str:
         reply: the text.
         actions: that may occur in it.
     """
+    from khala_protocol.speech import Forget, Note, Revoke, Standing, parse, thought_of  # noqa: PLC0415  # slow to load
+
     known = {action.name: action for action in actions}
     speech = parse(reply)
     standing = [said for said in speech.standing if isinstance(said, Standing)]

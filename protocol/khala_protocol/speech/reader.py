@@ -1,7 +1,7 @@
 """One pass over a reply, from mark to mark and never back.
 
 Above it: `khala_protocol.speech`, which lists the rules (S1 to S42). Below: `headings`, `calls`, `arguments`,
-`quoting`, `objects` and `tools`, each of which reads one kind of thing at one place, `document`, which reads a reply
+`quoting`, `objects` and `tools`, each of which reads one kind of thing at one place, `whole`, which reads a reply
 that is JSON as a whole, `echoes`, which knows what repeats the prompt, and `said`, which decides what counts.
 """
 
@@ -38,7 +38,6 @@ from khala_protocol.speech.calls import (
     segment_end,
     stands_alone,
 )
-from khala_protocol.speech.document import document_of
 from khala_protocol.speech.echoes import NOTHING_SHOWN, ShownText, has_arguments, is_form
 from khala_protocol.speech.headings import (
     JSON_KEY,
@@ -56,14 +55,15 @@ from khala_protocol.speech.quoting import MessageReader
 from khala_protocol.speech.said import Forget, Gathering, ListenTo, MessageTo, Note, Revoke, Speech, Standing
 from khala_protocol.speech.standing import numbers_in, standing_at
 from khala_protocol.speech.tools import BEGINS, item_at, tool_at
+from khala_protocol.speech.whole import json_reply_of
 from khala_protocol.speech.words import NEGATION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from khala_protocol.messages import Point
-    from khala_protocol.speech.document import Part
     from khala_protocol.speech.quoting import Addressed
+    from khala_protocol.speech.whole import Part
 
     Said: TypeAlias = Call | MessageTo | ListenTo | Note | Forget | Standing | Revoke
 
@@ -169,15 +169,15 @@ class _Walk:
         self._team_end = -_DIRECTLY_ABOVE
 
     def run(self) -> None:
-        document = document_of(self._text)
-        if document is not None and self._read_document(document.parts):
+        document = json_reply_of(self._text)
+        if document is not None and self._read_json_reply(document.parts):
             return
         at = self._line(0)
         while place := _MAY_BEGIN.search(self._plain, at):
             mark = _NEXT.match(self._plain, place.start())
             at = place.end() if mark is None else _READS[str(mark.lastgroup)](self, mark)
 
-    def _read_document(self, parts: Sequence[Part]) -> bool:  # S41
+    def _read_json_reply(self, parts: Sequence[Part]) -> bool:  # S41
         """Read a reply that is JSON as a whole; return False if an item of it is something else."""
         read = [(part, found) for part in parts if (found := _of_part(part)) is not None]
         if len(read) < len(parts):

@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 
 from khala_protocol.messages import MAX_REPLY_CHARACTERS
-from khala_protocol.speech.document import document_of
 from khala_protocol.speech.headings import ReplySection, heading_at
 from khala_protocol.speech.marks import to_ascii
+from khala_protocol.speech.whole import json_reply_of
 
 _REASONED = re.compile(r"</\s*+(?:think(?:ing)?|thoughts?|reasoning)\s*+>|\[/THINK\]|◁/think▷", re.IGNORECASE)
 _LINE = re.compile(r"^", re.MULTILINE)
@@ -21,7 +21,7 @@ def thought_of(reply: str) -> str:
 
     A reasoning block belongs to it. It is all of the reply if there is no such heading.
     """
-    if document := document_of(reply):
+    if document := json_reply_of(reply):
         return document.analysis.strip()
     text = to_ascii(reply[:MAX_REPLY_CHARACTERS])
     reasoned = _REASONED.search(text)

@@ -55,14 +55,14 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Document:
+class JsonReply:
     """The content of such an object: its analysis, and the items of its lists."""
 
     analysis: str
     parts: tuple[Part, ...]
 
 
-def document_of(reply: str) -> Document | None:
+def json_reply_of(reply: str) -> JsonReply | None:
     """Return the content of a reply that is such an object; None for any other reply."""
     begin = _BEGIN.match(reply)
     if begin is None:
@@ -74,7 +74,7 @@ def document_of(reply: str) -> Document | None:
     return document if _END.fullmatch(reply, end) else None
 
 
-def _read(text: str, at: int) -> tuple[Document, int]:
+def _read(text: str, at: int) -> tuple[JsonReply, int]:
     """Return the content of the object that begins here, and the offset after it.
 
     Raises:
@@ -87,7 +87,7 @@ def _read(text: str, at: int) -> tuple[Document, int]:
         if key is None:
             if not has_lists:
                 raise ValueError
-            return Document(analysis, tuple(parts)), value_at
+            return JsonReply(analysis, tuple(parts)), value_at
         if key in _KINDS and text.startswith("[", value_at):
             has_lists = True
             parts += (Part(_KINDS[key], *item) for item in _items(text, value_at + 1))
