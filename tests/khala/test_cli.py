@@ -419,7 +419,7 @@ def test_the_doctor_says_which_endpoint_goes_through_which_proxy_and_what_is_tru
     _, out = tell(capsys, "doctor", "--json")
     found = {finding["name"]: finding["found"] for finding in json.loads(out)["findings"]}
     assert found["proxy"] == "http://proxy.example:3128 (ALL_PROXY) for anthropic, gemini, openai, openrouter, vllm"
-    assert found["no proxy"] == "for deepseek, ollama, scripted"
+    assert found["no proxy"] == "for deepseek, llamacpp, lmstudio, ollama, scripted"
     assert found["trusted certificates"] == f"REQUESTS_CA_BUNDLE={tmp_path}"
     assert "hidden" not in out
     monkeypatch.setenv("ALL_PROXY", "socks4://proxy.example:1080")

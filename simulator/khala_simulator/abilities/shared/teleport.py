@@ -86,9 +86,7 @@ def beside(world: World, maker: int, unit: UnitType, count: int = 1) -> list[int
     """Put new units of the maker's owner where they fit around it, facing as it does; return their slots."""
     x, y = world.pos[maker].tolist()
     owner = int(world.owner[maker])
-    made = [
-        lifecycle.spawn(world, unit, owner, place) for place in placement.free_places(world, unit, (x, y), count)
-    ]
+    made = [lifecycle.spawn(world, unit, owner, place) for place in placement.free_places(world, unit, (x, y), count)]
     world.heading[made] = world.turret[made] = world.heading[maker]
     return made
 
