@@ -13,7 +13,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, JsonValue, field_validator, model_validator
 
-from khala_agents.answers.form import AnswerRule
+from khala_agents.answers.form import AnswerForm, AnswerRule
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.limits import LimitRules
@@ -186,13 +186,18 @@ class ModelConfig(Frozen):
         needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
         if needs_key and self.api_key_env is None:
             raise ValueError(f"{self.profile} needs a key: name the environment variable that holds it in api_key_env")
-        takes_grammars = self.profile != "anthropic" and PROFILES[self.profile].grammar_field
-        if self.answer.form == "grammar" and not takes_grammars:
+        if self.answer.form not in self.forms:
             takers = " and ".join(name for name, profile in PROFILES.items() if profile.grammar_field)
             raise ValueError(f"{self.profile} takes no grammar: {takers} do; write `answer: json` or `answer: tools`")
         if self.profile == "anthropic" and self.system_role is not None:
             raise ValueError("system_role is for chat completions: Anthropic's messages have a field for it")
         return self
+
+    @property
+    def forms(self) -> tuple[AnswerForm, ...]:
+        """The forms that its endpoint can hold an answer to."""
+        takes_grammars = self.profile != "anthropic" and PROFILES[self.profile].grammar_field
+        return ("text", "json", "tools", "grammar") if takes_grammars else ("text", "json", "tools")
 
     @property
     def secrets(self) -> tuple[str, ...]:

@@ -11,7 +11,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_agents.answers.wording import how_to_answer_in_json, how_to_answer_with_tools, in_json
+from khala_agents.answers.wording import (
+    EXAMPLE_POINTS,
+    GOES_ON,
+    how_to_answer_in_json,
+    how_to_answer_with_tools,
+    in_json,
+)
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
@@ -33,7 +39,6 @@ if TYPE_CHECKING:
 
 EXAMPLE_TAGS = ("0xe0001", "0xe0002")
 """Tags of the example; a game's own tags are longer, so that a copied one is noticed at once."""
-_EXAMPLE_VALUES = {"screen": "[14.5, 9]", "minimap": "[31, 22]"}
 
 
 class Prompt:
@@ -213,7 +218,7 @@ def _format(briefing: Briefing) -> str:
     lines += [
         'Then write "Actions:", and under it a line "Team <name>:" for each team that shall act, named as observed.',
         "Below it write the actions of that team, each as <Name(arguments)> on a line of its own.",
-        "A team that you do not mention goes on with what it is doing.",
+        GOES_ON,
     ]
     if briefing.correspondents or briefing.channels:
         lines.append('If you have something to say to others, end with "Communications:" and the messages.')
@@ -277,5 +282,5 @@ def _example_teams(briefing: Briefing) -> dict[str, list[ActionSpec]]:
 
 def _example_call(action: ActionSpec) -> str:
     tags = iter(EXAMPLE_TAGS)
-    values = [next(tags) if kind == "tag" else _EXAMPLE_VALUES[kind] for kind in action.args]
+    values = [next(tags) if kind == "tag" else str(EXAMPLE_POINTS[kind]) for kind in action.args]
     return f"<{action.name}({', '.join(values)})>"

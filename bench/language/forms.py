@@ -25,7 +25,6 @@ from khala.playing.local import play
 from khala.playing.minds import Minds
 from khala_agents.answers.form import AnswerForm
 from khala_agents.config import load_model
-from khala_agents.llm.profiles import PROFILES
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import ModelCall, Observation, Reply, count_refusals
 from khala_protocol.recording import Recording
@@ -55,13 +54,6 @@ class FormFigures:
     """A reply, on average, as the endpoint counted them."""
     answer_tokens: float
     seconds: float
-
-
-def forms_of(model: str) -> list[str]:
-    """Return the forms that the endpoint of a model file can be asked for."""
-    profile = load_model(model).profile
-    takes_grammars = profile != "anthropic" and PROFILES[profile].grammar_field
-    return [form for form in get_args(AnswerForm) if form != "grammar" or takes_grammars]
 
 
 async def measure(model: str, form: str, tasks: Sequence[str], steps: int, keep: Path | None) -> FormFigures:
@@ -137,7 +129,7 @@ def main() -> None:
     found = [
         asyncio.run(measure(model, form, options.tasks, options.steps, options.keep))
         for model in options.models
-        for form in options.forms or forms_of(model)
+        for form in options.forms or load_model(model).forms
     ]
     if options.json:
         print(json.dumps([asdict(each) for each in found]))

@@ -35,7 +35,7 @@ ALL_S = 400
 def assert_repelled(row: Row) -> None:
     assert row.tried
     assert row.succeeded == 0, row
-    assert row.steps > 2, row  # the match went on; a busy machine plays few in half a second
+    assert row.steps > 5, row
     assert row.slowest_ms < 1000 * ANSWER_S + 500, row  # a busy machine is late with it, too
 
 

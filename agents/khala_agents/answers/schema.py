@@ -6,6 +6,7 @@ from another by `anyOf`.
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 Schema = dict[str, Any]
 
+NO_FIELDS: Final[Mapping[str, Schema]] = MappingProxyType({})
 ANY_TAG: Final[Schema] = {"type": "string", "pattern": "^0x[0-9a-f]+$"}
 TEXT: Final[Schema] = {"type": "string"}
 NUMBER: Final[Schema] = {"type": "integer"}
@@ -44,9 +46,10 @@ def answer_schema(choices: Choices) -> Schema:
     return {**object_with(fields), "$defs": definitions} if definitions else object_with(fields)
 
 
-def object_with(fields: Mapping[str, Schema]) -> Schema:
-    """Return the schema of an object with exactly these fields."""
-    return {"type": "object", "properties": dict(fields), "required": list(fields), "additionalProperties": False}
+def object_with(fields: Mapping[str, Schema], optional: Mapping[str, Schema] = NO_FIELDS) -> Schema:
+    """Return the schema of an object with these fields, perhaps the optional ones, and no others."""
+    properties = {**fields, **optional}
+    return {"type": "object", "properties": properties, "required": list(fields), "additionalProperties": False}
 
 
 def one_of(words: Iterable[str]) -> Schema:

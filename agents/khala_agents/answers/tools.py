@@ -9,13 +9,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from khala_agents.answers.form import Tool
-from khala_agents.answers.schema import NUMBER, TEXT, UNTIL, argument_schema, one_of
+from khala_agents.answers.schema import NUMBER, TEXT, UNTIL, argument_schema, object_with, one_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from khala_agents.answers.choices import Argument, Choices, Option
-    from khala_agents.answers.schema import Schema
 
 
 def tools_for(choices: Choices) -> tuple[Tool, ...]:
@@ -33,29 +32,20 @@ def _actions(choices: Choices) -> Iterator[Tool]:
         for arguments in zip(*(option.arguments for option in options), strict=True):
             fields[arguments[0].name] = argument_schema(_together(arguments))
         optional = {"until": {**UNTIL, "type": "string"}} if choices.stands else {}
-        yield Tool(name, options[0].action.description, _parameters(fields, optional))
+        yield Tool(name, options[0].action.description, object_with(fields, optional))
 
 
 def _talk(choices: Choices) -> Iterator[Tool]:
     if choices.recipients:
         fields = {"to": one_of(choices.recipients), "text": TEXT}
-        yield Tool("MessageTo", "Send a text to an agent or a channel.", _parameters(fields))
+        yield Tool("MessageTo", "Send a text to an agent or a channel.", object_with(fields))
     if choices.channels:
-        yield Tool("ListenTo", "Hear a channel from now on.", _parameters({"channel": one_of(choices.channels)}))
+        yield Tool("ListenTo", "Hear a channel from now on.", object_with({"channel": one_of(choices.channels)}))
     if choices.keeps_notes:
-        yield Tool("Note", "Keep a note for yourself, of at most 200 characters.", _parameters({"text": TEXT}))
-        yield Tool("Forget", "Remove the note of this number.", _parameters({"number": NUMBER}))
+        yield Tool("Note", "Keep a note for yourself, of at most 200 characters.", object_with({"text": TEXT}))
+        yield Tool("Forget", "Remove the note of this number.", object_with({"number": NUMBER}))
     if choices.stands:
-        yield Tool("Revoke", "End the standing order of this number.", _parameters({"number": NUMBER}))
-
-
-def _parameters(fields: dict[str, Schema], optional: dict[str, Schema] | None = None) -> Schema:
-    return {
-        "type": "object",
-        "properties": {**fields, **(optional or {})},
-        "required": list(fields),
-        "additionalProperties": False,
-    }
+        yield Tool("Revoke", "End the standing order of this number.", object_with({"number": NUMBER}))
 
 
 def _together(arguments: Sequence[Argument]) -> Argument:

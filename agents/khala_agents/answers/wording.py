@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import ActionSpec, Briefing, Call
 
-_GOES_ON = "A team that you do not mention goes on with what it is doing."
+GOES_ON = "A team that you do not mention goes on with what it is doing."
+EXAMPLE_POINTS = {"screen": [14.5, 9], "minimap": [31, 22]}
 
 
 def how_to_answer_in_json(briefing: Briefing) -> str:
@@ -35,14 +36,14 @@ def how_to_answer_in_json(briefing: Briefing) -> str:
         lines.append('- "notes": texts to keep for yourself; "forget": numbers of notes to remove.')
     if briefing.standing_orders:
         lines.append('- "revoke": numbers of standing orders to end.')
-    return "\n".join([*lines, *([_GOES_ON] if briefing.teams else [])])
+    return "\n".join([*lines, *([GOES_ON] if briefing.teams else [])])
 
 
 def how_to_answer_with_tools(briefing: Briefing) -> str:
     """Return how to answer with calls of tools."""
     orders = " Each order is a call of its action's tool; give all of them in this answer." if briefing.teams else ""
     talk = " MessageTo sends a message." if briefing.correspondents or briefing.channels else ""
-    goes_on = f"\n{_GOES_ON}" if briefing.teams else ""
+    goes_on = f"\n{GOES_ON}" if briefing.teams else ""
     return f"Write a few sentences on what matters now, and call tools.{orders}{talk}{goes_on}"
 
 
@@ -81,7 +82,7 @@ def _order(call: Call, known: Mapping[str, ActionSpec]) -> dict[str, Any]:
 
 
 def _sample_order(briefing: Briefing) -> str:
-    samples = {"tag": "0x…", "unit": "0x…", "second_unit": "0x…", "screen": [14.5, 9], "minimap": [31, 22]}
+    samples = {"tag": "0x…", "unit": "0x…", "second_unit": "0x…", **EXAMPLE_POINTS}
     action = next((action for action in briefing.actions if action.args), briefing.actions[0])
     given = {name: samples[name] for name, _ in argument_names(action)}
     return json.dumps({"team": briefing.teams[0].name, "action": action.name, **given}, ensure_ascii=False)

@@ -61,8 +61,11 @@ class Anthropic(HttpClient[_Answer]):
     def _shape(self, shape: AnswerShape) -> dict[str, Any]:
         if shape.schema:
             return {"output_config": {"format": {"type": "json_schema", "schema": _without_limits(shape.schema)}}}
-        tools = ((tool.name, tool.description, tool.parameters) for tool in shape.tools)
-        return {"tools": [dict(zip(("name", "description", "input_schema"), tool, strict=True)) for tool in tools]}
+        tools = [
+            {"name": tool.name, "description": tool.description, "input_schema": tool.parameters}
+            for tool in shape.tools
+        ]
+        return {"tools": tools}
 
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
         return {"type": "image", "source": {"type": "base64", "media_type": media_type, "data": data}}

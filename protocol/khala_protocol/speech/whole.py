@@ -20,10 +20,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import Final, Literal, TypeAlias
 
 Kind: TypeAlias = Literal["orders", "messages", "listen", "notes", "forget", "revoke"]
 
@@ -83,42 +80,42 @@ def _read(text: str, at: int) -> tuple[JsonReply, int]:
     analysis = ""
     parts: list[Part] = []
     has_lists = False
-    for key, value_at in _members(text, at + 1):
-        if key is None:
-            if not has_lists:
-                raise ValueError
-            return JsonReply(analysis, tuple(parts)), value_at
-        if key in _KINDS and text.startswith("[", value_at):
+    at = _skip(text, at + 1)
+    while text[at : at + 1] != "}":
+        key, at = _key(text, at)
+        if key in _KINDS and text.startswith("[", at):
             has_lists = True
-            parts += (Part(_KINDS[key], *item) for item in _items(text, value_at + 1))
+            items, at = _items(text, at, _KINDS[key])
+            parts += items
         elif key in _TEXTS:
-            analysis = str(_DECODER.raw_decode(text, value_at)[0])
+            value, at = _DECODER.raw_decode(text, at)
+            analysis = str(value)
         else:
             raise ValueError
-    raise ValueError
+        at = _next(text, at, "}")
+    if not has_lists:
+        raise ValueError
+    return JsonReply(analysis, tuple(parts)), at + 1
 
 
-def _members(text: str, at: int) -> Iterator[tuple[str | None, int]]:
-    """Yield the keys of an object, each with the offset of its value; at the end None, with the offset after it."""
+def _key(text: str, at: int) -> tuple[str, int]:
+    """Return the key of an object that begins here, in lower case, and the offset of its value."""
+    key, at = _DECODER.raw_decode(text, at)
     at = _skip(text, at)
-    while text[at : at + 1] != "}":
-        key, at = _DECODER.raw_decode(text, at)
-        at = _skip(text, at)
-        if not isinstance(key, str) or text[at : at + 1] != ":":
-            raise ValueError
-        at = _skip(text, at + 1)
-        yield key.casefold(), at
-        at = _next(text, _DECODER.raw_decode(text, at)[1], "}")
-    yield None, at + 1
+    if not isinstance(key, str) or text[at : at + 1] != ":":
+        raise ValueError
+    return key.casefold(), _skip(text, at + 1)
 
 
-def _items(text: str, at: int) -> Iterator[tuple[object, int, int]]:
-    """Yield the items of a list, each with the offsets before and after it."""
-    at = _skip(text, at)
+def _items(text: str, at: int, kind: Kind) -> tuple[list[Part], int]:
+    """Return the items of the list that begins here, and the offset after it."""
+    items: list[Part] = []
+    at = _skip(text, at + 1)
     while text[at : at + 1] != "]":
         item, end = _DECODER.raw_decode(text, at)
-        yield item, at, end
+        items.append(Part(kind, item, at, end))
         at = _next(text, end, "]")
+    return items, at + 1
 
 
 def _next(text: str, at: int, close: str) -> int:

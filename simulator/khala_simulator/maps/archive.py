@@ -71,18 +71,18 @@ def read_archive(data: bytes, path: str) -> GameMap:
             return known
         raise
     digest = content + name.encode()
+    archive = _open(data)
     if known is not None and not known.scenario.melee and known.terrain.size == terrain.size:
-        return game_map(_with_data(known.scenario, data), terrain, digest)
+        return game_map(_with_data(known.scenario, archive), terrain, digest)
     try:
-        melee = _melee(_member(_open(data), OBJECTS), name, terrain.size)
-        return game_map(_with_data(melee, data), terrain, digest)
+        melee = _melee(_member(archive, OBJECTS), name, terrain.size)
+        return game_map(_with_data(melee, archive), terrain, digest)
     except MapError as error:
         raise ArchiveError(str(error)) from error
 
 
-def _with_data(scenario: Scenario, data: bytes) -> Scenario:
+def _with_data(scenario: Scenario, archive: Any) -> Scenario:
     """Return a scenario with the data set of the mods that an archive depends on, where it names any."""
-    archive = _open(data)
     text = next((found for name in DEPENDENCIES if (found := _find(archive, name))), b"")
     mods = frozenset(name.lower() for name in MOD.findall(text))
     return scenario.model_copy(update={"data": DATA_OF_MODS.get(mods, DEFAULT_DATA)}) if mods else scenario
