@@ -93,13 +93,21 @@ class Recipe:
     """What counts tokens for the card, see `khala.dataset.lengths`; None: Khala's estimate."""
 
 
-def card(contents: Contents, recipe: Recipe, form: RowForm) -> str:
-    """Return the README of one form."""
-    front = yaml.safe_dump(_front(contents, recipe, form), sort_keys=False)
+def card(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> str:
+    """Return the README of one form.
+
+    Args:
+        contents: what is in the data set.
+        recipe: how it was made.
+        form: of the rows.
+        fingerprint: of the files. Without it in the YAML, `datasets` takes all local data sets whose folders and files
+            have the same names for one, and gives rows of the first one from its cache.
+    """
+    front = yaml.safe_dump(_front(contents, recipe, form, fingerprint), sort_keys=False)
     return f"---\n{front}---\n\n" + "\n".join(_body(contents, recipe, form))
 
 
-def _front(contents: Contents, recipe: Recipe, form: RowForm) -> dict[str, object]:
+def _front(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> dict[str, object]:
     splits = [name for name in recipe.split.names if contents.rows[name]]
     tasks = ["text-generation", "reinforcement-learning"]
     return {
@@ -114,6 +122,7 @@ def _front(contents: Contents, recipe: Recipe, form: RowForm) -> dict[str, objec
         "configs": [
             {
                 "config_name": "default",
+                "description": f"files {fingerprint}",
                 "data_files": [{"split": name, "path": f"{name}.{form.suffix}"} for name in splits],
             }
         ],
@@ -249,9 +258,7 @@ COLUMNS: Mapping[RowForm, str] = {
 """,
 }
 
-_ONLY_LAST = (
-    "Train on the last reply alone: each decision is a row, and the replies within prompts repeat in many rows."
-)
+_ONLY_LAST = "Train on the last reply alone: the replies within a prompt are the worked example, or rows of their own."
 
 TRAINING: Mapping[RowForm, str] = {
     RowForm.OPENAI: f"""\

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import logging
 from typing import TYPE_CHECKING
 
@@ -60,9 +61,10 @@ def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
                     contents.add(split, row)
             if not contents.rows:
                 raise ConfigError(_nothing(contents), source="--only" if recipe.choice.only else None)
-            check_splits(part, recipe.formats)
+            if len(recipe.split.names) > 1:
+                check_splits(part, recipe.formats)
             for form in recipe.formats:
-                write_private(part / form / NAME, card(contents, recipe, form))
+                write_private(part / form / NAME, card(contents, recipe, form, _fingerprint(part / form)))
     except OSError as error:
         raise ConfigError(f"cannot be written, and nothing of it is kept: {error.strerror}", source=str(out)) from None
     return contents
@@ -85,6 +87,15 @@ def _new_rows(recordings: Sequence[Recording], recipe: Recipe, contents: Content
                 contents.left_out[DUPLICATE] += 1
             else:
                 yield row
+
+
+def _fingerprint(directory: Path) -> str:
+    """Return a hash of the files of a directory."""
+    digest = hashlib.sha256()
+    for path in sorted(directory.glob("*.*")):
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()[:16]
 
 
 def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[Row]:

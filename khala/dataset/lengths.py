@@ -13,7 +13,7 @@ from khala_agents.llm.client import estimated_text_tokens
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
     from khala.dataset.row import Row
 
@@ -21,7 +21,7 @@ ESTIMATE = "estimated at four bytes a token"
 TIKTOKEN = "tiktoken:"
 FIELDS = ("system", "example", "earlier steps", "observation", "reply", "row")
 """Parts of a row, in their order, and all of them."""
-_MOST_REMEMBERED = 512
+_MOST_REMEMBERED = 64
 """Texts whose number of tokens is remembered: rows of an episode share the system message and the example."""
 
 
@@ -105,7 +105,7 @@ def _tiktoken(name: str) -> TokenCounter:
     tiktoken = _import("tiktoken")
     try:
         encoding = tiktoken.get_encoding(name.removeprefix(TIKTOKEN))
-    except Exception as error:  # tiktoken raises ValueError, and what its download raises
+    except Exception as error:  # noqa: BLE001  # tiktoken raises ValueError, and what its download raises
         raise _no_tokenizer(name, error, "encodings are cl100k_base, o200k_base, …") from None
     return TokenCounter(f"counted by {name}", lambda text: len(encoding.encode(text, disallowed_special=())))
 
@@ -115,7 +115,7 @@ def _tokenizers(name: str) -> TokenCounter:
     is_file = Path(name).is_file()
     try:
         tokenizer = tokenizer_class.from_file(name) if is_file else tokenizer_class.from_pretrained(name)
-    except Exception as error:  # the package raises plain exceptions
+    except Exception as error:  # noqa: BLE001  # the package raises plain exceptions
         advice = "it is no tokenizer.json" if is_file else "it is neither a file nor a name that the hub gives"
         raise _no_tokenizer(name, error, advice) from None
     shown = Path(name).name if is_file else name

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _ROLES = {"system": "system", "human": "user", "gpt": "assistant"}
 _PICTURE = f"{PLACEHOLDER}\n"
 """In ShareGPT's form, the end of a picture; the text of a message stands after its pictures."""
-_BATCH_ROWS = 256
+_BATCH_ROWS = 32
 
 Chat = list[tuple[str, str]]
 
