@@ -17,7 +17,7 @@ from khala import __version__
 from khala.dataset.choose import ExampleRule, RowChoice, Split
 from khala.dataset.files import RowForm
 from khala.dataset.lengths import Lengths, token_counter
-from khala.dataset.repeats import Repeats
+from khala.dataset.repeats import RepeatedRows
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Contents:
     seeds: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
     """By split."""
     outcomes: Counter[str] = field(default_factory=Counter)
-    repeats: Repeats = field(default_factory=Repeats)
+    repeats: RepeatedRows = field(default_factory=RepeatedRows)
     shared: int = 0
     """Prompts that seeds (runs, tasks) of several splits have."""
     moved: int = 0

@@ -141,7 +141,7 @@ def _print(contents: "Contents", out: Path, recipe: "Recipe") -> None:
     if contents.repeats.duplicates and not recipe.dedupe:
         say(f"{contents.repeats.duplicates} rows repeat the prompt and the reply of another: --dedupe leaves them out")
     if contents.shared:
-        say(f"{contents.shared} prompts stood in several splits, and now in one each: {contents.moved} rows have moved")
+        say(f"prompts that stood in several splits, now in the first: {contents.shared}; rows moved: {contents.moved}")
     row = contents.lengths.fields()["row"]
     reply = contents.lengths.fields()["reply"]
     say(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import defaultdict
 from functools import lru_cache
+from importlib import import_module
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -102,7 +103,7 @@ def token_counter(name: str | None) -> TokenCounter:
 
 
 def _tiktoken(name: str) -> TokenCounter:
-    tiktoken = _import("tiktoken")
+    tiktoken = _import("tiktoken", "tiktoken")
     try:
         encoding = tiktoken.get_encoding(name.removeprefix(TIKTOKEN))
     except Exception as error:  # noqa: BLE001  # tiktoken raises ValueError, and what its download raises
@@ -111,7 +112,7 @@ def _tiktoken(name: str) -> TokenCounter:
 
 
 def _tokenizers(name: str) -> TokenCounter:
-    tokenizer_class = _import("tokenizers").Tokenizer
+    tokenizer_class = _import("tokenizers", '"khala[data]"').Tokenizer
     is_file = Path(name).is_file()
     try:
         tokenizer = tokenizer_class.from_file(name) if is_file else tokenizer_class.from_pretrained(name)
@@ -122,14 +123,12 @@ def _tokenizers(name: str) -> TokenCounter:
     return TokenCounter(f"counted by {shown}", lambda text: len(tokenizer.encode(text, add_special_tokens=False).ids))
 
 
-def _import(package: str) -> Any:
-    from importlib import import_module  # noqa: PLC0415
-
+def _import(package: str, wanted: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
         raise ConfigError(
-            f"needs the package {package}, which is not installed: pip install {package}; without the option, lengths "
+            f"needs the package {package}, which is not installed: pip install {wanted}. Without the option, lengths "
             "are estimated",
             source="--tokenizer",
         ) from None

@@ -36,7 +36,7 @@ def chat_digest(prompt: Iterable[ChatMessage]) -> bytes:
     return prompt_digest((message.role, message.content) for message in prompt)
 
 
-class Repeats:
+class RepeatedRows:
     """The rows that came so far.
 
     Attributes:
