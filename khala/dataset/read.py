@@ -52,9 +52,12 @@ def check_splits(directory: Path, forms: Sequence[RowForm]) -> None:
         splits: dict[bytes, str] = {}
         for path in sorted((directory / form).glob(f"*.{form.suffix}")):
             for row in read_rows(path):
-                if splits.setdefault(prompt_digest(row.prompt), path.stem) != path.stem:
-                    other = splits[prompt_digest(row.prompt)]
-                    raise RecordingError(f"{form}: the prompt of {row.place or 'a row'} is in {other} and {path.stem}")
+                other = splits.setdefault(prompt_digest(row.prompt), path.stem)
+                if other != path.stem:
+                    raise RecordingError(
+                        f"{form}: the prompt of {row.place or 'a row'} is in {other} and {path.stem}: if a match was "
+                        "still recorded, export again when it has ended"
+                    )
 
 
 def _parquet(path: Path) -> Iterator[WrittenRow]:

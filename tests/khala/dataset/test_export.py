@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 import json
@@ -16,6 +17,7 @@ import yaml
 from PIL import Image
 
 from khala.cli import main
+from khala.dataset import forms
 from khala.dataset.card import Recipe
 from khala.dataset.choose import FILTERS, Only, RowChoice, Split
 from khala.dataset.export import export
@@ -329,6 +331,18 @@ def test_without_the_worked_example_a_prompt_has_no_reply(recording: Recording, 
             {"role": "assistant", "content": row.reply, "weight": 1},
         ]
     assert "are not those that agents play with" in (tmp_path / "out" / "openai" / "README.md").read_text()
+
+
+@pytest.mark.parametrize(("write", "key"), [(forms.openai, "messages"), (forms.sharegpt, "conversations")])
+def test_replies_of_earlier_steps_have_no_weight(
+    recording: Recording, write: Callable[..., dict[str, Any]], key: str
+) -> None:
+    """As a memory of whole steps recalls them: each of them is a row of its own."""
+    row = rows_of(recording)[0]
+    system, seen, said, now = row.prompt
+    longer = dataclasses.replace(row, prompt=(system, seen, said, seen, said, now))
+    chat = write(longer, images=False)[key]
+    assert [message.get("weight") for message in chat] == [None, None, 0, None, 0, None, 1]
 
 
 @pytest.mark.slow
