@@ -14,6 +14,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from khala_protocol.messages import ChatMessage
+from khala_protocol.reasoning import END, FINAL
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 MAX_THOUGHT_CHARACTERS = 200
 """Longest first sentence of an analysis; the rest is cut."""
-_THOUGHTS_END = re.compile(r"</\s*think(?:ing)?\s*>|◁/think▷", re.IGNORECASE)
+_REASONED = re.compile(rf"{END}|{FINAL}", re.IGNORECASE)
 _SENTENCE = re.compile(r"[^\n]*?[.!?。](?=\s|$)|[^\n]*")
 
 
@@ -159,7 +160,7 @@ def end_step(step: StepInShort, observation: Observation) -> None:
 
 def first_sentence(reply: str) -> str:
     """Return the first sentence of a reply's analysis; of the reply, if it has no such heading; "" for mere calls."""
-    said = _THOUGHTS_END.split(reply)[-1]
+    said = _REASONED.split(reply)[-1]
     heading = _analysis().search(said)
     rest = said[heading.end() :] if heading else said.lstrip()
     found = _SENTENCE.match(rest)

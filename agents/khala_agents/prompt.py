@@ -63,6 +63,11 @@ class Prompt:
         """Number of messages at the front that are the same in all of them."""
         return len(self._head)
 
+    @property
+    def example(self) -> Sequence[ChatMessage]:
+        """The worked example, an observation and an answer to it; empty with `tools`."""
+        return self._head[1:]
+
     def messages(
         self,
         observation_text: str,

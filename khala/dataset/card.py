@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING
 import yaml
 
 from khala import __version__
-from khala.dataset.choose import RowChoice, Split
+from khala.dataset.choose import ExampleRule, RowChoice, Split
 from khala.dataset.files import RowForm
+from khala.dataset.lengths import Lengths, token_counter
+from khala.dataset.repeats import RepeatedRows
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
@@ -53,6 +55,12 @@ class Contents:
     seeds: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
     """By split."""
     outcomes: Counter[str] = field(default_factory=Counter)
+    repeats: RepeatedRows = field(default_factory=RepeatedRows)
+    shared: int = 0
+    """Prompts that seeds (runs, tasks) of several splits have."""
+    moved: int = 0
+    """Rows that are in another split than their seed (run, task), because they have such a prompt."""
+    lengths: Lengths = field(default_factory=lambda: Lengths(token_counter(None)))
 
     def add(self, split: str, row: Row) -> None:
         """Count a row."""
@@ -65,6 +73,7 @@ class Contents:
         self.versions.add(f"{row.game}, Khala {row.versions.get('khala', 'unknown')}")
         self.seeds[split].add(row.seed)
         self.outcomes[row.outcome] += 1
+        self.lengths.add(row)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +86,28 @@ class Recipe:
     gamma: float = 0.99
     """Discount of the reward-to-go."""
     images: bool = True
+    example: ExampleRule = "weighted"
+    dedupe: bool = False
+    """Whether a row whose prompt and reply came before is left out."""
+    tokenizer: str | None = None
+    """What counts tokens for the card, see `khala.dataset.lengths`; None: Khala's estimate."""
 
 
-def card(contents: Contents, recipe: Recipe, form: RowForm) -> str:
-    """Return the README of one form."""
-    front = yaml.safe_dump(_front(contents, recipe, form), sort_keys=False)
+def card(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> str:
+    """Return the README of one form.
+
+    Args:
+        contents: what is in the data set.
+        recipe: how it was made.
+        form: of the rows.
+        fingerprint: of the files. Without it in the YAML, `datasets` takes all local data sets whose folders and files
+            have the same names for one, and gives rows of the first one from its cache.
+    """
+    front = yaml.safe_dump(_front(contents, recipe, form, fingerprint), sort_keys=False)
     return f"---\n{front}---\n\n" + "\n".join(_body(contents, recipe, form))
 
 
-def _front(contents: Contents, recipe: Recipe, form: RowForm) -> dict[str, object]:
+def _front(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> dict[str, object]:
     splits = [name for name in recipe.split.names if contents.rows[name]]
     tasks = ["text-generation", "reinforcement-learning"]
     return {
@@ -100,6 +122,7 @@ def _front(contents: Contents, recipe: Recipe, form: RowForm) -> dict[str, objec
         "configs": [
             {
                 "config_name": "default",
+                "description": f"files {fingerprint}",
                 "data_files": [{"split": name, "path": f"{name}.{form.suffix}"} for name in splits],
             }
         ],
@@ -125,10 +148,16 @@ def _body(contents: Contents, recipe: Recipe, form: RowForm) -> Iterator[str]:
     yield from _table(("model", "rows"), models)
     yield from _table(("outcome of the episode", "rows"), contents.outcomes.most_common())
     yield "Games and versions: " + "; ".join(map(_cell, sorted(contents.versions)[:MOST_LISTED])) + ".\n"
+    yield "## Lengths\n"
+    yield from _length_words(contents)
+    yield "## Repeats\n"
+    yield from _repeat_words(contents, recipe)
     yield "## How it was made\n"
     yield from _making(contents, recipe)
     yield "## Columns\n"
     yield COLUMNS[form].format(gamma=recipe.gamma)
+    yield "## Training\n"
+    yield TRAINING[form]
     yield "## Licence\n"
     yield LICENCE
 
@@ -140,12 +169,44 @@ def _splits(contents: Contents, recipe: Recipe) -> Iterator[Sequence[object]]:
         yield name, contents.rows[name], ", ".join(map(str, seeds[:MOST_LISTED])) + more
 
 
+def _length_words(contents: Contents) -> Iterator[str]:
+    fields = contents.lengths.fields()
+    yield (
+        f"Tokens, {_cell(contents.lengths.counter.name)}: of the texts alone, without pictures and what a chat "
+        "template adds.\n"
+    )
+    yield from _table(
+        ("field", "median", "95 % have at most", "longest", "share of all"),
+        ((name, of.median, of.p95, of.longest, f"{of.share:.1%}") for name, of in fields.items()),
+    )
+    yield (
+        f"A trainer must keep more than {fields['row'].longest} tokens of a row (`max_length`, `sequence_len`, "
+        "`cutoff_len`): what it cuts is the end, where the reply is.\n"
+    )
+
+
+def _repeat_words(contents: Contents, recipe: Recipe) -> Iterator[str]:
+    repeats, by = contents.repeats, recipe.split.by
+    kept = "left out" if recipe.dedupe else "kept; `--dedupe` leaves them out"
+    yield f"* Different prompts: {repeats.prompts}."
+    yield f"* Rows whose prompt and reply came before: {repeats.duplicates}, {kept}."
+    yield f"* Prompts with several different replies: {repeats.ambiguous}, kept."
+    if len(recipe.split.names) > 1:
+        yield (
+            f"* Prompts that stood in a {by} of several splits: {contents.shared}. All their rows are in the first of "
+            f"these splits, {_plural(contents.moved, 'row')} of them away from the split of their {by}."
+        )
+        yield "* The written files were read again: no prompt stands in two splits, word for word."
+    yield ""
+
+
 def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     choice, split = recipe.choice, recipe.split
     agents = ", ".join(map(_cell, choice.agents)) or "all"
     shares = ", ".join(f"{name} {share:g}" for name, share in zip(split.names, split.shares, strict=True))
     yield f"* Filters: {', '.join(choice.only) or 'none'}. Agents: {agents}."
-    yield f"* Splits by {split.by}: {shares}. Its hash says into which a {split.by} falls, always."
+    yield f"* Splits by {split.by}: {shares}. Its hash says into which a {split.by} falls; see Repeats."
+    yield f"* Worked example in the prompts: {_EXAMPLE_WORDS[recipe.example]}."
     left_out = ", ".join(f"{reason}: {count}" for reason, count in sorted(contents.left_out.items()) if count)
     yield f"* Decisions left out: {left_out or 'none'}."
     yield f"* Prompts of {contents.rebuilt} rows were sent to no model: they are made as a model would have got them."
@@ -157,18 +218,30 @@ def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     yield ""
 
 
+_EXAMPLE_WORDS: Mapping[ExampleRule, str] = {
+    "weighted": "kept, as the agent got it; its reply is not to be trained on",
+    "none": "left out, so the prompts are not those that agents play with",
+}
+
 COLUMNS: Mapping[RowForm, str] = {
     RowForm.OPENAI: """\
 * `messages`: the prompt, and the reply as its last message, in the form of OpenAI's fine-tuning. Pictures stand in the
-  prompt as data URLs, each after its title.
+  prompt as data URLs, each after its title. `weight` is 1 for the reply, and 0 for replies within the prompt: that of
+  the worked example, and those of earlier steps.
 """,
     RowForm.SHAREGPT: """\
 * `id`: run, side, agent, episode and step of the decision.
 * `conversations`: the prompt, and the reply as the last part. `<image>` stands for a picture, after its title;
-  `< image>` is in a text that had the same word.
+  `< image>` is in a text that had the same word. `weight` is 1 for the reply, and 0 for replies within the prompt: that
+  of the worked example, and those of earlier steps.
 * `images`: the files of the pictures, in their order.
 * `task`, `seed`, `outcome` of the episode; `model` as its endpoint calls it, empty for a player without a model;
   `status` is `fallback` where another policy decided for the model.
+""",
+    RowForm.TRL: """\
+* `id`: run, side, agent, episode and step of the decision.
+* `prompt`, `completion`: messages with `role` and `content`, as TRL's conversational prompt-completion data sets have
+  them. With pictures, a `content` is a list of parts, and a part of type `image` stands for the next of `images`.
 """,
     RowForm.PARQUET: """\
 * `id`, `run`, `task`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which decision it is.
@@ -182,6 +255,25 @@ COLUMNS: Mapping[RowForm, str] = {
   next decision of its side; agents that decide in the same step share it.
 * `reward_to_go` = `reward` + {gamma:g} · `reward_to_go` of the next decision of the side, to the end of the episode.
 * `outcome`, `valid`: of the episode; `unfinished` if its recording ends before it does.
+""",
+}
+
+_ONLY_LAST = "Train on the last reply alone: the replies within a prompt are the worked example, or rows of their own."
+
+TRAINING: Mapping[RowForm, str] = {
+    RowForm.OPENAI: f"""\
+{_ONLY_LAST} OpenAI's fine-tuning obeys `weight`; Axolotl does with `message_field_training: weight`. TRL's
+`assistant_only_loss` does not know it: take the form `trl`.
+""",
+    RowForm.SHAREGPT: f"""\
+{_ONLY_LAST} LLaMA-Factory does with `mask_history: true`, Axolotl with `message_field_training: weight`.
+""",
+    RowForm.TRL: f"""\
+{_ONLY_LAST} `SFTTrainer` does so by itself with these columns. Its `max_length` is 1024 unless you set it, shorter than
+most rows: then nothing of the reply is left.
+""",
+    RowForm.PARQUET: f"""\
+{_ONLY_LAST} For TRL, take the form `trl`, which has the same ids.
 """,
 }
 

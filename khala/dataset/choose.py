@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from khala.dataset.row import Row
 
 SplitBy = Literal["seed", "run", "task"]
+ExampleRule = Literal["weighted", "none"]
+"""What becomes of the worked example: it stays in prompts, and chats give its reply the weight 0; or it is left out."""
 
 
 class Only(StrEnum):

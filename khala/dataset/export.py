@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import logging
 from typing import TYPE_CHECKING
 
 from khala.dataset.card import NAME, Contents, card
 from khala.dataset.files import Files
+from khala.dataset.lengths import Lengths, token_counter
+from khala.dataset.read import check_splits
+from khala.dataset.repeats import chat_digest, find_shared_prompts
 from khala.dataset.rows import Rows
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.files import replacing_directory, write_private
@@ -14,7 +19,7 @@ from khala_protocol.keys import Topic
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from khala.dataset.card import Recipe
@@ -22,6 +27,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+DUPLICATE = "duplicate"
+"""Why a row is left out whose prompt and reply came before."""
 LOST = ".lost-"
 """In the name of a recording that a whole one stands beside, see `khala.playing.hosting`."""
 
@@ -39,34 +46,67 @@ def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
         RecordingError: a named file is no recording.
     """
     _require_empty(out)
-    contents = Contents()
+    contents = Contents(lengths=Lengths(token_counter(recipe.tokenizer)))
     recordings = list(_open_each(sources, contents))
+    shared = _shared_prompts(recordings, recipe)
+    contents.shared = len(shared)
     try:
         with replacing_directory(out) as part:
             with Files(part, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
-                for recording in recordings:
-                    for row in _rows(recording, recipe, contents):
-                        split = recipe.split.part(row)
-                        files.write(split, row)
-                        contents.add(split, row)
+                for row in _new_rows(recordings, recipe, contents):
+                    own = recipe.split.part(row)
+                    split = shared.get(chat_digest(row.prompt), own)
+                    contents.moved += split != own
+                    files.write(split, row)
+                    contents.add(split, row)
             if not contents.rows:
                 raise ConfigError(_nothing(contents), source="--only" if recipe.choice.only else None)
+            if len(recipe.split.names) > 1:
+                check_splits(part, recipe.formats)
             for form in recipe.formats:
-                write_private(part / form / NAME, card(contents, recipe, form))
+                write_private(part / form / NAME, card(contents, recipe, form, _fingerprint(part / form)))
     except OSError as error:
         raise ConfigError(f"cannot be written, and nothing of it is kept: {error.strerror}", source=str(out)) from None
     return contents
 
 
+def _shared_prompts(recordings: Sequence[Recording], recipe: Recipe) -> Mapping[bytes, str]:
+    """Read all rows, and return the split of each prompt that several splits would have."""
+    if len(recipe.split.names) == 1:
+        return {}
+    without_pictures = dataclasses.replace(recipe, images=False)
+    rows = (row for recording in recordings for row in _rows(recording, without_pictures, Contents()))
+    return find_shared_prompts(rows, recipe.split)
+
+
+def _new_rows(recordings: Sequence[Recording], recipe: Recipe, contents: Contents) -> Iterator[Row]:
+    """Yield the rows of all recordings, without duplicates if the recipe says so."""
+    for recording in recordings:
+        for row in _rows(recording, recipe, contents):
+            if contents.repeats.add(row) and recipe.dedupe:
+                contents.left_out[DUPLICATE] += 1
+            else:
+                yield row
+
+
+def _fingerprint(directory: Path) -> str:
+    """Return a hash of the files of a directory."""
+    digest = hashlib.sha256()
+    for path in sorted(directory.glob("*.*")):
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()[:16]
+
+
 def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[Row]:
-    """Yield the rows of a recording that are exported; count the other decisions."""
+    """Yield the rows of a recording that pass the filters; count the other decisions."""
     assert recording.run is not None
     rows = Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images)
     for row in rows:
         if why := recipe.choice.why_not(row):
             contents.left_out[why] += 1
         else:
-            yield row
+            yield row if recipe.example == "weighted" else row.without_example()
     contents.left_out += rows.left_out
 
 

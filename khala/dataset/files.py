@@ -29,11 +29,15 @@ class RowForm(StrEnum):
     PARQUET = "parquet"
     OPENAI = "openai"
     SHAREGPT = "sharegpt"
+    TRL = "trl"
 
     @property
     def suffix(self) -> str:
         """The end of the names of its files."""
-        return "parquet" if self is RowForm.PARQUET else "jsonl"
+        return "parquet" if self in PARQUET_FORMS else "jsonl"
+
+
+PARQUET_FORMS = frozenset({RowForm.PARQUET, RowForm.TRL})
 
 
 class Writer(Protocol):
@@ -61,7 +65,7 @@ class Files:
         self._directory, self._formats, self._images = directory, formats, images
         self._writers: dict[tuple[RowForm, str], Writer] = {}
         self._stack = ExitStack()
-        if RowForm.PARQUET in formats:
+        if PARQUET_FORMS & set(formats):
             import_pyarrow()
 
     def __enter__(self) -> Self:
@@ -122,12 +126,13 @@ class ShareGPT:
 
 
 class Parquet:
-    """All that is known of each row, with the pictures as a column that `datasets` decodes."""
+    """Rows as columns, with the pictures as a column that `datasets` decodes; here: all that is known of each row."""
 
     def __init__(self, path: Path, images: bool) -> None:
         pa, pq = import_pyarrow()
         self._pa, self._images = pa, images
-        self._schema = _schema(pa)
+        columns = self._columns(pa)
+        self._schema = pa.schema(columns.items(), metadata=_METADATA if "images" in columns else None)
         self._file = open_private(path, "xb")
         self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
         self._rows: list[dict[str, Any]] = []
@@ -135,7 +140,7 @@ class Parquet:
 
     def write(self, row: Row) -> None:
         """Take a row; rows are written in groups."""
-        self._rows.append(_plain(row, images=self._images))
+        self._rows.append(self._plain(row))
         self._bytes += sum(len(message.content) for message in row.prompt)
         self._bytes += sum(len(picture.data) for picture in row.pictures)
         if self._bytes > ROW_GROUP_BYTES or len(self._rows) == ROW_GROUP_ROWS:
@@ -145,6 +150,12 @@ class Parquet:
         """Write the last group, and end the file."""
         with self._file, closing(self._writer):
             self._flush()
+
+    def _columns(self, pa: Any) -> dict[str, Any]:
+        return _columns(pa)
+
+    def _plain(self, row: Row) -> dict[str, Any]:
+        return _plain(row, images=self._images)
 
     def _flush(self) -> None:
         rows, self._rows, self._bytes = self._rows, [], 0
@@ -156,10 +167,24 @@ class Parquet:
             self._writer.write_table(table)
 
 
+class TRL(Parquet):
+    """Prompts and completions as TRL's trainers read them."""
+
+    def _columns(self, pa: Any) -> dict[str, Any]:
+        text = pa.string()
+        content = pa.list_(pa.struct({"type": text, "text": text})) if self._images else text
+        chat = pa.list_(pa.struct({"role": text, "content": content}))
+        return {"id": text, "prompt": chat, "completion": chat, **(_picture_column(pa) if self._images else {})}
+
+    def _plain(self, row: Row) -> dict[str, Any]:
+        return forms.trl(row, images=self._images) | ({"images": _pictures(row)} if self._images else {})
+
+
 _WRITERS: dict[RowForm, Callable[[Path, bool], Writer]] = {
     RowForm.PARQUET: Parquet,
     RowForm.OPENAI: OpenAI,
     RowForm.SHAREGPT: ShareGPT,
+    RowForm.TRL: TRL,
 }
 
 
@@ -177,16 +202,27 @@ def import_pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def _schema(pa: Any) -> Any:
-    """Return the columns. The metadata say to `datasets` that the pictures are some."""
+_METADATA = {"huggingface": json.dumps({"info": {"features": {"images": [{"_type": "Image"}]}}})}
+"""Of a schema; says to `datasets` that the pictures are some."""
+
+
+def _picture_column(pa: Any) -> dict[str, Any]:
+    return {"images": pa.list_(pa.struct({"bytes": pa.binary(), "path": pa.string()}))}
+
+
+def _pictures(row: Row) -> list[dict[str, Any]]:
+    return [{"bytes": picture.data, "path": picture.file_name} for picture in row.pictures]
+
+
+def _columns(pa: Any) -> dict[str, Any]:
     text = pa.string()
     whole = pa.int64()
     number = pa.float64()
-    fields = {
+    return {
         "id": text, "run": text, "task": text, "map": text, "game": text, "seed": whole,
         "side": text, "agent": text, "episode": whole, "step": whole, "game_loop": whole,
         "prompt": pa.list_(pa.struct({"role": text, "content": text})), "prompt_recorded": pa.bool_(),
-        "images": pa.list_(pa.struct({"bytes": pa.binary(), "path": text})), "image_titles": pa.list_(text),
+        **_picture_column(pa), "image_titles": pa.list_(text),
         "reply": text, "status": text, "model": text,
         "accepted": pa.list_(text),
         "rejected": pa.list_(pa.struct({"reason": text, "message": text, "text": text, "team": text})),
@@ -195,12 +231,9 @@ def _schema(pa: Any) -> Any:
         "usage": pa.struct({"requests": whole, "prompt_tokens": whole, "completion_tokens": whole,
                             "cached_tokens": whole, "reasoning_tokens": whole, "cost_usd": number}),
     }  # fmt: skip
-    features = {"images": [{"_type": "Image"}]}
-    return pa.schema(fields.items(), metadata={"huggingface": json.dumps({"info": {"features": features}})})
 
 
 def _plain(row: Row, *, images: bool) -> dict[str, Any]:
-    pictures = row.pictures if images else ()
     same = (
         "id", "run", "task", "game", "seed", "side", "agent", "episode", "step", "game_loop", "prompt_recorded",
         "reply", "status", "model", "fate", "age_loops", "outcome", "valid",
@@ -208,8 +241,8 @@ def _plain(row: Row, *, images: bool) -> dict[str, Any]:
     return {name: getattr(row, name) for name in same} | {
         "map": row.map_name,
         "prompt": [{"role": message.role, "content": message.content} for message in row.prompt],
-        "images": [{"bytes": picture.data, "path": picture.file_name} for picture in pictures],
-        "image_titles": [picture.ref.title for picture in pictures],
+        "images": _pictures(row) if images else [],
+        "image_titles": [picture.ref.title for picture in row.pictures] if images else [],
         "accepted": list(row.accepted),
         "rejected": [
             rejection.model_dump(include={"reason", "message", "text", "team"}) for rejection in row.rejections

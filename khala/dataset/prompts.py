@@ -1,7 +1,8 @@
 """The prompt of a decision, as the policy that asks a language model makes it of a briefing and observations.
 
-Two things are the model's own and cannot be made again: a summary of the game, and a memory that an agents file gave to
-one agent. The memory of the task is there.
+A prompt is a system message, the worked example of the briefing, earlier steps that the memory recalls, and the
+observation. Two things are the model's own and cannot be made again: a summary of the game, and a memory that an agents
+file gave to one agent. The memory of the task is there.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.prompt import Prompt
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from khala_protocol.messages import Briefing, ChatMessage, Observation
 
 
@@ -33,6 +36,24 @@ class Prompter:
         text = "\n".join(filter(None, (recalled.text, observation.text)))
         return self._prompt.messages(text, recalled.messages, images=observation.images)
 
+    @property
+    def example(self) -> Sequence[ChatMessage]:
+        """The worked example of the last prompt: an observation and a reply."""
+        return self._prompt.example if self._prompt else ()
+
     def remember(self, observation: Observation, reply: str) -> None:
         """Note a step that was answered, for the prompts to come."""
         self._memory.remember(observation, reply)
+
+
+def count_example(prompt: Sequence[ChatMessage], example: Sequence[ChatMessage]) -> int:
+    """Return how many messages after the first one of a prompt are the worked example: 2, or 0 if it has none.
+
+    Only the observation of the example is compared, because the form of answers changes its reply.
+    """
+    return len(example) if example and len(prompt) > 1 and prompt[1].content == example[0].content else 0
+
+
+def without_example(prompt: tuple[ChatMessage, ...], count: int) -> tuple[ChatMessage, ...]:
+    """Return a prompt without its worked example of `count` messages."""
+    return (*prompt[:1], *prompt[1 + count :])

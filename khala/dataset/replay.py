@@ -10,38 +10,30 @@ that the data set does not have is not made.
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 from dataclasses import dataclass, field
 from functools import cache
-from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from khala.dataset.files import RowForm, import_pyarrow
-from khala.dataset.forms import PLACEHOLDER
-from khala.dataset.prompts import Prompter
+from khala.dataset.files import RowForm
+from khala.dataset.prompts import Prompter, count_example, without_example
+from khala.dataset.read import read_rows
+from khala.dataset.repeats import chat_digest, prompt_digest
 from khala_agents.policy import Decision, Policy
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
+    from khala.dataset.read import WrittenRow
     from khala_agents.policy import Context, Said
-    from khala_protocol.messages import Observation
+    from khala_protocol.messages import Briefing, Observation
 
 log = logging.getLogger(__name__)
 
 PATH, RUN = "KHALA_DATASET", "KHALA_DATASET_RUN"
-_FORMS = (RowForm.PARQUET, RowForm.SHAREGPT, RowForm.OPENAI)
+_FORMS = (RowForm.PARQUET, RowForm.TRL, RowForm.SHAREGPT, RowForm.OPENAI)
 """Folders of a data set, the one that knows most first."""
-_ROLES = {"system": "system", "human": "user", "gpt": "assistant"}
-_PICTURE = f"{PLACEHOLDER}\n"
-"""In ShareGPT's form, the end of a picture; the text of a message stands after its pictures."""
-_BATCH_ROWS = 256
-
-Chat = list[tuple[str, str]]
 
 
 class FromDataset(Policy):
@@ -67,11 +59,11 @@ class FromDataset(Policy):
     async def decide(self, context: Context) -> Said:
         """Return the reply of the data set."""
         seen = context.observation
-        prompt = digest((message.role, message.content) for message in self._prompter.messages(context.briefing, seen))
-        found = self._look_up(seen, prompt)
+        prompts = self._digests(context.briefing, seen)
+        found = self._look_up(seen, prompts)
         if found is None:
             return Decision("", "failed", "not in the data set")
-        if found.prompt != prompt and not self._warned:
+        if found.prompt not in prompts and not self._warned:
             self._warned = True
             log.warning(
                 "agent %s: from episode %d, step %d on its prompts are not those of the data set: the match has gone "
@@ -81,10 +73,16 @@ class FromDataset(Policy):
         self._prompter.remember(seen, found.text)
         return found.text
 
-    def _look_up(self, seen: Observation, prompt: bytes) -> _Reply | None:
+    def _digests(self, briefing: Briefing, seen: Observation) -> tuple[bytes, bytes]:
+        """Return the digests of the prompt with its worked example and without: a data set has the one or the other."""
+        prompt = self._prompter.messages(briefing, seen)
+        bare = without_example(prompt, count_example(prompt, self._prompter.example))
+        return chat_digest(prompt), chat_digest(bare)
+
+    def _look_up(self, seen: Observation, prompts: tuple[bytes, ...]) -> _Reply | None:
         run = seen.run if seen.run in self._replies.runs else self._run
         by_place = self._replies.by_place.get(f"{run}/{seen.side}/{seen.agent}/{seen.episode}/{seen.step}")
-        return by_place or self._replies.by_prompt.get(prompt)
+        return by_place or next(filter(None, map(self._replies.by_prompt.get, prompts)), None)
 
 
 class _Reply(NamedTuple):
@@ -107,23 +105,18 @@ class Replies:
         """The run that all replies are of; None if there are several."""
         return next(iter(self.runs)) if len(self.runs) == 1 else None
 
-    def add(self, place: str | None, prompt: Chat, text: str) -> None:
+    def add(self, row: WrittenRow) -> None:
         """Take a row.
 
         Raises:
             ConfigError: there is another reply to the same place.
         """
-        reply = _Reply(text, digest(prompt))
+        reply = _Reply(row.reply, prompt_digest(row.prompt))
         self.by_prompt.setdefault(reply.prompt, reply)
-        if place is not None:
-            if self.by_place.setdefault(place, reply) != reply:
-                raise ConfigError(f"the data set has two decisions {place}: two of its recordings have this run")
-            self.runs.add(place.partition("/")[0])
-
-
-def digest(prompt: Iterable[tuple[str, str]]) -> bytes:
-    """Return the hash of a prompt: of the roles and texts of its messages."""
-    return sha256(json.dumps(list(prompt)).encode()).digest()
+        if row.place is not None:
+            if self.by_place.setdefault(row.place, reply) != reply:
+                raise ConfigError(f"the data set has two decisions {row.place}: two of its recordings have this run")
+            self.runs.add(row.place.partition("/")[0])
 
 
 @cache
@@ -136,8 +129,8 @@ def replies_of(path: Path) -> Replies:
     replies = Replies()
     try:
         for file in _files(path):
-            for place, prompt, text in _parquet(file) if file.suffix == ".parquet" else _json_lines(file):
-                replies.add(place, prompt, text)
+            for row in read_rows(file):
+                replies.add(row)
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", source=str(path)) from None
     except (ValueError, LookupError, TypeError, AttributeError) as error:
@@ -153,27 +146,3 @@ def _files(path: Path) -> list[Path]:
     if not files:
         raise ConfigError("holds no data set: name a directory that `khala dataset export` wrote", source=str(path))
     return files
-
-
-def _parquet(path: Path) -> Iterator[tuple[str | None, Chat, str]]:
-    _, pq = import_pyarrow()
-    file = pq.ParquetFile(path)
-    for batch in file.iter_batches(_BATCH_ROWS, columns=["id", "prompt", "reply"]):
-        for row in batch.to_pylist():
-            yield row["id"], [(message["role"], message["content"]) for message in row["prompt"]], row["reply"]
-
-
-def _json_lines(path: Path) -> Iterator[tuple[str | None, Chat, str]]:
-    with path.open(encoding="utf-8") as file:
-        for line in file:
-            row = json.loads(line)
-            if "messages" in row:
-                chat = [(message["role"], _text(message["content"])) for message in row["messages"]]
-            else:
-                chat = [(_ROLES[said["from"]], said["value"].split(_PICTURE)[-1]) for said in row["conversations"]]
-            yield row.get("id"), chat[:-1], chat[-1][1]
-
-
-def _text(content: str | list[dict[str, Any]]) -> str:
-    """Return the text of a message, which stands after its pictures."""
-    return content if isinstance(content, str) else str(content[-1]["text"])

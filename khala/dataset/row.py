@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
+
+from khala.dataset.prompts import without_example
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,6 +49,8 @@ class Row:
     prompt: tuple[ChatMessage, ...]
     prompt_recorded: bool
     """Whether a model got this prompt; otherwise it is made of the briefing and the observation."""
+    example: int
+    """How many messages after the first one are the worked example: 2 or 0."""
     pictures: tuple[RowPicture, ...]
     """Those sent with the prompt that are in the recording, in their order."""
     reply: str
@@ -66,3 +70,7 @@ class Row:
     def id(self) -> str:
         """The place of the decision, as one text."""
         return f"{self.run}/{self.side}/{self.agent}/{self.episode}/{self.step}"
+
+    def without_example(self) -> Row:
+        """Return the row with a prompt that has no worked example."""
+        return replace(self, prompt=without_example(self.prompt, self.example), example=0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala.dataset.prompts import Prompter
+from khala.dataset.prompts import Prompter, count_example
 from khala.dataset.rewards import COUNTED, UNKNOWN, rewards
 from khala.dataset.row import UNFINISHED, Row, RowPicture
 from khala_orchestrator.roster import Seat
@@ -21,7 +21,7 @@ from khala_protocol.keys import Topic
 from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from khala_protocol.messages import AgentReport, ChatMessage, Result, Run
     from khala_protocol.recording import Recorded, Recording
@@ -47,6 +47,9 @@ class _Open:
 
     seen: Observation
     prompt: tuple[ChatMessage, ...]
+    """As it is made of briefing and observation."""
+    example: Sequence[ChatMessage]
+    """Of the briefing."""
     pictures: dict[str, bytes]
     reply: Reply | None = None
     call: ModelCall | None = None
@@ -145,8 +148,10 @@ class Rows:
             return
         found = {ref.sha256: self._pictures.kept.get(ref.sha256) for ref in seen.images}
         pictures = {digest: data for digest, data in found.items() if data is not None}
-        prompt = self._prompters[seat].messages(briefing, seen)
-        self._open[DecisionPlace(seat, seen.episode, seen.step)] = _Open(seen, prompt, pictures)
+        prompter = self._prompters[seat]
+        prompt = prompter.messages(briefing, seen)
+        place = DecisionPlace(seat, seen.episode, seen.step)
+        self._open[place] = _Open(seen, prompt, prompter.example, pictures)
 
     def _answer(self, place: DecisionPlace, reply: Reply) -> None:
         decision = self._open.get(place)
@@ -180,7 +185,7 @@ class Rows:
     def _row(self, decision: _Open) -> Row:
         seen, reply, report, call = decision.seen, decision.reply, decision.report, decision.call
         assert reply is not None and report is not None
-        prompt = decision.prompt if call is None else call.prompt
+        prompt = _prompt(decision)
         result = self._results.get((seen.side, seen.episode))
         shown = [ref for message in prompt for ref in message.images if ref.sha256 in decision.pictures]
         return Row(
@@ -197,6 +202,7 @@ class Rows:
             game_loop=seen.game_loop,
             prompt=prompt,
             prompt_recorded=call is not None,
+            example=count_example(prompt, decision.example),
             pictures=tuple(RowPicture(ref, decision.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
             status=reply.status,
@@ -210,3 +216,8 @@ class Rows:
             outcome=result.outcome if result else UNFINISHED,
             valid=result.valid if result else False,
         )
+
+
+def _prompt(decision: _Open) -> tuple[ChatMessage, ...]:
+    """Return the prompt of a row: the recorded one if there is one. No other place chooses it."""
+    return decision.prompt if decision.call is None else decision.call.prompt

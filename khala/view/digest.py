@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from khala_bridge.knowledge import WORKERS, is_structure, knowledge
-from khala_protocol.messages import MOST, UnitFlag
+from khala_protocol.messages import MOST, UnitFlag, refusals_by_reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -289,4 +289,7 @@ def _several(kind: str) -> str:
 
 def _count_refused(agent: dict[str, Any]) -> int:
     """Return how many calls of an agent's report were refused."""
-    return sum(sum(said.get("others", {}).values()) or 1 for said in agent.get("rejections", ()))
+    return sum(
+        sum(refusals_by_reason(said.get("reason", ""), said.get("others", {})).values())
+        for said in agent.get("rejections", ())
+    )

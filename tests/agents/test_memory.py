@@ -16,6 +16,7 @@ from khala_agents.policy import Context, Said
 from khala_agents.prompt import system_text
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import MemoryRule, ModelCall, Received, Rejection, Usage, View
+from khala_protocol.reasoning import CHANNELS, MARKS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -86,6 +87,11 @@ def test_a_step_in_short_is_its_thought_its_messages_and_what_became_of_its_orde
 )
 def test_the_first_sentence_of_an_analysis_is_found(reply: str, sentence: str) -> None:
     assert first_sentence(reply) == sentence
+
+
+@pytest.mark.parametrize(("begin", "end"), [*MARKS, CHANNELS])
+def test_reasoning_between_any_marks_is_no_analysis(begin: str, end: str) -> None:
+    assert first_sentence(f"{begin}Hm. Perhaps.{end}Go now. Then stop.") == "Go now."
 
 
 def test_a_prompt_tells_of_notes_and_standing_orders_only_where_there_are_any(

@@ -284,8 +284,12 @@ def prompt_sha256(messages: Iterable[ChatMessage]) -> str:
 def estimated_tokens(messages: Sequence[ChatMessage], vision: Vision | None = None) -> int:
     """Return the tokens of a prompt: texts at about four bytes a token, pictures by the model's rule."""
     texts = (text for message in messages for text in (message.content, *(image.title for image in message.images)))
-    words = sum(-(-_bytes(text) // 4) for text in texts)
-    return words + (estimated_image_tokens(messages, vision) if vision else 0)
+    return sum(map(estimated_text_tokens, texts)) + (estimated_image_tokens(messages, vision) if vision else 0)
+
+
+def estimated_text_tokens(text: str) -> int:
+    """Return the tokens of a text at about four bytes a token."""
+    return -(-_bytes(text) // 4)
 
 
 def estimated_image_tokens(messages: Iterable[ChatMessage], vision: Vision) -> int:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from khala_agents.secret import excerpt, scrub
+from khala_protocol.reasoning import BEGIN, BLOCK_END, END, FINAL
 
 Verdict: TypeAlias = Literal["ok", "empty", "cut", "refused", "filtered"]
 """Whether a completion has words to play. If not: the model said nothing, it reached its limit of tokens before it said
@@ -27,10 +28,8 @@ FILTERED: Final = frozenset(
 
 _TOOLS = "the model called tools, of which none are offered; they are read as its orders"
 _CALL = re.compile(r"<\s*+[A-Za-z]\w*+\s*+\(")
-_NAMES = r"(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)"
-_END = rf"<\s*+/\s*+{_NAMES}\s*+>|\[/THINK\]|◁/think▷"
-_BLOCK = re.compile(rf"(?:<\s*+{_NAMES}\s*+>|\[THINK\]|◁think▷).*?(?:{_END}|\Z)", re.IGNORECASE | re.DOTALL)
-_BEGAN_BEFORE = re.compile(rf"\A.*(?:{_END})", re.IGNORECASE | re.DOTALL)
+_BLOCK = re.compile(rf"(?:{BEGIN}).*?(?:{BLOCK_END}|\Z)", re.IGNORECASE | re.DOTALL)
+_BEGAN_BEFORE = re.compile(rf"\A.*(?:{END}|{FINAL})", re.IGNORECASE | re.DOTALL)
 """Reasoning whose beginning stands in the prompt, as templates of some models have it."""
 _LONGEST_REFUSAL = 500
 _DECLINES = re.compile(

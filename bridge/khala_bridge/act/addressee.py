@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.vocabulary import squash
+from khala_bridge.observe.mark_digits import mark_digits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -77,8 +78,9 @@ class Addressees:
 
     def tag_called(self, digits: str) -> int | None:
         """Return the tag of the only unit in sight that these digits stand for: its tag without 0x, or its mark."""
-        meant = {tag for tag in self._tags() if digits == tag[2:] or digits in (tag[-7:-4], tag[-8:-4])}
-        return int(meant.pop(), 16) if len(meant) == 1 else None
+        tags = {int(tag, 16) for tag in self._tags()}
+        meant = [tag for tag in tags if digits == f"{tag:x}" or digits in mark_digits(tag)]
+        return meant[0] if len(meant) == 1 else None
 
     def sample_tags(self, own: int, others: int) -> Sequence[str]:
         """Return tags in sight for an example, so many of own units and then of others; nothing if there are fewer."""

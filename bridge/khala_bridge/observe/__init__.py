@@ -6,7 +6,7 @@
     events     changes since the snapshot before              chronicle   a side's memory of an episode
     offers     possible actions, and why not the others       side, landmarks   for agents of the whole side
     observation   all of this as a value                      text, image  in words; in pictures
-    feedback   the results of the last reply, and messages
+    feedback   the results of the last reply, and messages    mark_digits   parts of tags that stand for units
 
 Everything here is a function of snapshots and of agents' replies; no clock, no bus.
 """

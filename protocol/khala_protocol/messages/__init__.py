@@ -45,6 +45,7 @@ from khala_protocol.messages.to_agents import (
     RejectionReason,
     TeamSpec,
     count_refusals,
+    refusals_by_reason,
 )
 from khala_protocol.messages.to_all import (
     AgentCard,
@@ -201,4 +202,5 @@ __all__ = [
     "WarpGates",
     "Wire",
     "count_refusals",
+    "refusals_by_reason",
 ]

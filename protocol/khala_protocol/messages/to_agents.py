@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -13,8 +13,9 @@ from khala_protocol.messages.usage import Pace
 from khala_protocol.messages.view import ActionSpec, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
+R = TypeVar("R", bound=str)
 RejectionReason = Literal[
     "malformed",  # looks like a call, but is not one
     "unknown_action",  # no action of this name in the agent's catalogue
@@ -180,11 +181,16 @@ class Rejection(Frozen):
     """How many it stands for, by reason, if an observation has no room for them; else it stands for itself."""
 
 
+def refusals_by_reason(reason: R, others: Mapping[R, int]) -> Mapping[R, int]:
+    """Return how many refused calls a rejection with these fields stands for, by reason."""
+    return others or {reason: 1}
+
+
 def count_refusals(rejections: Iterable[Rejection]) -> Counter[RejectionReason]:
     """Return how many were refused, by reason."""
     found: Counter[RejectionReason] = Counter()
     for rejection in rejections:
-        found.update(rejection.others or {rejection.reason: 1})
+        found.update(refusals_by_reason(rejection.reason, rejection.others))
     return found
 
 

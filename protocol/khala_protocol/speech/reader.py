@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
+from khala_protocol import reasoning
 from khala_protocol.messages import MAX_REPLY_CHARACTERS, Call, Rejection
 from khala_protocol.speech.arguments import read_arguments
 from khala_protocol.speech.calls import (
@@ -107,20 +108,14 @@ def _incomplete(walk: _Walk, text: str, start: int, why: str) -> Speech:
     return replace(speech, faults=(*speech.faults, unread))
 
 
-_THINK = (
-    r"<\s*+{slash}\s*+(?:think(?:ing)?|thoughts?|reasoning|reflection|scratchpad)\s*+>|\[{slash}THINK\]|◁{slash}think▷"
-)
-_CHANNEL = r"<\|channel\|>\s*+"
-_THINKS = rf"{_THINK.format(slash='')}|<\|begin_of_thought\|>|{_CHANNEL}(?:analysis|commentary)\b[^<>\n]*+<\|message\|>"
-_THOUGHT = rf"{_THINK.format(slash='/')}|<\|end_of_thought\|>"
-_THINK_ENDS = re.compile(rf"{_THOUGHT}|<\|end\|>|{_CHANNEL}final\b[^<>\n]*+<\|message\|>", re.IGNORECASE)
+_BLOCK_END = re.compile(reasoning.BLOCK_END, re.IGNORECASE)
 _SPEAKER = (
     r"<\|(?:im_)?start\|>\s*+user\b|<start_of_turn>\s*+user\b|<\|user\|>|<\|start_header_id\|>\s*+user\b|\[INST\]"
 )
 _MAY_BEGIN = re.compile(r"[\n<\[◁{`|\"'.!?;。]")
 """First characters of what `_NEXT` matches; a search for one of them is ten times faster."""
 _NEXT = re.compile(
-    rf"(?P<line>\n\s*+)|(?P<thought>{_THOUGHT})|(?P<tool>{BEGINS})|(?P<think>{_THINKS})|(?P<comment><!--)"
+    rf"(?P<line>\n\s*+)|(?P<thought>{reasoning.END})|(?P<tool>{BEGINS})|(?P<think>{reasoning.BEGIN})|(?P<comment><!--)"
     rf"|(?P<speaker>{_SPEAKER})"
     r"|(?P<angle><)|(?P<object>\{)|(?P<team>\"teams?\"\s*+:)"
     r"|(?P<quoted>(?:(?<=[\[,:])|(?<=[\[,:] ))[\"'](?=[A-Z]\w*+\()|(?:(?<=:)|(?<=: )|(?<=:\*\* ))`(?=[A-Z]\w*_\w*\()"
@@ -293,7 +288,7 @@ class _Walk:
         return self._line(end.end())
 
     def thoughts(self, begin: re.Match[str]) -> int:
-        end = _THINK_ENDS.search(self._plain, begin.end())
+        end = _BLOCK_END.search(self._plain, begin.end())
         if end is not None:
             return self._line(end.end())
         reason = "the reasoning block is not closed, so nothing behind it was carried out: end it with </think>"

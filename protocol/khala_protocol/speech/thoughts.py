@@ -8,11 +8,12 @@ from __future__ import annotations
 import re
 
 from khala_protocol.messages import MAX_REPLY_CHARACTERS
+from khala_protocol.reasoning import END, FINAL
 from khala_protocol.speech.headings import ReplySection, heading_at
 from khala_protocol.speech.marks import to_ascii
 from khala_protocol.speech.whole import json_reply_of
 
-_REASONED = re.compile(r"</\s*+(?:think(?:ing)?|thoughts?|reasoning)\s*+>|\[/THINK\]|◁/think▷", re.IGNORECASE)
+_REASONED = re.compile(rf"{END}|{FINAL}", re.IGNORECASE)
 _LINE = re.compile(r"^", re.MULTILINE)
 
 

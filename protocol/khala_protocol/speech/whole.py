@@ -22,9 +22,11 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
+from khala_protocol.reasoning import END, FINAL
+
 Kind: TypeAlias = Literal["orders", "messages", "listen", "notes", "forget", "revoke"]
 
-_BEGIN = re.compile(r"(?:.*</think(?:ing)?>)?\s*(?:```(?:json)?\s*)?(?=\{)", re.DOTALL | re.IGNORECASE)
+_BEGIN = re.compile(rf"(?:.*(?:{END}|{FINAL}))?\s*(?:```(?:json)?\s*)?(?=\{{)", re.DOTALL | re.IGNORECASE)
 _END = re.compile(r"\s*(?:```)?\s*")
 _BLANK = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()

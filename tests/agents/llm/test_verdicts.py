@@ -17,6 +17,7 @@ from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.verdict import AnswerParts, judge
 from khala_agents.scripted.canned import Canned, Given, completion
 from khala_protocol.messages import ChatMessage, Usage
+from khala_protocol.reasoning import CHANNELS, MARKS
 from khala_protocol.speech import parse, render
 
 if TYPE_CHECKING:
@@ -124,6 +125,14 @@ NO_REFUSALS = [
     "I will not help this time: attack.\n<Attack_Unit(0x1)>",
     "Analysis: I can't help with that. " + "The enemy is near. " * 40,
 ]
+
+
+@pytest.mark.parametrize(("begin", "end"), [*MARKS, CHANNELS])
+def test_reasoning_between_any_marks_is_no_answer(begin: str, end: str) -> None:
+    assert judge(AnswerParts(f"{begin}{ORDERS}{end}", "stop")).verdict == "empty"
+    assert judge(AnswerParts(f"{begin}{ORDERS}", "stop")).verdict == "empty"
+    assert judge(AnswerParts(f"{ORDERS}{end}", "stop")).verdict == "empty"
+    assert judge(AnswerParts(f"{begin}hm{end}{ORDERS}", "stop")).verdict == "ok"
 
 
 @pytest.mark.parametrize("words", NO_REFUSALS)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from khala_bridge.knowledge import knowledge
 from khala_bridge.observe.image.codes import code_of
 from khala_bridge.observe.image.lettering import written
-from khala_bridge.observe.image.marks import Marked, marks_of, place
+from khala_bridge.observe.image.marks import Marked, place
+from khala_bridge.observe.mark_digits import mark_digits, marks_of
 
 
 @pytest.mark.parametrize(
@@ -33,6 +34,7 @@ def test_units_of_a_game_have_different_marks_that_stand_in_their_tags(numbers: 
     marks = marks_of(tags)
     assert len(set(marks.values())) == len(tags)
     assert all(f"{tag:x}"[:-4].endswith(mark) for tag, mark in marks.items())
+    assert all(mark in mark_digits(tag) for tag, mark in marks.items())  # what a picture shows can be read in a reply
 
 
 def test_marks_of_units_apart_stand_to_the_right_of_their_bodies() -> None:

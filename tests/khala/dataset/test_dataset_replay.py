@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from khala.dataset.card import Recipe
+from khala.dataset.export import export
 from khala.dataset.files import RowForm
 from khala.dataset.replay import FromDataset, replies_of
 from khala_agents.build import load_policy
@@ -52,6 +54,7 @@ def check_same(again: Recording, recording: Recording) -> None:
     "form",
     [
         RowForm.PARQUET,
+        pytest.param(RowForm.TRL, marks=pytest.mark.slow),
         pytest.param(RowForm.SHAREGPT, marks=pytest.mark.slow),
         pytest.param(RowForm.OPENAI, marks=pytest.mark.slow),
     ],
@@ -79,6 +82,17 @@ def test_every_form_has_every_reply(recording: Recording, data_set: Path, form: 
         assert {reply.text for reply in replies.by_prompt.values()} == set(said.values())
     else:
         assert {place: reply.text for place, reply in replies.by_place.items()} == said
+
+
+async def test_a_data_set_without_the_worked_example_is_found_by_its_prompts(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,), example="none"))
+    monkeypatch.setenv("KHALA_DATASET", str(tmp_path / "out"))
+    briefing = next(recording.of(Briefing, agent="Stalkers"))
+    first = next(recording.observations("Stalkers"))
+    said = next(reply.text for reply in recording.of(Reply) if (reply.agent, reply.step) == ("Stalkers", first.step))
+    assert await FromDataset().decide(Context(briefing, first)) == said
 
 
 async def test_what_the_data_set_does_not_have_is_no_decision(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 import json
+import shutil
 import sys
 import tracemalloc
 from types import SimpleNamespace
@@ -15,10 +17,13 @@ import yaml
 from PIL import Image
 
 from khala.cli import main
+from khala.dataset import forms
 from khala.dataset.card import Recipe
 from khala.dataset.choose import FILTERS, Only, RowChoice, Split
 from khala.dataset.export import export
 from khala.dataset.files import RowForm
+from khala.dataset.read import check_splits, read_rows
+from khala.dataset.repeats import prompt_digest
 from khala.dataset.rows import Rows
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
@@ -71,16 +76,36 @@ def test_datasets_loads_all_columns_of_parquet_and_decodes_the_pictures(
         assert [image.size for image in got["images"]] == sizes != []
 
 
-def test_datasets_loads_the_chats_in_both_forms(recording: Recording, data_set: Path, load: Callable[..., Any]) -> None:
+def test_datasets_loads_the_chats_in_each_form(recording: Recording, data_set: Path, load: Callable[..., Any]) -> None:
     expected = rows_of(recording)
     chats = load(data_set / "openai")["train"]["messages"]
     assert [chat[-1]["content"][0]["text"] for chat in chats] == [row.reply for row in expected]
     assert {tuple(said["role"] for said in chat) for chat in chats} == {
-        ("system", "user", "assistant") * 1 + ("user", "assistant")
+        ("system", "user", "assistant", "user", "assistant")
     }
+    assert {tuple(said.get("weight") for said in chat) for chat in chats} == {(None, None, 0, None, 1)}
     found = load(data_set / "sharegpt")["train"]
     assert found["id"] == [row.id for row in expected]
-    assert [chat[-1] for chat in found["conversations"]] == [{"from": "gpt", "value": row.reply} for row in expected]
+    said = [{"from": "gpt", "value": row.reply, "weight": 1} for row in expected]
+    assert [chat[-1] for chat in found["conversations"]] == said
+    assert {tuple(said.get("weight") for said in chat) for chat in found["conversations"]} == {(None, None, 0, None, 1)}
+    found = load(data_set / "trl")["train"]
+    assert found["id"] == [row.id for row in expected]
+    for got, row in zip(found, expected, strict=True):
+        assert got["completion"] == [{"role": "assistant", "content": [{"type": "text", "text": row.reply}]}]
+        assert [message["role"] for message in got["prompt"]] == [message.role for message in row.prompt]
+        kinds = [part["type"] for part in got["prompt"][-1]["content"]]
+        assert kinds == ["text", "image"] * len(row.pictures) + ["text"]
+        assert len(got["images"]) == len(row.pictures) > 0
+
+
+def test_datasets_does_not_take_one_export_for_another(
+    recording: Recording, tmp_path: Path, load: Callable[..., Any]
+) -> None:
+    """Its cache knows local data sets by the names of their folders and files, and by what their README says."""
+    for agent in ("Stalkers", "Zealots"):
+        export([recording.path], tmp_path / agent, Recipe((RowForm.PARQUET,), RowChoice(agents=(agent,))))
+        assert set(load(tmp_path / agent / "parquet")["train"]["agent"]) == {agent}
 
 
 def test_pictures_are_those_that_the_model_was_sent_byte_for_byte(recording: Recording, data_set: Path) -> None:
@@ -95,11 +120,16 @@ def test_pictures_are_those_that_the_model_was_sent_byte_for_byte(recording: Rec
     assert {path.stem for path in (data_set / "sharegpt" / "images").iterdir()} == sent
 
 
-def test_without_pictures_a_chat_is_plain_text(recording: Recording, tmp_path: Path) -> None:
-    export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,), images=False))
-    for chat, row in zip(lines(tmp_path / "out" / "openai" / "train.jsonl"), rows_of(recording), strict=True):
+def test_without_pictures_a_chat_is_plain_text(recording: Recording, tmp_path: Path, load: Callable[..., Any]) -> None:
+    export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI, RowForm.TRL), images=False))
+    completions = load(tmp_path / "out" / "trl")["train"]
+    chats = lines(tmp_path / "out" / "openai" / "train.jsonl")
+    for chat, completion, row in zip(chats, completions, rows_of(recording), strict=True):
         plain = [{"role": message.role, "content": message.content} for message in row.prompt]
-        assert chat == {"messages": [*plain, {"role": "assistant", "content": row.reply}]}
+        said = {"role": "assistant", "content": row.reply}
+        assert completion == {"id": row.id, "prompt": plain, "completion": [said]}
+        plain[2] |= {"weight": 0}
+        assert chat == {"messages": [*plain, said | {"weight": 1}]}
 
 
 @pytest.fixture
@@ -209,10 +239,7 @@ def test_seeds_of_two_recordings_go_into_their_splits(
 ) -> None:
     """The seeds 3 and 7 fall into different halves."""
 
-    def seven(sample: Any) -> list[Any]:
-        return [sample.message.but(seed=7)] if isinstance(sample.message, Run) else [sample.message]
-
-    rewritten(seven, "runs/7.mcap")
+    rewritten(other_game(7), "runs/7.mcap")
     rewritten(lambda sample: [sample.message], "runs/3.mcap")
     recipe = Recipe((RowForm.PARQUET, RowForm.OPENAI), split=Split.of("0.5,0.5", "seed"))
     export([tmp_path / "runs", tmp_path / "runs" / "3.mcap"], tmp_path / "out", recipe)
@@ -220,6 +247,126 @@ def test_seeds_of_two_recordings_go_into_their_splits(
     seeds = {name: set(found[name]["seed"]) for name in ("train", "test")}
     assert sorted(map(sorted, seeds.values())) == [[3], [7]]
     assert len(found["train"]) == len(found["test"]) == len(load(tmp_path / "out" / "openai")["test"])
+
+
+def other_game(seed: int, *, from_step: int = 0) -> Callable[[Any], list[Any]]:
+    """Return a change of the recording that makes it one of another seed, with other prompts from a step on."""
+
+    def change(sample: Any) -> list[Any]:
+        match sample.message:
+            case Run() as run:
+                return [run.but(seed=seed)]
+            case ModelCall() as call if call.step >= from_step:
+                last = call.prompt[-1].but(content=f"Another game.\n{call.prompt[-1].content}")
+                return [call.but(prompt=(*call.prompt[:-1], last))]
+            case Observation() as seen if seen.step >= from_step:
+                return [seen.but(text=f"Another game.\n{seen.text}")]
+        return [sample.message]
+
+    return change
+
+
+def test_a_prompt_of_two_splits_goes_to_the_first_of_them_and_the_card_counts_it(
+    rewritten: Rewrite, tmp_path: Path
+) -> None:
+    """The seeds 3 and 7 fall into different halves; their games begin with the same five steps of two agents."""
+    rewritten(other_game(7, from_step=5), "runs/7.mcap")
+    rewritten(lambda sample: [sample.message], "runs/3.mcap")
+    split = Split.of("0.5,0.5", "seed")
+    contents = export([tmp_path / "runs"], tmp_path / "out", Recipe(split=split))
+    assert (contents.shared, contents.moved) == (10, 10)
+    assert contents.rows["train"] == contents.rows["test"] + 20
+    for form in RowForm:
+        prompts = {
+            name: {prompt_digest(row.prompt) for row in read_rows(tmp_path / "out" / form / f"{name}.{form.suffix}")}
+            for name in split.names
+        }
+        assert prompts["train"]
+        assert prompts["test"]
+        assert not prompts["train"] & prompts["test"]
+        words = (tmp_path / "out" / form / "README.md").read_text()
+        assert "several splits: 10. All their rows are in the first of these splits, 10 rows of them away" in words
+
+
+@pytest.mark.parametrize("form", RowForm)
+def test_a_prompt_in_two_written_files_is_found(data_set: Path, tmp_path: Path, form: RowForm) -> None:
+    folder = tmp_path / form
+    shutil.copytree(data_set / form, folder)
+    check_splits(tmp_path, [form])
+    shutil.copy(folder / f"train.{form.suffix}", folder / f"test.{form.suffix}")
+    with pytest.raises(RecordingError, match=rf"{form}: the prompt of .* is in test and train"):
+        check_splits(tmp_path, [form])
+
+
+def test_duplicates_are_counted_and_left_out_if_asked(recording: Recording, rewritten: Rewrite, tmp_path: Path) -> None:
+    """The second game has the recorded prompts of the first, and the agent that asked a model answers otherwise."""
+
+    def change(sample: Any) -> list[Any]:
+        if isinstance(sample.message, Reply) and sample.message.agent == "Stalkers":
+            return [sample.message.but(text="Actions:\n")]
+        return [sample.message]
+
+    again = rewritten(change)
+    rows = rows_of(recording)
+    changed = sum(row.agent == "Stalkers" for row in rows)
+    kept = export([recording.path, again.path], tmp_path / "kept", Recipe((RowForm.OPENAI,)))
+    assert kept.rows["train"] == 2 * len(rows)
+    assert (kept.repeats.duplicates, kept.repeats.ambiguous) == (len(rows) - changed, changed)
+    recipe = Recipe((RowForm.OPENAI,), dedupe=True)
+    deduped = export([recording.path, again.path], tmp_path / "deduped", recipe)
+    assert deduped.rows["train"] == len(rows) + changed
+    assert deduped.left_out["duplicate"] == len(rows) - changed
+    words = (tmp_path / "deduped" / "openai" / "README.md").read_text()
+    assert f"reply came before: {len(rows) - changed}, left out" in words
+    assert f"several different replies: {changed}, kept" in words
+
+
+def test_without_the_worked_example_a_prompt_has_no_reply(recording: Recording, tmp_path: Path) -> None:
+    export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,), images=False, example="none"))
+    for chat, row in zip(lines(tmp_path / "out" / "openai" / "train.jsonl"), rows_of(recording), strict=True):
+        system, _, _, seen = row.prompt
+        assert chat["messages"] == [
+            {"role": "system", "content": system.content},
+            {"role": "user", "content": seen.content},
+            {"role": "assistant", "content": row.reply, "weight": 1},
+        ]
+    assert "are not those that agents play with" in (tmp_path / "out" / "openai" / "README.md").read_text()
+
+
+@pytest.mark.parametrize(("write", "key"), [(forms.openai, "messages"), (forms.sharegpt, "conversations")])
+def test_replies_of_earlier_steps_have_no_weight(
+    recording: Recording, write: Callable[..., dict[str, Any]], key: str
+) -> None:
+    """As a memory of whole steps recalls them: each of them is a row of its own."""
+    row = rows_of(recording)[0]
+    system, seen, said, now = row.prompt
+    longer = dataclasses.replace(row, prompt=(system, seen, said, seen, said, now))
+    chat = write(longer, images=False)[key]
+    assert [message.get("weight") for message in chat] == [None, None, 0, None, 0, None, 1]
+
+
+@pytest.mark.slow
+def test_trl_reads_prompts_and_completions(
+    data_set: Path, tmp_path: Path, recording: Recording, load: Callable[..., Any]
+) -> None:
+    """Needs no torch: pip install --no-deps trl transformers accelerate safetensors regex jinja2 markupsafe."""
+    functions = pytest.importorskip("trl.data_utils")
+    transformers = pytest.importorskip("transformers")
+    tokenizers = pytest.importorskip("tokenizers")
+    words = tokenizers.Tokenizer(tokenizers.models.WordLevel({"?": 0}, unk_token="?"))
+    tokenizer = transformers.PreTrainedTokenizerFast(tokenizer_object=words)
+    tokenizer.chat_template = (
+        "{% for said in messages %}[{{ said.role }}]{{ said.content }}{% endfor %}"
+        "{% if add_generation_prompt %}[assistant]{% endif %}"
+    )
+    export([recording.path], tmp_path / "plain", Recipe((RowForm.TRL,), images=False))
+    for got, row in zip(load(tmp_path / "plain" / "trl")["train"], rows_of(recording), strict=True):
+        assert functions.is_conversational(got)
+        assert functions.apply_chat_template(got, tokenizer)["completion"] == row.reply
+    for got in load(data_set / "trl")["train"]:
+        messages = functions.prepare_multimodal_messages(got["prompt"] + got["completion"], images=got["images"])
+        shown = [part["image"] for said in messages for part in said["content"] if part["type"] == "image"]
+        assert shown == got["images"] != []
 
 
 @pytest.mark.parametrize("text", ["", "0.8", "0.8,0.1", "1,0", "0.5,0.6,-0.1", "a,b", "0.25,0.25,0.25,0.25", "nan,1"])
@@ -279,6 +426,8 @@ def test_the_command_prints_what_it_wrote(
     rows = lines(out / "openai" / "train.jsonl")
     assert found["rows"] == {"train": len(rows)}
     assert found["left_out"] == {"another agent": len(rows_of(recording)) - len(rows)}
+    assert (found["duplicates"], found["prompts"], found["shared_prompts"]) == (0, len(rows), 0)
+    assert 0 < found["tokens"]["reply"]["share"] < 0.2
     assert sorted(path.name for path in (out / "openai").iterdir()) == ["README.md", "train.jsonl"]
 
 
@@ -300,10 +449,10 @@ def test_memory_does_not_grow_with_the_recordings(
                     if isinstance(sample.message, Report):
                         recorder.flush()
         tracemalloc.start()
-        contents = export([recorder.path], tmp_path / f"{episodes}", Recipe())
+        contents = export([recorder.path], tmp_path / f"{episodes}", Recipe(split=Split.of("0.5,0.5", "seed")))
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert contents.rows["train"] == episodes * len(rows_of(recording))
+        assert contents.rows.total() == episodes * len(rows_of(recording))
         return most
 
     peak(1)  # imports what is needed

@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala.view.digest import Digest, Memory
 from khala.view.wire import MOST_SCENES
-from khala_protocol.messages import Observation, Reply, Report, Scene, UnitFlag
+from khala_protocol.messages import (
+    AgentReport,
+    Observation,
+    Rejection,
+    Reply,
+    Report,
+    Scene,
+    UnitFlag,
+    count_refusals,
+)
 from khala_protocol.recording import Recording
 from tests.khala.view.made import opened
 
@@ -98,6 +108,17 @@ def test_the_time_line_sums_up_to_the_result(made: Opened) -> None:
     assert curves["lost_value", result.side][-1] == pytest.approx(result.lost.value)
     assert curves["army_value", "opponent"][-1] == 175.0
     assert curves["minerals", "blue"][-1] == 89.0
+
+
+def test_refused_calls_are_counted_as_everywhere_else() -> None:
+    """A rejection may stand for many others; messages are read as plain JSON here."""
+    single = Rejection(reason="not_available", message="Not now.", text="<Stop()>", start=0)
+    many = single.but(text="", others={"malformed": 3, "unknown_team": 2})
+    agent = AgentReport(agent="A", side="blue", status="ok", rejections=(single, many))
+    report = Report(run="r", side="blue", episode=0, step=0, game_loop=0, agents=(agent,))
+    digest = Digest(Memory())
+    digest.report(report.model_dump(mode="json"))
+    assert digest.steps[0, 0]["refused/blue"] == count_refusals(agent.rejections).total() == 6
 
 
 @pytest.mark.parametrize("name", ["golden", "old"])

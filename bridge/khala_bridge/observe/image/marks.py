@@ -1,18 +1,12 @@
-"""Marks: the digits of a unit's tag beside it, so that a model can name what it sees; placed where they hide least.
+"""Marks (`khala_bridge.observe.mark_digits`) beside units, so that a model can name what it sees; they hide little.
 
 On large bodies they stand below the letters of the type, otherwise beside the body.
-
-    0x1_0014_0001    the mark is `014`
-
-A tag ends in four digits that are the same for nearly all units of a game (how often the game used the number before).
-The three digits before them are the mark, or four if two units on one picture would share three.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
@@ -27,8 +21,6 @@ if TYPE_CHECKING:
     from khala_bridge.observe.image.lettering import Image, Stamp
     from khala_bridge.observe.image.palette import Side
 
-_TAIL = 4
-"""Hexadecimal digits at the end of a tag that do not distinguish units."""
 _CELL = 4
 """Pixels of a cell of the plan of taken places."""
 _WORST = 0.5
@@ -49,13 +41,6 @@ class Marked(NamedTuple):
     x: int
     y: int
     radius: int
-
-
-def marks_of(tags: Iterable[int]) -> dict[int, str]:
-    """Return the mark of each tag, three or four hexadecimal digits; different tags have different marks."""
-    digits = {tag: f"{tag:x}".zfill(_TAIL + 4)[:-_TAIL] for tag in tags}
-    shared = Counter(text[-3:] for text in digits.values())
-    return {tag: text[-3:] if shared[text[-3:]] == 1 else text[-4:] for tag, text in digits.items()}
 
 
 def place(image: Image, marked: Iterable[Marked], bodies: Iterable[Marked], height_px: int) -> list[Marked]:

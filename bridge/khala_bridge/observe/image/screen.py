@@ -14,7 +14,8 @@ from khala_bridge.observe.image import palette
 from khala_bridge.observe.image.bodies import LETTERS_FROM_PX, BodyLook, body, direction_of
 from khala_bridge.observe.image.canvas import SMALL_PX, Canvas, inner_px
 from khala_bridge.observe.image.effects import draw_orders, draw_patches
-from khala_bridge.observe.image.marks import Marked, marks_of, place
+from khala_bridge.observe.image.marks import Marked, place
+from khala_bridge.observe.mark_digits import marks_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
