@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.messages import Fate
+    from khala_protocol.messages import Fate, StandingView
     from khala_protocol.speech import Speech
 
 
@@ -97,6 +97,10 @@ class Actor:
         """Forget the episode before."""
         self.standing.clear()
 
+    def standing_views(self, agent: str, observation: SideObservation) -> tuple[StandingView, ...]:
+        """Return an agent's standing orders, with what they wait for at this moment."""
+        return self.standing.views(agent, observation, self._translator(observation))
+
     def joint(
         self,
         observation: SideObservation,
@@ -110,9 +114,7 @@ class Actor:
             speeches: by agent; the units of an agent without one continue.
             seen: by agent, the observation on which it decided; an agent that is not in it decided on the present one.
         """
-        translator = Translator(
-            observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents}
-        )
+        translator = self._translator(observation)
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}
@@ -139,6 +141,9 @@ class Actor:
         for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections, fates)
+
+    def _translator(self, observation: SideObservation) -> Translator:
+        return Translator(observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
 
     def _carry_out(self, translator: Translator, saw: AgentObservation, speech: Speech) -> _Outcome:
         words = self._words[saw.agent.name]

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.schedule import Decision, StepId
     from khala_orchestrator.words.mailbox import Post
-    from khala_protocol.messages import Advice, Fate, Timings, Trigger, Unasked
+    from khala_protocol.messages import Advice, Fate, StandingView, Timings, Trigger, Unasked
     from khala_protocol.speech import Speech
 
 
@@ -144,11 +144,13 @@ class MatchSide:
                 member.news,
                 messages=member.letters.read(member.news.messages, snapshot.game_loop),
                 notes=member.notebook.notes,
-                standing=self._actor.standing.views(name),
             )
             for name, member in self._members.items()
         }
-        self._now = self._observer.observe(snapshot, feedback)
+        self._now = self._observer.observe(snapshot, feedback, self._standing)
+
+    def _standing(self, agent: str) -> tuple[StandingView, ...]:
+        return self._actor.standing_views(agent, self._now)
 
     def triggers_of(self, agent: str) -> Collection[Trigger]:
         """Return what happened to an agent since its last observation."""
