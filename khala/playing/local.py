@@ -19,7 +19,7 @@ from khala.playing import games
 from khala.playing.children import Children, Spawn, spawn
 from khala.playing.hosting import host_match
 from khala.playing.local_bus import local_endpoint
-from khala.playing.minds import groups_of, scripted_endpoint
+from khala.playing.minds import groups_of, rethinks_of, scripted_endpoint
 from khala.playing.spending import ledger_of
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -90,6 +90,7 @@ async def play(
         mind.check()
     supplies = supplies or Supplies()
     config, sc2path = _prepare(config, directory, game)
+    config = config.model_copy(update={"rethink": rethinks_of(config.task, minds)})
     async with contextlib.AsyncExitStack() as stack:
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)

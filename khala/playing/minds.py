@@ -47,6 +47,8 @@ class Minds:
     """Latency of the scripted endpoint, if it is started."""
     fallback: str | None = None
     """Policy that decides where the model has no reply."""
+    rethink: int = 0
+    """How often the model is asked again in a step, if nothing of its answer is possible."""
     agents: Mapping[str, str] = field(default_factory=dict)
     """Agents that decide in another way, by name, as `named` takes it."""
 
@@ -66,7 +68,7 @@ class Minds:
         ]
 
     def with_name(self, text: str) -> Minds:
-        """Return minds with the model or the policy of this name; budget, latency and fallback stay.
+        """Return minds with the model or the policy of this name; budget, latency, fallback and rethink stay.
 
         Args:
             text: a model, a model and its name at the endpoint (`scripted/skilled`), or a policy (`my_agent:decide`).
@@ -122,7 +124,10 @@ class Minds:
         Raises:
             ConfigError: as in `check`.
         """
-        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
+        if self.policy:
+            spec = WorkerSpec(policy=self.policy)
+        else:
+            spec = WorkerSpec(model=self.model, fallback=self.fallback, rethink=self.rethink)
         address = base_url if self.needs_endpoint else self.base_url
         workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address}, gates=gates)
         return {name: workshop.policy(spec) for name in names}
@@ -144,6 +149,7 @@ class Minds:
             return ["--policy", self.policy]
         address = base_url if self.needs_endpoint else self.base_url
         more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
+        more |= {"--rethink": str(self.rethink)} if self.rethink else {}
         given = [part for option, value in more.items() if value for part in (option, value)]
         return ["--model", self.model, *given]
 
@@ -162,6 +168,18 @@ def groups_of(
         for mind, group in minds[side.side].groups(names) if left else ():
             if not left.isdisjoint(group):
                 yield side.side, mind, [name for name in group if name in left]
+
+
+def rethinks_of(task: TaskConfig, minds: Mapping[str, Minds]) -> dict[str, int]:
+    """Return by agent that rethinks, `red/Zealots` where there are two sides, how often in a step."""
+    groups = list(groups_of(task, minds))
+    named = len({side for side, _, _ in groups}) > 1
+    return {
+        f"{side}/{name}" if named else name: mind.rethink
+        for side, mind, names in groups
+        if mind.rethink and mind.policy is None
+        for name in names
+    }
 
 
 async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, Minds, Sequence[str]]]) -> str | None:

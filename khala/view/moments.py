@@ -174,9 +174,13 @@ class Moments:
         return None, None
 
     def _reply(self, episode: int, step: int, side: str, agent: str) -> Reply | None:
-        """Return the reply that counted: the first one."""
-        found = self._index.first(Topic.REPLY, episode, side, agent, step)
-        return self._read(Reply, found) if found else None
+        """Return the reply that counted: the first one, or the first one to the last verdict on those before it."""
+        counted: Reply | None = None
+        for found in self._index.at(Topic.REPLY, episode, step, step):
+            reply = self._read(Reply, found) if (found.side, found.agent) == (side, agent) else None
+            if reply is not None and (counted is None or reply.rethinks > counted.rethinks):
+                counted = reply
+        return counted
 
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:
         samples = self._index.at(Topic.EXCHANGE, episode, step, step)

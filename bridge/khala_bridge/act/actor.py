@@ -125,7 +125,7 @@ class Actor:
                 continue
             saw = seen[name] if seen and name in seen else observation.agents[name]
             ordered, said, faults, hindered = self._carry_out(translator, saw, speech)
-            taken, refused = self._stand(translator, observation, saw, speech)
+            taken, refused = self._stand(translator, observation, saw, speech, self.standing)
             commands += ordered
             said += taken
             faults += refused
@@ -141,6 +141,18 @@ class Actor:
         for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections, fates)
+
+    def judge(
+        self, observation: SideObservation, speech: Speech, saw: AgentObservation
+    ) -> tuple[Sequence[str], Sequence[Rejection]]:
+        """Return which calls of an agent are possible now, without those of others, and why the others are not.
+
+        Nothing comes of it: no order is given, and none begins to stand.
+        """
+        translator = self._translator(observation)
+        outcome = self._carry_out(translator, saw, speech)
+        taken, refused = self._stand(translator, observation, saw, speech, self.standing.copy())
+        return [*outcome.accepted, *taken], [*speech.faults, *outcome.faults, *refused]
 
     def _translator(self, observation: SideObservation) -> Translator:
         return Translator(observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
@@ -173,7 +185,12 @@ class Actor:
         return _Outcome(commands, accepted, faults, hindered)
 
     def _stand(
-        self, translator: Translator, observation: SideObservation, saw: AgentObservation, speech: Speech
+        self,
+        translator: Translator,
+        observation: SideObservation,
+        saw: AgentObservation,
+        speech: Speech,
+        standing: StandingOrders,
     ) -> tuple[list[str], list[Rejection]]:
         """Begin and end the standing orders of one agent; return what was accepted, and what was not."""
         accepted: list[str] = []
@@ -182,16 +199,21 @@ class Actor:
         for item in speech.standing[:MOST_WRONG]:
             try:
                 if isinstance(item, Revoke):
-                    self.standing.revoke(saw.agent.name, item.number)
+                    standing.revoke(saw.agent.name, item.number)
                     accepted.append(render(_call_of(item)))
                 else:
-                    accepted += self._begin_standing(translator, observation, saw, item)
+                    accepted += self._begin_standing(translator, observation, saw, item, standing)
             except CallRejected as refused:
                 faults.append(reject(_call_of(item), refused))
         return accepted, faults
 
     def _begin_standing(
-        self, translator: Translator, observation: SideObservation, saw: AgentObservation, item: Standing
+        self,
+        translator: Translator,
+        observation: SideObservation,
+        saw: AgentObservation,
+        item: Standing,
+        standing: StandingOrders,
     ) -> Iterator[str]:
         """Begin a standing order of each team that it is for, and yield it as it was accepted.
 
@@ -206,7 +228,7 @@ class Actor:
         for said in meant:
             if not words.has(said.team, said.action):
                 raise CallRejected("not_available", f"Team {said.team.name} has no action {said.action.name}.")
-            self.standing.begin(said, until, translator, observation)
+            standing.begin(said, until, translator, observation)
             end = f", until {until.text}" if until.text else ""
             yield f"{said.team.name} <Standing({said.written[1:-1]}{end})>"
 

@@ -83,6 +83,11 @@ class StandingOrders:
         self._orders.clear()
         self._given.clear()
 
+    def copy(self) -> StandingOrders:
+        """Return the same orders, to try what a reply would do to them."""
+        orders = {agent: [replace(order) for order in mine] for agent, mine in self._orders.items()}
+        return StandingOrders(self.most, orders, dict(self._given))
+
     def views(self, agent: str, observation: SideObservation, translator: Translator) -> tuple[StandingView, ...]:
         """Return an agent's orders in force, and those that have ended since it was asked.
 

@@ -44,6 +44,7 @@ from khala_protocol.messages.to_agents import (
     Rejection,
     RejectionReason,
     TeamSpec,
+    Verdict,
     count_refusals,
 )
 from khala_protocol.messages.to_all import (
@@ -197,6 +198,7 @@ __all__ = [
     "UnitView",
     "Usage",
     "ValidArguments",
+    "Verdict",
     "View",
     "WarpGates",
     "Wire",
