@@ -58,6 +58,8 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
                 f"{recording.path} has no requests of {agent} to a model: give the policy it played with"
             )
         policy = policies[card.name]
+        replies = recording.of(Reply, agent=card.name, side=card.side)
+        policy.rethink = next((reply.rethink for reply in replies), 0)
     broker = MemoryBroker()
     bus = broker.session()
     stage = await _Stage.set(bus, run.run, card.side, card.name)

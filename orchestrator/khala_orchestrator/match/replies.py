@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from khala_bridge.observe import rejection_line, shorten
+from khala_protocol.manual import VERDICT
 from khala_protocol.messages import Rejection
 from khala_protocol.speech import parse
 
@@ -73,10 +74,9 @@ def say_unread(answer: Answer, agent: str, speech: Speech | None, task: TaskConf
 def verdict_words(rejections: Sequence[Rejection]) -> str:
     """Return what an agent is told of its reply, of which nothing is possible, for its next reply in the same step."""
     lines = (rejection_line(rejection) for rejection in shorten(rejections))
-    return "\n".join([_NOTHING, *(f"    {line}" for line in lines), _AGAIN])
+    return "\n".join([VERDICT, *(f"    {line}" for line in lines), _AGAIN])
 
 
-_NOTHING = "Nothing of this answer can be carried out:"
 _AGAIN = "Answer the same observation again, and in full: only your new answer counts."
 _ORDERS = 'write your actions under "Actions:" and "Team <name>:", each as <Name(arguments)> on a line of its own.'
 _WORDS = "write your messages under \"Communications:\", each as <MessageTo(name, '''text''')> on a line of its own."

@@ -202,15 +202,17 @@ class MatchSide:
     # --- judging ------------------------------------------------------------------------------------
 
     def judge(self, agent: str, answer: Answer) -> str:
-        """Return the verdict on a reply of which nothing is possible; "" if something is, or if it orders nothing.
+        """Return the verdict on a reply of which nothing is possible; "" if something is, or if it tries nothing.
 
-        It is judged alone and at this moment, as if it took effect now, and nothing comes of it. An answer that an
-        agent did not get from its model is not judged.
+        It is judged alone and at this moment, as if it took effect now, and nothing comes of it. A reply that only
+        writes to others is possible. What an agent did not get from its model is not judged.
         """
         member = self._members[agent]
         if member.seen is None or answer.status not in JUDGED:
             return ""
         speech = parse(answer.text or "", member.shown(answer.verdicts))
+        if speech.messages and not speech.calls and not speech.standing:
+            return ""
         accepted, refused = self._actor.judge(self._now, speech, member.seen)
         unread = replies.say_unread(answer, agent, speech, self.task)
         rejections = (*refused, *unread)
