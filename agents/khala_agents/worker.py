@@ -193,7 +193,7 @@ class Worker:
             if not self._is_new(observation):
                 await self._repeat(at, links)
                 continue
-            if self._rethought(observation) is None:
+            if self._reply_before(observation) is None:
                 self._arrived = self._clock()
                 self._ledger.open(at[:2])
             self._newest = observation
@@ -234,7 +234,7 @@ class Worker:
     async def _answer(self, observation: Observation, links: Links, group: asyncio.TaskGroup) -> None:
         """Play one turn: decide, send, then have the policy think on. Sending cannot be cancelled."""
         arrived = self._arrived
-        refused = self._rethought(observation)
+        refused = self._reply_before(observation)
         time_s = time_to_decide_s(observation.answer_within_s)
         left_s = None if time_s is None else max(arrived + time_s - self._clock(), 0.0)
         deciding = self._decide(observation, arrived, refused.text if refused else "")
@@ -265,7 +265,7 @@ class Worker:
         context = Context(briefing, observation, self._pictures, self._ledger.note, arrived, refused=refused)
         return await self._policy.decide(context)
 
-    def _rethought(self, observation: Observation) -> Reply | None:
+    def _reply_before(self, observation: Observation) -> Reply | None:
         """Return the reply that an observation's verdict is on; None without a verdict, or if another process gave it.
 
         An agent that was started again in between has its whole time again, as after any other observation.

@@ -167,9 +167,10 @@ async def test_a_verdict_that_comes_twice_gets_the_same_reply_twice(
     await host.say(briefing())
     await host.say(observation())
     await host.replies(1)
-    for count in (2, 3):
-        await host.say(verdict_on(observation()))
-        replies = await host.replies(count)
+    await host.say(verdict_on(observation()))
+    await host.replies(2)
+    await host.say(verdict_on(observation()))
+    replies = await host.replies(3)
     assert [reply.text for reply in replies] == ["<Fire()>", "<Stop()>", "<Stop()>"]
 
 
