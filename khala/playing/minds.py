@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
     from khala_bridge.task.config import TaskConfig
+    from khala_orchestrator.config import MatchConfig
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -170,16 +171,16 @@ def groups_of(
                 yield side.side, mind, [name for name in group if name in left]
 
 
-def rethinks_of(task: TaskConfig, minds: Mapping[str, Minds]) -> dict[str, int]:
-    """Return by agent that rethinks, `red/Zealots` where there are two sides, how often in a step."""
-    groups = list(groups_of(task, minds))
-    named = len({side for side, _, _ in groups}) > 1
-    return {
-        f"{side}/{name}" if named else name: mind.rethink
-        for side, mind, names in groups
-        if mind.rethink and mind.policy is None
-        for name in names
-    }
+def declare_rethink(config: MatchConfig, rethink: Mapping[Seat, int]) -> MatchConfig:
+    """Return a match whose run card says which agents may rethink, `red/Zealots` where there are two sides.
+
+    Args:
+        config: the match.
+        rethink: by agent, how often in a step.
+    """
+    sides = len(config.task.per_side())
+    said = {seat.agent if sides == 1 else str(seat): count for seat, count in rethink.items() if count}
+    return config.model_copy(update={"rethink": said})
 
 
 async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, Minds, Sequence[str]]]) -> str | None:

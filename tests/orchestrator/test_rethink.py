@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import pytest
+
+from khala_bridge.game.game import GameIdentity
+from khala_orchestrator.config import MatchConfig
+from khala_orchestrator.console import card, table
+from khala_orchestrator.match.cards import run_card
+from khala_orchestrator.match.schedule import StepId
+from khala_orchestrator.match.side import sides_of
+from khala_orchestrator.match.tally import Tally
+from khala_orchestrator.match.turn import Answer
 from khala_orchestrator.roster import Seat
 from khala_protocol.keys import Topic
+from khala_protocol.messages import AgentReport, Reply, Report
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import pytest
-
-    from khala_orchestrator.match.turn import Answer, Question
+    from khala_orchestrator.match.turn import Question
+    from khala_protocol.messages import ReplyStatus
     from tests.orchestrator.conftest import Peer, Table
 
     Observe = Callable[..., list[Question]]
@@ -117,3 +127,79 @@ async def test_an_agent_that_was_away_gets_the_verdict_again(table: Table, obser
         answer = (await asked).by_seat[ZEALOTS]
     assert first == second
     assert answer.text == "attack"
+
+
+# --- the judgement ------------------------------------------------------------------------------------
+
+
+class Judged(NamedTuple):
+    """A reply, and what its verdict has; "" for none."""
+
+    text: str
+    verdict: str = ""
+    status: ReplyStatus = "ok"
+    cut: bool = False
+
+
+ORDER = "Team Stalker-1:\n<Attack_Unit(0xb)>"
+REPLIES = [
+    Judged(f"Actions:\n{ORDER}"),
+    Judged(f"Actions:\n{ORDER}\n<Fire()>"),
+    Judged("Actions:\nTeam Stalker-1:\n<Standing(Attack_Unit(0xb))>"),
+    Judged("Analysis: wait.\nActions:\n"),
+    Judged("<MessageTo(Zealots, 'go')>"),
+    Judged("", status="failed"),
+    Judged("<Fire()>", status="fallback"),
+    Judged("<MessageTo(Zealots, 'go')>\nTeam Stalker-1:\n<Fire()>", "There is no action Fire"),
+    Judged("Team Stalker-1:\n<Attack_Unit(0xeeee)>", "0xeeee"),
+    Judged("I shall attack.", "Nothing could be read in your last answer."),
+    Judged("", "Your last answer was empty:", status="empty"),
+    Judged("<think>If", "was cut at the limit of tokens", cut=True),
+    Judged("<Revoke(3)>", "You have no standing order 3"),
+    Judged("    rejected: <Fire()>: say it in words", "only repeats what you were shown"),
+]
+
+
+@pytest.mark.parametrize("judged", REPLIES, ids=[f"{judged.status} {judged.text!r}" for judged in REPLIES])
+async def test_a_reply_is_judged_by_its_orders_alone_and_nothing_comes_of_it(
+    judged: Judged, config: Any, start: Any, still_game: Any
+) -> None:
+    task = config().task.model_copy(update={"standing_orders": 2})
+    (side,) = sides_of(MatchConfig(task=task, run="test"))
+    side.begin()
+    (snapshot,) = await (await start(still_game())).reset()
+    side.look(snapshot)
+    side.question("Stalkers", StepId(0, 0))
+    reply = Reply(
+        run="test", side="blue", agent="Stalkers", episode=0, step=0, text=judged.text, status=judged.status,
+        cut=judged.cut,
+    )  # fmt: skip
+    answer = Answer(judged.status, reply, verdicts=("    rejected: <Fire()>: say it in words",))
+    verdict = side.judge("Stalkers", answer)
+    assert verdict == side.judge("Stalkers", answer)
+    assert side._actor.standing.views("Stalkers", side._now, side._actor._translator(side._now)) == ()
+    if not judged.verdict:
+        assert verdict == ""
+    else:
+        assert judged.verdict in verdict
+        first, *_, last = verdict.splitlines()
+        assert first == "Nothing of this answer can be carried out:"
+        assert last == "Answer the same observation again, and in full: only your new answer counts."
+
+
+def test_the_result_counts_how_often_an_agent_rethought(snapshot: Any, printed: Any) -> None:
+    tally = Tally(snapshot(), "blue")
+    report = AgentReport(agent="Stalkers", side="blue", status="ok", latency_s=1.0)
+    steps = [report, report.model_copy(update={"rethinks": 2}), report.model_copy(update={"rethinks": 1})]
+    for step, agent in enumerate(steps):
+        tally.add(Report(run="test", episode=0, step=step, game_loop=8, agents=(agent,)), snapshot())
+    result = tally.result("test", 0, wall_s=1.0)
+    assert result.rethinks == {"Stalkers": 3}
+    assert any("3 ok, 3 asked to rethink" in line for line in printed(table(result)))
+
+
+def test_the_run_card_says_who_may_rethink(config: Any, printed: Any) -> None:
+    match = config().model_copy(update={"rethink": {"Stalkers": 1}})
+    run = run_card(match, GameIdentity("1", "1", "a.SC2Map", ""))
+    assert run.rethink == {"Stalkers": 1}
+    assert any(line.split() == ["│", "rethink", "Stalkers", "1", "a", "step", "│"] for line in printed(card(run)))
