@@ -325,6 +325,15 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
 }
 
 
+def test_the_form_of_an_attack_has_no_tag_where_no_enemy_is_in_sight(
+    task: Callable[..., TaskConfig], unit: Make, snapshot: Callable[..., Snapshot]
+) -> None:
+    config = task("2s3z", agents=(AGENT,))
+    observation = Observer(config).observe(snapshot([unit(S1, "Stalker", 10, 10), unit(Z1, "Zealot", 11, 8)]))
+    (fault,) = Actor(config).joint(observation, {"A": parse(team("<Attack_Unit()>"))}).rejections["A"]
+    assert fault.message == "Attack_Unit takes (tag), the tag of an enemy in sight; you see none now."
+
+
 def test_every_class_of_refusals_is_pinned() -> None:
     assert {reason for _, reason, _ in REFUSED} == set(get_args(RejectionReason)) - set(ELSEWHERE)
 
