@@ -363,6 +363,14 @@ async def test_a_refusal_that_repeats_names_what_is_possible_instead(play: Play)
     assert "in a row" not in said[5]
 
 
+@pytest.mark.parametrize("count", [97, 300])
+async def test_every_refused_call_counts_however_few_are_listed(count: int, play: Play) -> None:
+    wrong = "Actions:\nTeam Stalker-1:\n" + "\n".join(f"<Fire_{number}()>" for number in range(count))
+    played = await play({("Stalkers", 0): wrong}, max_steps=2)
+    assert sum(played.results[0].rejections.values()) == count
+    assert len(played.pool.of("Stalkers")[1].rejections) == 11  # ten, and one for all others
+
+
 async def test_of_two_refusals_that_repeat_neither_recommends_the_other(play: Play) -> None:
     wrong = "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xeee)>\n<Move_Screen([99, 99])>"
     played = await play({("Stalkers", step): wrong for step in range(3)}, max_steps=4, max_actions=2)

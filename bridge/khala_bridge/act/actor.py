@@ -247,7 +247,7 @@ def _call_of(item: Standing | Revoke) -> Call:
 def _unread(calls: Sequence[Call]) -> Rejection:
     """Return the rejection of the calls of a reply that has far too many."""
     what = f"These are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
-    return reject(calls[0], CallRejected("too_many_actions", what))
+    return reject(calls[0], CallRejected("too_many_actions", what)).but(others={"too_many_actions": len(calls)})
 
 
 def executor_of(task: TaskConfig) -> Executor:
