@@ -105,6 +105,10 @@ def orders(joint: JointAction) -> list[tuple[str, tuple[int, ...], object, bool]
     ("call", "name", "units", "target"),
     [
         ("<Attack_Unit(0x100180001)>", "Attack_Unit", (S1, S2), FOE),
+        ("<Attack_Unit(100180001)>", "Attack_Unit", (S1, S2), FOE),  # without 0x
+        ("<Attack_Unit(4296540161)>", "Attack_Unit", (S1, S2), FOE),  # in decimal
+        ("<Attack_Unit(018)>", "Attack_Unit", (S1, S2), FOE),  # its mark in a picture
+        ('attack_unit(team="Stalker-1", tag=0x100180001)', "Attack_Unit", (S1, S2), FOE),
         ("<attack_unit(4296540161)>", "Attack_Unit", (S1, S2), FOE),
         ("<Hold_Position()>", "Hold_Position", (S1, S2), None),
         ("<Move_Screen([12, 12])>", "Move_Screen", (S1, S2), WorldPoint(10, 10)),
