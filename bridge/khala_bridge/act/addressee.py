@@ -84,9 +84,10 @@ class Addressees:
         """Return tags in sight for an example of an action, the actors first; nothing if there are not enough."""
         views = [team.view for team in self._agent.teams]
         actors = [unit.tag for view in views for unit in view.units][: action.actor_count]
-        enemies = [unit.tag for view in views for unit in view.enemies] if action.target != "own" else []
-        allies = [unit.tag for view in views for unit in (*view.allies, *view.units)] if action.target != "enemy" else []
-        targets = [tag for tag in (*enemies, *allies) if tag not in actors]
+        enemies = [unit.tag for view in views for unit in view.enemies]
+        own = [unit.tag for view in views for unit in (*view.allies, *view.units)]
+        aims = {"enemy": enemies, "own": own}.get(action.target or "", [*enemies, *own])
+        targets = [tag for tag in aims if tag not in actors]
         wanted = action.args.count("tag")
         found = (*actors, *targets[: wanted - action.actor_count])
         return found if len(found) == wanted else ()
