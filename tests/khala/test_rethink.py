@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from contextlib import AsyncExitStack
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.messages import Observation, Reply, Report, Usage
 from khala_protocol.recording import Recording
 from khala_simulator.process.install import install
+from tests.khala.view.made import opened
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -84,6 +86,12 @@ async def test_nonsense_is_answered_within_the_step_and_counted_and_replays_the_
     better = [a for a in reports if a.rethinks and a.accepted]
     assert better
     assert result.usage["Stalkers"] == sum((a.usage for a in reports if a.agent == "Stalkers"), Usage())
+    shown = opened(tmp_path / "recording.mcap")
+    for seen in verdicts:
+        texts = json.loads(shown.texts(0, seen.step, "blue", "Stalkers"))
+        assert texts["reply"] == first[seen.step, 1].text
+        assert [call["completion"] for call in texts["calls"]] == [NONSENSE, first[seen.step, 1].text]
+    shown.index.close()
     assert await replay_host(tmp_path / "recording.mcap") == []
     assert await replay_agents(tmp_path / "recording.mcap") == []
     assert recording.run is not None
