@@ -132,6 +132,7 @@ class Workshop:
             vision=config.vision,
             pace=config.pace,
             answer=config.answer,
+            rethink=spec.rethink,
             breaker=self._breakers.setdefault(config.base_url, Breaker(config.base_url, config.breaker)),
         )
         return Fallback(model, load_policy(spec.fallback), name=spec.fallback) if spec.fallback else model

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from khala_protocol.commandline import run_command
+from khala_protocol.rethinks import MAX_RETHINKS
 from khala_protocol.trust import trust_files
 
 DEFAULT_LLM_PORT = 8765
@@ -110,6 +111,15 @@ def agent(
             metavar="NAME",
         ),
     ] = None,
+    rethink: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=MAX_RETHINKS,
+            help="How often a model is asked again in a step if nothing of its answer is possible.",
+            metavar="N",
+        ),
+    ] = 0,
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
@@ -123,7 +133,15 @@ def agent(
     from khala_agents import commands  # noqa: PLC0415  # see there
 
     commands.play(
-        commands.specs(names or [], model=model, policy=policy, memory=memory, path=agents, fallback=fallback),
+        commands.specs(
+            names or [],
+            model=model,
+            policy=policy,
+            memory=memory,
+            path=agents,
+            fallback=fallback,
+            rethink=rethink,
+        ),
         run,
         side,
         commands.BusPlace(connect or [], tls, insecure=insecure),

@@ -138,6 +138,7 @@ def specs(
     memory: str | None,
     path: Path | None,
     fallback: str | None = None,
+    rethink: int = 0,
 ) -> AgentsFile:
     """Return the agents that the command line describes, by a file or one by one.
 
@@ -145,24 +146,25 @@ def specs(
         ConfigError: the command line says both, or nothing, or the file is wrong.
     """
     if path is not None:
-        if names or model or policy or fallback:
-            fault = "a file of agents says all: leave out NAMES, --model, --policy and --fallback"
+        if names or model or policy or fallback or rethink:
+            fault = "a file of agents says all: leave out NAMES, --model, --policy, --fallback and --rethink"
             raise ConfigError(fault, source="--agents")
         return load_agents(path)
     if not names:
         raise ConfigError("say which agents to play, or give a file with --agents: khala agent NAME… --run RUN")
     if model and policy:
         raise ConfigError("an agent decides with a model or with a policy: give --model or --policy, not both")
-    if policy and fallback:
-        raise ConfigError("--fallback is for agents with a model: leave it out, or --policy")
+    if policy and (fallback or rethink):
+        option = "--fallback" if fallback else "--rethink"
+        raise ConfigError(f"{option} is for agents with a model: leave it out, or --policy")
     trust_named(policy, fallback)
-    default = _with_model(model or "scripted", memory, fallback)
+    default = _with_model(model or "scripted", memory, fallback, rethink)
     spec = WorkerSpec(policy=policy) if policy else default
     return AgentsFile(agents={check_name(name, "agent"): spec for name in names})
 
 
-def _with_model(model: str, memory: str | None, fallback: str | None) -> WorkerSpec:
-    fields = {"model": model, "fallback": fallback} | ({} if memory is None else {"memory": memory})
+def _with_model(model: str, memory: str | None, fallback: str | None, rethink: int) -> WorkerSpec:
+    fields = {"model": model, "fallback": fallback, "rethink": rethink} | ({} if memory is None else {"memory": memory})
     try:
         return WorkerSpec.model_validate(fields)
     except ValidationError as error:

@@ -27,6 +27,7 @@ from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Frozen, MemoryRule, Pace
+from khala_protocol.rethinks import MAX_RETHINKS
 
 _VARIABLE = re.compile(r"[A-Z_][A-Z0-9_]*")
 _KEY_LIKE = re.compile(r"key|token$|secret|password|authorization|cookie|signature", re.IGNORECASE)
@@ -231,6 +232,9 @@ class WorkerSpec(Frozen):
     memory: MemoryRule | None = None
     """What its prompt has of the steps before, instead of what the task says: `2`, or `steps`, `whole` and `summary`.
     With a model only; `notes` and `messages_s` are for the host to keep, and stand in the task file."""
+    rethink: int = Field(default=0, ge=0, le=MAX_RETHINKS)
+    """How often the model is asked again in a step, with the refusals, if nothing of its answer is possible: nothing
+    can be read, or every call is refused. It has no more time for it. With a model only."""
 
     @field_validator("memory")
     @classmethod
@@ -247,6 +251,8 @@ class WorkerSpec(Frozen):
             raise ValueError("give either a model or a policy")
         if self.fallback is not None and self.model is None:
             raise ValueError("fallback is for an agent with a model; this one has a policy")
+        if self.rethink and self.model is None:
+            raise ValueError("rethink is for an agent with a model; this one has a policy")
         return self
 
 

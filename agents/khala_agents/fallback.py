@@ -42,6 +42,7 @@ class Fallback(Policy):
     def __init__(self, model: Policy, other: Policy, *, name: str) -> None:
         self.model = model
         self.pace = model.pace
+        self.rethink = model.rethink
         self._other = other
         self._name = name
         self._complaints: set[str] = set()

@@ -33,7 +33,7 @@ from khala_agents.llm.retry import RetryRule, with_retries
 from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
-from khala_agents.prompt import Prompt
+from khala_agents.prompt import Prompt, with_verdict
 from khala_agents.secret import excerpt
 from khala_agents.summary import GameSummary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
@@ -74,6 +74,7 @@ class LLMPolicy(Policy):
         vision: how the model sees; None if it does not see, and pictures are left out.
         pace: how fast the model is, for the clock `token`; None: the task says.
         answer: the form of its answers.
+        rethink: how often it is asked again in a step, if nothing of its answer is possible.
         rng: jitter of the waits between tries.
     """
 
@@ -89,6 +90,7 @@ class LLMPolicy(Policy):
         vision: Vision | None = None,
         pace: Pace | None = None,
         answer: AnswerRule | None = None,
+        rethink: int = 0,
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
@@ -98,6 +100,7 @@ class LLMPolicy(Policy):
         self.vision = vision
         self.pace = pace
         self.answer = answer or AnswerRule()
+        self.rethink = rethink
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
         self._answered = False
@@ -108,6 +111,10 @@ class LLMPolicy(Policy):
         self._retry = retry or RetryRule()
         self._rng = rng or random.Random()
         self._prompt: tuple[Briefing, Prompt] | None = None
+        self._unsettled: tuple[Observation, str] | None = None
+        """The newest step, which the memory takes in once the agent can no longer rethink it."""
+        self.newest = Tried()
+        """The tries of the newest decision."""
 
     async def check(self) -> None:
         """Check that the endpoint accepts the key; leave no connection open, because nothing may close it later."""
@@ -132,7 +139,9 @@ class LLMPolicy(Policy):
         pictures = await self._look(context)
         wanted = observation.images[: self.vision.max_images] if self.vision else ()
         prompt = self._prompt_for(context.briefing)
-        self._summary.begin_decision(observation)
+        if observation.verdict is None:
+            self._settle()
+            self._summary.begin_decision(observation)
         recalled = self._memory.recall(observation)
         above = [text for text in (self._summary.above, recalled.text) if text]
         messages = prompt.messages(
@@ -141,11 +150,15 @@ class LLMPolicy(Policy):
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
+        if observation.verdict is not None:
+            messages = with_verdict(messages, context.refused, observation.verdict.text)
         shape = shape_for(self.answer, context.briefing, observation.view)
         completion = await self._complete(_Tries(self, context, messages, pictures, prompt.stable, shape))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
+        if not self.rethink:
+            self._settle()
         return Decision(completion.text, cut=True) if completion.cut else completion.text
 
     def remember(self, decisions: Sequence[tuple[Observation, str]]) -> None:
@@ -153,8 +166,15 @@ class LLMPolicy(Policy):
         self._before = tuple(decisions)
 
     def _note(self, observation: Observation, reply: str) -> None:
-        self._memory.remember(observation, reply)
+        """Note what was decided, in place of what was decided on the same observation before."""
+        self._unsettled = (observation, reply)
         self._summary.end_decision(observation, reply)
+
+    def _settle(self) -> None:
+        """Have the memory take in the newest step."""
+        if self._unsettled is not None:
+            self._memory.remember(*self._unsettled)
+        self._unsettled = None
 
     async def reflect(self, context: Context) -> None:
         """Ask for a new summary of the game, if one is due."""
@@ -221,12 +241,21 @@ class LLMPolicy(Policy):
         rule = self._rule or briefing.memory
         self._memory = self._own_memory or memory_of(rule)
         self._memory.clear()
+        self._unsettled = None
         self._summary = GameSummary(0 if self._own_memory else rule.summary)
         for observation, reply in self._before:
             if observation.episode == briefing.episode:
                 self._summary.begin_decision(observation)
                 self._memory.recall(observation)  # which tells it what became of the step before
                 self._note(observation, reply)
+                self._settle()
+
+
+class Tried(NamedTuple):
+    """Tries of the newest decision, over all replies to its observation."""
+
+    step: tuple[int, int] = (-1, -1)
+    tries: int = 0
 
 
 class _Outcome(NamedTuple):
@@ -267,7 +296,7 @@ class _Tries:
             images=sum(len(message.images) for message in prompt),
             image_tokens=estimated_image_tokens(prompt, policy.vision) if policy.vision else 0,
         )
-        self._made = 0
+        self._made = policy.newest.tries if self._goes_on else 0
         self._clock = asyncio.get_running_loop().time
 
     async def once(self) -> Completion:
@@ -279,6 +308,7 @@ class _Tries:
             tokens=self._tokens, answer_tokens=answer_tokens, deadline=self._context.deadline
         ) as ticket:
             self._made += 1
+            self._count()
             began = self._clock()
             request = self._request(began)
             outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
@@ -301,6 +331,21 @@ class _Tries:
             finally:
                 self._trace(began, ticket, outcome)
             return completion
+
+    @property
+    def _step(self) -> tuple[int, int]:
+        observation = self._context.observation
+        return observation.episode, observation.step
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether these are tries for a second reply to the same observation; they are numbered on."""
+        is_again = self._purpose == "decision" and self._context.observation.verdict is not None
+        return is_again and self._policy.newest.step == self._step
+
+    def _count(self) -> None:
+        if self._purpose == "decision":
+            self._policy.newest = Tried(self._step, self._made)
 
     async def _complete(self, request: Request) -> Completion:
         """Return the completion; tell the breaker how the call ended."""

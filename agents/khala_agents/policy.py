@@ -82,6 +82,7 @@ class Context:
             counted in the reply.
         arrived: when the observation arrived, on the clock of the event loop.
         reserve_s: seconds of the time that are for another policy, should this one fail.
+        refused: the reply that the observation's verdict is on; "" if this process did not give it.
     """
 
     briefing: Briefing
@@ -90,6 +91,7 @@ class Context:
     trace: Callable[[ModelCall], None] = _drop
     arrived: float = field(default_factory=_now)
     reserve_s: float = 0.0
+    refused: str = ""
 
     @property
     def time_s(self) -> float | None:
@@ -113,9 +115,12 @@ class Policy(ABC):
 
     Attributes:
         pace: how fast its model is, for the clock `token`; None: the task says.
+        rethink: how often it wants to decide again on one observation, if nothing of its reply is possible. The
+            observation then has a verdict.
     """
 
     pace: Pace | None = None
+    rethink: int = 0
 
     async def check(self) -> None:  # noqa: B027  # a hook, not a duty
         """Look for what is wrong, before the agent joins a run.

@@ -90,6 +90,21 @@ class Prompt:
         return (*self._head, *recalled, seen)
 
 
+def with_verdict(messages: tuple[ChatMessage, ...], refused: str, verdict: str) -> tuple[ChatMessage, ...]:
+    """Return a prompt after which the agent answered so, and the host says why nothing of it is possible.
+
+    Args:
+        messages: of the observation.
+        refused: the agent's answer; "" if it was empty or is not known, and then the verdict follows the observation.
+        verdict: the host's words.
+    """
+    if refused.strip():
+        answer = ChatMessage(role="assistant", content=refused)
+        return (*messages, answer, ChatMessage(role="user", content=verdict))
+    *head, last = messages
+    return (*head, last.model_copy(update={"content": f"{last.content}\n\n{verdict}"}))
+
+
 def _line(text: str) -> str:
     return " ".join(text.split())
 

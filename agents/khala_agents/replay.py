@@ -58,6 +58,8 @@ async def replay_agent(recording: Recording, agent: str, policy: Policy | None =
                 f"{recording.path} has no requests of {agent} to a model: give the policy it played with"
             )
         policy = policies[card.name]
+        replies = recording.of(Reply, agent=card.name, side=card.side)
+        policy.rethink = next((reply.rethink for reply in replies), 0)
     broker = MemoryBroker()
     bus = broker.session()
     stage = await _Stage.set(bus, run.run, card.side, card.name)
@@ -91,7 +93,7 @@ _Part = Briefing | _Image | _Scene
 def _script(recording: Recording, card: AgentCard) -> Iterator[_Part]:
     """Return briefings, pictures, and the observations that were answered, in their order."""
     whose = {"agent": card.name, "side": card.side}
-    replies = {(r.episode, r.step): r for r in reversed(list(recording.of(Reply, **whose)))}
+    replies = {(r.episode, r.step, r.rethinks): r for r in reversed(list(recording.of(Reply, **whose)))}
     for sample in recording:
         address = sample.address
         if address is None or (address.side, address.agent) != (card.side, card.name):
@@ -102,8 +104,8 @@ def _script(recording: Recording, card: AgentCard) -> Iterator[_Part]:
         match sample.message:
             case Briefing() as briefing:
                 yield briefing
-            case Observation() as seen if (seen.episode, seen.step) in replies:
-                yield _Scene(seen, replies[seen.episode, seen.step])
+            case Observation() as seen if reply := replies.get(_place_of(seen)):
+                yield _Scene(seen, reply)
 
 
 class _Stage:
@@ -155,6 +157,11 @@ class _Stage:
             recorded, sent = _content(part.reply), _content(reply)
             if recorded != sent:
                 yield Difference(reply.agent, reply.episode, reply.step, "reply", recorded, sent)
+
+
+def _place_of(seen: Observation) -> tuple[int, int, int]:
+    """Return episode, step, and the number of the verdict, 0 for none."""
+    return seen.episode, seen.step, seen.verdict.number if seen.verdict else 0
 
 
 def _content(reply: Reply) -> str:

@@ -81,10 +81,14 @@ class GameSummary:
             request.task.cancel()
 
     def end_decision(self, observation: Observation, reply: str) -> None:
-        """Take in a step that was answered."""
-        if self._every:
+        """Take in a step that was answered; a second reply to an observation takes the place of the first."""
+        if not self._every:
+            return
+        if observation.verdict is None:
             self._decided += 1
-            self._steps.append(StepInShort.of(observation, reply))
+        elif self._steps:
+            self._steps.pop()  # the reply before, which does not count
+        self._steps.append(StepInShort.of(observation, reply))
 
     @property
     def is_due(self) -> bool:

@@ -1,9 +1,11 @@
 """One agent on the bus: an observation in, one reply out.
 
 The worker owns everything that a policy need not know: the bus, the deadline, and that every step is answered
-exactly once. It announces the agent's liveliness and receives briefings and observations (the newest supersedes
-the older ones, and cancels a decision that is still being made for one of them). It has a policy decide under
-`khala_agents.guard`, and sends the reply with its usage. It does not read the reply: the host does.
+exactly once. An agent that rethinks answers a verdict on its reply, too, within the time of the observation: with a
+better reply, or with the same one again. The worker announces the agent's liveliness and receives briefings and
+observations (the newest supersedes the older ones, and cancels a decision that is still being made for one of them). It
+has a policy decide under `khala_agents.guard`, and sends the reply with its usage. It does not read the reply: the host
+does.
 
 It may join late or be restarted: it gets briefing and newest observation as soon as it subscribes. Below it
 are `protocol` and a policy; above it are the command line, and tests.
@@ -25,7 +27,7 @@ from khala_agents.guard import Guard
 from khala_agents.ledger import UsageLedger
 from khala_agents.links import Links, join
 from khala_agents.pictures import PictureStore
-from khala_agents.policy import Context
+from khala_agents.policy import Context, Decision
 from khala_agents.time_to_decide import time_to_decide_s
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, BusError, PeerError
@@ -35,7 +37,7 @@ from khala_protocol.unread import decode_observation
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Mapping
 
-    from khala_agents.policy import Decision, Policy, Said
+    from khala_agents.policy import Policy, Said
     from khala_protocol.bus import Bus, Sample, Subscription
     from khala_protocol.messages import Observation
 
@@ -125,6 +127,8 @@ class Worker:
         self._last_result: int | None = None
         self._newest: Observation | None = None
         self._began_again = False
+        self._arrived = 0.0
+        """When the newest observation came for the first time, without a verdict."""
         self._last_reply: Reply | None = None
         self._deciding: asyncio.Task[None] | None = None
         self._reflecting: set[asyncio.Task[None]] = set()
@@ -185,10 +189,13 @@ class Worker:
 
     async def _hear_observations(self, links: Links, group: asyncio.TaskGroup) -> None:
         async for observation in self._read(decode_observation, links.observations):
-            at = (observation.episode, observation.step)
+            at = _place_of(observation)
             if not self._is_new(observation):
                 await self._repeat(at, links)
                 continue
+            if self._reply_before(observation) is None:
+                self._arrived = self._clock()
+                self._ledger.open(at[:2])
             self._newest = observation
             self._began_again = False
             self._supersede()
@@ -201,7 +208,7 @@ class Worker:
         newest = self._newest
         if newest is None:
             return True
-        here, before = ((observed.episode, observed.step) for observed in (observation, newest))
+        here, before = (_place_of(observed) for observed in (observation, newest))
         if not self._began_again:
             return here > before
         try:
@@ -226,10 +233,14 @@ class Worker:
 
     async def _answer(self, observation: Observation, links: Links, group: asyncio.TaskGroup) -> None:
         """Play one turn: decide, send, then have the policy think on. Sending cannot be cancelled."""
-        arrived = self._clock()
-        self._ledger.open((observation.episode, observation.step))
+        arrived = self._arrived
+        refused = self._reply_before(observation)
         time_s = time_to_decide_s(observation.answer_within_s)
-        decision = await self._guard.within(time_s, self._decide(observation, arrived))
+        left_s = None if time_s is None else max(arrived + time_s - self._clock(), 0.0)
+        deciding = self._decide(observation, arrived, refused.text if refused else "")
+        decision = await self._guard.within(left_s, deciding)
+        if refused is not None and decision.status not in ("ok", "fallback"):
+            decision = _same_again(refused)
         self._deciding = None
         try:
             await self._send(observation, decision, links, latency_s=self._clock() - arrived)
@@ -249,9 +260,21 @@ class Worker:
         self._reflecting.add(task)
         task.add_done_callback(self._reflecting.discard)
 
-    async def _decide(self, observation: Observation, arrived: float) -> Said:
+    async def _decide(self, observation: Observation, arrived: float, refused: str) -> Said:
         briefing = await self._briefings.of(observation.episode)
-        return await self._policy.decide(Context(briefing, observation, self._pictures, self._ledger.note, arrived))
+        context = Context(briefing, observation, self._pictures, self._ledger.note, arrived, refused=refused)
+        return await self._policy.decide(context)
+
+    def _reply_before(self, observation: Observation) -> Reply | None:
+        """Return the reply that an observation's verdict is on; None without a verdict, or if another process gave it.
+
+        An agent that was started again in between has its whole time again, as after any other observation.
+        """
+        last = self._last_reply
+        if observation.verdict is None or last is None:
+            return None
+        episode, step, number = _place_of(observation)
+        return last if (last.episode, last.step, last.rethinks) == (episode, step, number - 1) else None
 
     async def _send(self, observation: Observation, decision: Decision, links: Links, *, latency_s: float) -> None:
         attempts, usage = self._ledger.account()  # before any await, because another step may begin meanwhile
@@ -267,6 +290,8 @@ class Worker:
             reason=decision.reason,
             hopeless=decision.hopeless,
             cut=decision.cut,
+            rethink=self._policy.rethink,
+            rethinks=_place_of(observation)[2],
             latency_s=latency_s,
             attempts=attempts or decision.attempts,
             usage=usage if attempts or usage.requests else decision.usage,
@@ -276,11 +301,12 @@ class Worker:
         await links.replies.put(encode(reply))
         self._count(reply)
 
-    async def _repeat(self, at: tuple[int, int], links: Links) -> None:
+    async def _repeat(self, at: tuple[int, int, int], links: Links) -> None:
         """Send the reply to an observation again that the host sent again: a link was down, and it may be lost."""
-        if self._last_reply is not None and (self._last_reply.episode, self._last_reply.step) == at:
+        last = self._last_reply
+        if last is not None and (last.episode, last.step, last.rethinks) == at:
             with contextlib.suppress(BusError):
-                await links.replies.put(encode(self._last_reply))
+                await links.replies.put(encode(last))
 
     def _supersede(self) -> None:
         if self._deciding is not None:
@@ -304,6 +330,16 @@ class Worker:
         if not self._ended.is_set():
             self.tally.ended = why
             self._ended.set()
+
+
+def _place_of(observation: Observation) -> tuple[int, int, int]:
+    """Return episode, step, and the number of the verdict, 0 for none."""
+    return observation.episode, observation.step, observation.verdict.number if observation.verdict else 0
+
+
+def _same_again(reply: Reply) -> Decision:
+    """Return the decision of a reply, which stands because no better one came."""
+    return Decision(reply.text, reply.status, reply.detail, reason=reply.reason, hopeless=reply.hopeless, cut=reply.cut)
 
 
 def _cancel(task: asyncio.Task[None] | None) -> None:

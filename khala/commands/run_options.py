@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from khala_protocol.clock_rule import ClockRule
+from khala_protocol.rethinks import MAX_RETHINKS
 
 Task = Annotated[
     str | None, typer.Argument(help="A task, see `khala tasks`, or a path to a .yaml file.", metavar="TASK")
@@ -116,6 +117,15 @@ Fallback = Annotated[
         metavar="NAME",
     ),
 ]
+Rethink = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        max=MAX_RETHINKS,
+        help="How often a model is asked again in a step if nothing of its answer is possible.",
+        metavar="N",
+    ),
+]
 Mind = Annotated[
     str | None,
     typer.Option(
@@ -164,6 +174,7 @@ class MindOptions:
     base_url: BaseUrl = None
     policy: PolicyName = None
     fallback: Fallback = None
+    rethink: Rethink = 0
     blue: Mind = None
     red: Mind = None
     side_model: SideModel = None

@@ -51,15 +51,21 @@ class _Open:
     example: Sequence[ChatMessage]
     """Of the briefing."""
     pictures: dict[str, bytes]
+    replies: dict[int, Reply] = field(default_factory=dict)
+    """By the number of the verdict that it answers, 0 for none."""
     reply: Reply | None = None
+    """The one that counts, once there is a report."""
     call: ModelCall | None = None
+    """The request whose answer it is: the newest one, or the newest that was answered."""
+    attempts: int = 0
     report: AgentReport | None = None
 
     @property
     def is_complete(self) -> bool:
         if self.reply is None or self.reply.attempts == 0:
             return True
-        return self.call is not None and (self.call.status == "ok" or self.call.attempt >= self.reply.attempts)
+        is_answer = self.call is not None and self.call.status == "ok" and not self.reply.rethinks
+        return is_answer or self.attempts >= self.reply.attempts
 
 
 @dataclass(slots=True)
@@ -139,12 +145,14 @@ class Rows:
             case ModelCall(purpose="decision"):
                 place = DecisionPlace(seat, said.episode, said.step)
                 if decision := self._open.get(place) or self._settled.get(place):
-                    decision.call = said
+                    decision.attempts = max(decision.attempts, said.attempt)
+                    if said.status == "ok" or decision.call is None or decision.call.status != "ok":
+                        decision.call = said
 
     def _ask(self, seat: Seat, seen: Observation) -> None:
         """Open a decision. A host that goes on after it was killed asks again; what came before was lost with it."""
         briefing = self._briefings.get(seat)
-        if briefing is None:
+        if briefing is None or seen.verdict is not None:
             return
         found = {ref.sha256: self._pictures.kept.get(ref.sha256) for ref in seen.images}
         pictures = {digest: data for digest, data in found.items() if data is not None}
@@ -155,17 +163,18 @@ class Rows:
 
     def _answer(self, place: DecisionPlace, reply: Reply) -> None:
         decision = self._open.get(place)
-        if decision is None or decision.reply is not None:
-            return
-        decision.reply = reply
-        if reply.status == "ok":
-            self._prompters[place.seat].remember(decision.seen, reply.text)
+        if decision is not None:
+            decision.replies.setdefault(reply.rethinks, reply)
 
     def _settle(self, report: Report) -> None:
         for agent in report.agents:
             asked = report.step if agent.asked_step is None else agent.asked_step
             place = DecisionPlace(Seat(agent.side, agent.agent), report.episode, asked)
             decision = self._open.pop(place, None)
+            if decision is not None:
+                decision.reply = decision.replies.get(agent.rethinks)
+                if decision.reply is not None and decision.reply.status == "ok":
+                    self._prompters[place.seat].remember(decision.seen, decision.reply.text)
             if agent.status not in COUNTED:
                 self.left_out[agent.status] += 1
             elif decision is None or decision.reply is None:

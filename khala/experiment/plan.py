@@ -208,7 +208,12 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     Raises:
         ConfigError: there is no such side.
     """
-    common = Minds(base_url=settings.base_url, latency_s=settings.latency_s or 0.0, fallback=settings.fallback)
+    common = Minds(
+        base_url=settings.base_url,
+        latency_s=settings.latency_s or 0.0,
+        fallback=settings.fallback,
+        rethink=settings.rethink or 0,
+    )
     if settings.model is not None:
         common = replace(common.with_name(settings.model), base_url=settings.base_url)
     if settings.agents:
@@ -218,7 +223,8 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
 
 def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
-    said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
+    said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url", "rethink")}
+    said |= {"rethink": mind.rethink} if mind.rethink else {}  # which no match had before there was any
     named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
     return said | {"files": [_model_file(mind.model) for mind in named if mind.policy is None]}
 

@@ -25,6 +25,7 @@ from khala_protocol.clock_rule import ClockRule  # noqa: TC001  # pydantic evalu
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
 from khala_protocol.messages import Frozen, MemoryRule
+from khala_protocol.rethinks import MAX_RETHINKS
 
 MOST_MATCHES = 100_000
 MOST_SEEDS = 10_000
@@ -67,6 +68,8 @@ class Settings(Frozen):
     """Models of the sides of a duel, by name."""
     base_url: str | None = None
     fallback: str | None = None
+    rethink: int | None = Field(default=None, ge=0, le=MAX_RETHINKS)
+    """How often models are asked again in a step, if nothing of their answer is possible."""
     latency_s: float | None = Field(default=None, ge=0)
     """Of the scripted model's endpoint."""
     clock: ClockRule | None = None

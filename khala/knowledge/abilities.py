@@ -25,7 +25,19 @@ EVERYWHERE: Final = 500
 OWN_FIGURES: Final = frozenset({"range", "time", "unit", "units", "energy", "supply", "buff", "count"})
 """Figures of a skill that the record already has, or that are words of the tables."""
 SHARED: Final = (
-    *("range", "everywhere", "must", "must_not", "autocast", "energy", "life", "minerals", "vespene", "supply"),
+    *(
+        "range",
+        "everywhere",
+        "must",
+        "must_not",
+        "autocast",
+        "instant",
+        "energy",
+        "life",
+        "minerals",
+        "vespene",
+        "supply",
+    ),
     *("cooldown_s", "charges", "requires", "addon", "produces", "count", "researches", "time_s", "figures"),
 )
 """Facts of a general ability if all its special ones agree."""
@@ -139,6 +151,7 @@ def _terms(ability: Ability) -> dict[str, Any]:
         "requires": list(needs.names),
         "addon": needs.addon,
         "autocast": ability.autocast,
+        "instant": ability.transient,
         **_filter(ability.filters),
     }
 

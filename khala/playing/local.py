@@ -19,8 +19,9 @@ from khala.playing import games
 from khala.playing.children import Children, Spawn, spawn
 from khala.playing.hosting import host_match
 from khala.playing.local_bus import local_endpoint
-from khala.playing.minds import groups_of, scripted_endpoint
+from khala.playing.minds import declare_rethink, groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
+from khala_orchestrator.roster import Seat
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
@@ -90,6 +91,8 @@ async def play(
         mind.check()
     supplies = supplies or Supplies()
     config, sc2path = _prepare(config, directory, game)
+    groups = [(side, mind, names) for side, mind, names in groups_of(config.task, minds) if not mind.policy]
+    config = declare_rethink(config, {Seat(side, name): mind.rethink for side, mind, names in groups for name in names})
     async with contextlib.AsyncExitStack() as stack:
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
     from khala_bridge.task.config import TaskConfig
+    from khala_orchestrator.config import MatchConfig
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -47,6 +48,8 @@ class Minds:
     """Latency of the scripted endpoint, if it is started."""
     fallback: str | None = None
     """Policy that decides where the model has no reply."""
+    rethink: int = 0
+    """How often the model is asked again in a step, if nothing of its answer is possible."""
     agents: Mapping[str, str] = field(default_factory=dict)
     """Agents that decide in another way, by name, as `named` takes it."""
 
@@ -66,7 +69,7 @@ class Minds:
         ]
 
     def with_name(self, text: str) -> Minds:
-        """Return minds with the model or the policy of this name; budget, latency and fallback stay.
+        """Return minds with the model or the policy of this name; budget, latency, fallback and rethink stay.
 
         Args:
             text: a model, a model and its name at the endpoint (`scripted/skilled`), or a policy (`my_agent:decide`).
@@ -122,7 +125,10 @@ class Minds:
         Raises:
             ConfigError: as in `check`.
         """
-        spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
+        if self.policy:
+            spec = WorkerSpec(policy=self.policy)
+        else:
+            spec = WorkerSpec(model=self.model, fallback=self.fallback, rethink=self.rethink)
         address = base_url if self.needs_endpoint else self.base_url
         workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address}, gates=gates)
         return {name: workshop.policy(spec) for name in names}
@@ -144,6 +150,7 @@ class Minds:
             return ["--policy", self.policy]
         address = base_url if self.needs_endpoint else self.base_url
         more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
+        more |= {"--rethink": str(self.rethink)} if self.rethink else {}
         given = [part for option, value in more.items() if value for part in (option, value)]
         return ["--model", self.model, *given]
 
@@ -162,6 +169,18 @@ def groups_of(
         for mind, group in minds[side.side].groups(names) if left else ():
             if not left.isdisjoint(group):
                 yield side.side, mind, [name for name in group if name in left]
+
+
+def declare_rethink(config: MatchConfig, rethink: Mapping[Seat, int]) -> MatchConfig:
+    """Return a match whose run card says which agents may rethink, `red/Zealots` where there are two sides.
+
+    Args:
+        config: the match.
+        rethink: by agent, how often in a step.
+    """
+    sides = len(config.task.per_side())
+    said = {seat.agent if sides == 1 else str(seat): count for seat, count in rethink.items() if count}
+    return config.model_copy(update={"rethink": said})
 
 
 async def scripted_endpoint(stack: AsyncExitStack, groups: Iterable[tuple[str, Minds, Sequence[str]]]) -> str | None:

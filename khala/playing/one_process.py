@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from khala.playing import games
 from khala.playing.hosting import host_match
-from khala.playing.minds import groups_of, scripted_endpoint
+from khala.playing.minds import declare_rethink, groups_of, scripted_endpoint
 from khala.playing.spending import ledger_of
 from khala_agents.llm.limits import own_turns
 from khala_agents.llm.money import MoneyLedger, SharedBudget
@@ -71,6 +71,8 @@ async def play(
     async with contextlib.AsyncExitStack() as stack:
         ledger = stack.enter_context(ledger_of(config.record, past) if config.record else MoneyLedger())
         by_side = await _policies(config, minds, ledger, stack, gates, callers)
+        often = {Seat(side, name): mind.rethink for side, its in by_side.items() for name, mind in its.items()}
+        config = declare_rethink(config, often)
         if past is not None:
             _remind(by_side, past)
         agents = [

@@ -144,14 +144,6 @@ class Index:
         )  # fmt: skip
         return FoundSample(*found[0]) if found else None
 
-    def first(self, topic: Topic, episode: int, side: str, agent: str, step: int) -> FoundSample | None:
-        """Return the first sample of an agent's topic at exactly this step."""
-        found = self.rows(
-            "select step, chunk, place, log_time_ns, side, agent from sample where topic = ? and episode = ? and "
-            "side = ? and agent = ? and step = ? order by rowid limit 1", topic, episode, side, agent, step,
-        )  # fmt: skip
-        return FoundSample(*found[0]) if found else None
-
     def at(self, topic: Topic, episode: int, first: int, last: int) -> Iterator[FoundSample]:
         """Yield the samples of a topic from step to step, both included, in the order of steps and of the file."""
         for row in self.rows(

@@ -99,7 +99,8 @@ class Moments:
             return None
         earlier = self._index.newest(Topic.OBSERVATION, episode, side, agent, found.step - 1)
         before = self._read(Observation, earlier) if earlier else None
-        reply = self._reply(episode, found.step, side, agent)
+        _, report = self._effect(episode, found.step, side, agent)
+        reply = self._reply(episode, found.step, side, agent, report)
         return DecisionTexts(
             side=side,
             agent=agent,
@@ -135,7 +136,7 @@ class Moments:
         if (seen := self._read(Observation, found)) is None:
             return None
         effect, report = self._effect(episode, found.step, side, agent)
-        reply = self._reply(episode, found.step, side, agent)
+        reply = self._reply(episode, found.step, side, agent, report)
         text = reply.text if reply else ""
         return SeenDecision(
             side=side,
@@ -173,10 +174,14 @@ class Moments:
                         return effect, decided
         return None, None
 
-    def _reply(self, episode: int, step: int, side: str, agent: str) -> Reply | None:
-        """Return the reply that counted: the first one."""
-        found = self._index.first(Topic.REPLY, episode, side, agent, step)
-        return self._read(Reply, found) if found else None
+    def _reply(self, episode: int, step: int, side: str, agent: str, report: AgentReport | None) -> Reply | None:
+        """Return the reply that counted, as the report says; without a report the newest one that may yet count."""
+        first: dict[int, Reply] = {}
+        for found in self._index.at(Topic.REPLY, episode, step, step):
+            reply = self._read(Reply, found) if (found.side, found.agent) == (side, agent) else None
+            if reply is not None:
+                first.setdefault(reply.rethinks, reply)
+        return first.get(report.rethinks if report else max(first, default=0))
 
     def _calls(self, episode: int, step: int, side: str, agent: str) -> Iterator[ModelCall]:
         samples = self._index.at(Topic.EXCHANGE, episode, step, step)

@@ -45,6 +45,8 @@ class MatchConfig(Frozen):
     """The MCAP file that every topic is written to; None for no recording."""
     labels: dict[str, str] = Field(default_factory=dict)
     """For the run card: what an experiment calls this match."""
+    rethink: dict[str, int] = Field(default_factory=dict)
+    """For the run card: by agent that rethinks, how often in a step (`khala run --rethink`)."""
     forked: Forked | None = None
     """Where it was forked from another match."""
 

@@ -189,6 +189,8 @@ def card(run: Run) -> Panel:
     if run.opponent:
         rows.add_row("against", run.opponent)
     rows.add_row("clock", rule(run.clock))
+    if run.rethink:
+        rows.add_row("rethink", ", ".join(f"{name} {count} a step" for name, count in run.rethink.items()))
     sides: dict[str, list[str]] = {}
     for agent in run.agents:
         sides.setdefault(agent.side, []).append(f"{agent.name} ({', '.join(agent.teams)})")
@@ -248,6 +250,7 @@ UNASKED = {"no_units": "not asked, without units", "not_due": "not asked, not du
 def _steps_of(result: Result, agent: str) -> str:
     """Return how an agent's steps ended: `177 ok, 23 not asked, without units`."""
     counts = sorted(result.statuses.get(agent, {}).items())
+    counts += [("asked to rethink", count)] if (count := result.rethinks.get(agent)) else []
     counts += [(UNASKED[why], count) for why, count in sorted(result.unasked.get(agent, {}).items())]
     return ", ".join(f"{count} {words}" for words, count in counts)
 

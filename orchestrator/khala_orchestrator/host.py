@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from khala_bridge.game.game import Sides
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.match import Asks
+    from khala_orchestrator.match.side import MatchSide
+    from khala_orchestrator.match.turn import Answer
     from khala_orchestrator.past.resume import Unfinished
     from khala_orchestrator.publish.record import OwnedSink
     from khala_orchestrator.roster import Seat
@@ -83,7 +85,7 @@ async def host(
         announcer = await stack.enter_async_context(Announcer(bus, config.run, seats, advisers))
         roster = await stack.enter_async_context(Roster(bus, config.run, seats))
         inbox = await stack.enter_async_context(AdviceInbox(bus, config.run, advisers))
-        turn = await stack.enter_async_context(_turn(config, bus, roster, required, inbox))
+        turn = await stack.enter_async_context(_turn(config, bus, roster, sides, inbox))
         await announcer.run(card)
         flush()  # a host that is killed before its first report can be resumed, too
         watch(card)
@@ -119,11 +121,17 @@ def _continue_recording(path: Path, past: Unfinished) -> Recorder:
     return recorder
 
 
-def _turn(config: MatchConfig, bus: Bus, roster: Roster, required: Sequence[Seat], inbox: AdviceInbox) -> Turn:
+def _turn(config: MatchConfig, bus: Bus, roster: Roster, sides: Sequence[MatchSide], inbox: AdviceInbox) -> Turn:
+    required = [side.seat(agent) for side in sides for agent in side.required]
+    of_name = {side.name: side for side in sides}
     rule = config.task.faults.agent_gone
     grace_s = config.task.clock.grace_s if rule == "wait" else 0.0
     waited_for = () if rule == "go_on" else required
-    return Turn(bus, config.run, roster, required=waited_for, grace_s=grace_s, advice=inbox.take)
+
+    def judge(seat: Seat, answer: Answer) -> str:
+        return of_name[seat.side].judge(seat.agent, answer)
+
+    return Turn(bus, config.run, roster, required=waited_for, grace_s=grace_s, advice=inbox.take, judge=judge)
 
 
 def _resume(match: Match, past: Unfinished, observer: _PublishingObserver) -> AsyncIterator[Result]:

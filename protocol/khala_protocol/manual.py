@@ -16,6 +16,8 @@ MESSAGE: Final = "<MessageTo(name, '''text''')> sends a text to one of them; it 
 LISTEN: Final = "<ListenTo(channel)> lets you hear a channel from the next observation on."
 NOTE: Final = "<Note('''text''')> keeps a note for yourself, of at most 200 characters."
 FORGET: Final = "There is room for {notes} notes; then the oldest one goes.\n<Forget(2)> removes note 2."
+VERDICT: Final = "Nothing of this answer can be carried out:"
+"""First line of a verdict, on the answer before it."""
 STANDING: Final = """\
 <Standing({call}, until 4:30)> under the heading of a team has the host give this action again and again.
 It is given to idle units of the team; for a team without units, once a step whenever it is possible.

@@ -44,7 +44,7 @@ BAD_OPTIONS = [
     ),
     (
         ["agent", "A", "--run", "r", "--agents", "a.yaml"],
-        "--agents: a file of agents says all: leave out NAMES, --model, --policy and --fallback",
+        "--agents: a file of agents says all: leave out NAMES, --model, --policy, --fallback and --rethink",
     ),
     (["agent", "--agents", "nowhere.yaml", "--run", "r"], "nowhere.yaml: there is no such file"),
     (

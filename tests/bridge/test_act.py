@@ -105,6 +105,10 @@ def orders(joint: JointAction) -> list[tuple[str, tuple[int, ...], object, bool]
     ("call", "name", "units", "target"),
     [
         ("<Attack_Unit(0x100180001)>", "Attack_Unit", (S1, S2), FOE),
+        ("<Attack_Unit(100180001)>", "Attack_Unit", (S1, S2), FOE),  # without 0x
+        ("<Attack_Unit(4296540161)>", "Attack_Unit", (S1, S2), FOE),  # in decimal
+        ("<Attack_Unit(018)>", "Attack_Unit", (S1, S2), FOE),  # its mark in a picture
+        ('attack_unit(team="Stalker-1", tag=0x100180001)', "Attack_Unit", (S1, S2), FOE),
         ("<attack_unit(4296540161)>", "Attack_Unit", (S1, S2), FOE),
         ("<Hold_Position()>", "Hold_Position", (S1, S2), None),
         ("<Move_Screen([12, 12])>", "Move_Screen", (S1, S2), WorldPoint(10, 10)),
@@ -323,6 +327,15 @@ ELSEWHERE = {  # where the sentences of the other classes are pinned
     "too_late": "tests/orchestrator/test_clocks.py",
     "unread": "tests/orchestrator/test_match.py",
 }
+
+
+def test_the_form_of_an_attack_has_no_tag_where_no_enemy_is_in_sight(
+    task: Callable[..., TaskConfig], unit: Make, snapshot: Callable[..., Snapshot]
+) -> None:
+    config = task("2s3z", agents=(AGENT,))
+    observation = Observer(config).observe(snapshot([unit(S1, "Stalker", 10, 10), unit(Z1, "Zealot", 11, 8)]))
+    (fault,) = Actor(config).joint(observation, {"A": parse(team("<Attack_Unit()>"))}).rejections["A"]
+    assert fault.message == "Attack_Unit takes (tag), the tag of an enemy in sight; you see none now."
 
 
 def test_every_class_of_refusals_is_pinned() -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from s2clientprotocol import raw_pb2
 
     from khala_bridge.act import JointAction
+    from khala_bridge.observe import AgentObservation
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import StandingView
@@ -33,7 +34,7 @@ AGENT = AgentConfig.model_validate(
         "role": "",
         "teams": [
             {"name": "Stalker-1", "unit_types": ["Stalker"]},
-            {"name": "Base", "kind": "side", "actions": ["Train_Probe"]},
+            {"name": "Base", "kind": "side", "actions": ["Train_Probe", "ChronoBoost_Economy"]},
         ],
         "actions": {"Stalker": ("Hold_Position", "Attack_Minimap", "Attack_Unit", "Select_Unit_Move_Screen")},
     }
@@ -49,6 +50,11 @@ class Table:
 
     def turn(self, reply: str = "", *, minerals: int = 400, **units: dict[str, Any] | None) -> JointAction:
         """Play a turn; `s1`, `s2`, `nexus` and `foe` are changes of these units, or None for one that is gone."""
+        self.look(minerals=minerals, **units)
+        return self._actor.joint(self._seen, {"A": parse(reply)} if reply else {})
+
+    def look(self, *, minerals: int = 400, **units: dict[str, Any] | None) -> AgentObservation:
+        """Observe the next moment; return what the agent sees of it."""
         self._loop += 112
         places = {
             "s1": (S1, "Stalker", 10, 10),
@@ -63,11 +69,12 @@ class Table:
         dead = frozenset(places[name][0] for name, changed in units.items() if changed is None)
         player = {"minerals": minerals, "food_cap": 15, "food_used": 4}
         now = self._snapshot(there, loop=self._loop, player=player, dead=dead)
-        return self._actor.joint(self._observer.observe(now), {"A": parse(reply)} if reply else {})
+        self._seen = self._observer.observe(now, standing=lambda name: self._actor.standing_views(name, self._seen))
+        return self._seen.agents["A"]
 
     def shown(self) -> list[str]:
         """Return what the agent is shown of its orders, when it is asked."""
-        views = self._actor.standing.views("A")
+        views = self._actor.standing_views("A", self._seen)
         self._actor.standing.forget_ended("A")
         return [_words(view) for view in views]
 
@@ -96,6 +103,25 @@ def test_an_order_to_the_side_waits_for_minerals_and_for_a_free_producer_and_end
     assert orders(table.turn(nexus={"orders": (TRAIN_PROBE, TRAIN_PROBE)})) == []
     assert table.shown() == ["1 1 its end is reached"]
     assert table.shown() == []
+
+
+def test_what_an_order_waits_for_is_judged_at_the_moment_that_its_agent_sees(table: Table) -> None:
+    table.turn("Team Base:\n<Standing(Train_Probe())>\n<Standing(ChronoBoost_Economy())>", minerals=40)
+    poor = table.look(minerals=30)
+    assert (
+        "    1: Base <Train_Probe()>: carried out 0 times; waits: it costs 50 minerals and 30 are left\n" in poor.text
+    )
+    rich = table.look()
+    assert "    1: Base <Train_Probe()>: carried out 0 times\n" in rich.text
+    assert _words(rich.view.standing[1]) == "2 0 no Nexus trains Probes that is not boosted yet; train Probes first"
+
+
+def test_a_nexus_that_trains_boosts_itself(table: Table) -> None:
+    training = {"orders": (TRAIN_PROBE,), "energy": 60}
+    said = "Team Base:\n<Standing(ChronoBoost_Economy())>"
+    assert orders(table.turn(said, nexus=training)) == [("Effect_ChronoBoostEnergyCost", (NEXUS,))]
+    assert orders(table.turn(nexus={**training, "energy": 20})) == []
+    assert table.shown() == [f"1 1 it needs 50 energy, and your Nexus {NEXUS:#x} has 20"]
 
 
 def test_an_order_to_units_is_for_the_idle_ones_and_ends_when_they_are_attacked(table: Table) -> None:

@@ -50,6 +50,7 @@ def test_a_policy_of_all_is_not_the_one_of_a_side_with_a_model() -> None:
     minds = minds_of(["blue", "red"], Minds(policy="skilled"), {"red": "openai"})
     assert (minds["blue"].policy, minds["red"].policy) == ("skilled", None)
     assert minds["red"].options(None) == ["--model", "openai"]
+    assert replace(minds["red"], rethink=2).options(None) == ["--model", "openai", "--rethink", "2"]
 
 
 def test_both_sides_may_spend_the_same() -> None:

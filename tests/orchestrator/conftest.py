@@ -104,12 +104,12 @@ def table(broker: MemoryBroker) -> Table:
     """A turn with agents that are all there."""
 
     @asynccontextmanager
-    async def lay(*seats: Seat) -> AsyncIterator[tuple[Turn, list[Peer]]]:
+    async def lay(*seats: Seat, **options: Any) -> AsyncIterator[tuple[Turn, list[Peer]]]:
         host = broker.session()
         peers = [Peer(broker.session(), seat) for seat in seats]
         for one in peers:
             await one.arrive()
-        async with Roster(host, RUN, seats) as roster, Turn(host, RUN, roster) as turn:
+        async with Roster(host, RUN, seats) as roster, Turn(host, RUN, roster, **options) as turn:
             await roster.assemble(seats, 1)
             yield turn, peers
 

@@ -83,7 +83,9 @@ def test_one_that_listens_twice_hears_once(mailbox: Mailbox) -> None:
 
 
 def test_an_unknown_channel_can_be_listened_to_and_not_written_to(mailbox: Mailbox) -> None:
-    mailbox.listen(B, "Channel-9")
+    fault = mailbox.listen(B, "Channel-9")
+    assert fault is not None
+    assert fault.message == "There is no channel 'Channel-9': the channels are Channel-1."
     post = mailbox.deliver([said(A, "Channel-9")])
     assert not post.received
     assert list(post.rejections) == [A]

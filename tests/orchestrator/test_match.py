@@ -356,11 +356,29 @@ async def test_a_refusal_that_repeats_names_what_is_possible_instead(play: Play)
     script: dict[tuple[str, int], str | Answer] = {("Stalkers", step): blink for step in (0, 1, 2, 4)}
     played = await play(script, max_steps=6)
     said = [" ".join(fault.message for fault in seen.rejections) for seen in played.pool.of("Stalkers")]
-    again = " Refused 3 times in a row for the same reason; possible now: "
+    again = " Refused 3 times in a row for the same reason; what was possible: "
     assert [again in words for words in said] == [False, False, False, True, False, False]
     assert "Attack_Unit" in said[3].partition(again)[2]
     assert said[4] == ""
     assert "in a row" not in said[5]
+
+
+@pytest.mark.parametrize("count", [97, 300])
+async def test_every_refused_call_counts_however_few_are_listed(count: int, play: Play) -> None:
+    wrong = "Actions:\nTeam Stalker-1:\n" + "\n".join(f"<Fire_{number}()>" for number in range(count))
+    played = await play({("Stalkers", 0): wrong}, max_steps=2)
+    assert sum(played.results[0].rejections.values()) == count
+    assert len(played.pool.of("Stalkers")[1].rejections) == 11  # ten, and one for all others
+
+
+async def test_of_two_refusals_that_repeat_neither_recommends_the_other(play: Play) -> None:
+    wrong = "Actions:\nTeam Stalker-1:\n<Attack_Unit(0xeee)>\n<Move_Screen([99, 99])>"
+    played = await play({("Stalkers", step): wrong for step in range(3)}, max_steps=4, max_actions=2)
+    attack, move = played.pool.of("Stalkers")[3].rejections
+    for fault in (attack, move):
+        again = fault.message.partition("Refused 3 times in a row for the same reason")[2]
+        assert again
+        assert not {"Attack_Unit", "Move_Screen"} & set(again.replace(",", "").replace(".", "").split())
 
 
 async def test_a_standing_order_is_carried_out_until_it_is_revoked(play: Play) -> None:

@@ -30,6 +30,7 @@ from khala_agents.scripted.faults import InjectedFaults
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.listening import Patience, bind
+from khala_protocol.manual import VERDICT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -198,8 +199,11 @@ class _Asked(BaseModel):
 
     @property
     def observation(self) -> str:
-        """The last message, if it is the user's."""
-        return self.messages[-1].text if self.messages and self.messages[-1].role == "user" else ""
+        """The last message, if it is the user's; before a verdict, the one of the user before it."""
+        if not self.messages or self.messages[-1].role != "user":
+            return ""
+        said = [message.text for message in self.messages if message.role == "user"]
+        return said[-2] if len(said) > 1 and said[-1].startswith(VERDICT) else said[-1]
 
 
 def _completion(asked: _Asked, text: str, digest: str) -> bytes:

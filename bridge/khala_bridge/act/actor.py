@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from khala_bridge.act.translate import Command
     from khala_bridge.observe.observation import AgentObservation, SideObservation
     from khala_bridge.task.config import TaskConfig
-    from khala_protocol.messages import Fate
+    from khala_protocol.messages import Fate, StandingView
     from khala_protocol.speech import Speech
 
 
@@ -97,6 +97,10 @@ class Actor:
         """Forget the episode before."""
         self.standing.clear()
 
+    def standing_views(self, agent: str, observation: SideObservation) -> tuple[StandingView, ...]:
+        """Return an agent's standing orders, with what they wait for at this moment."""
+        return self.standing.views(agent, observation, self._translator(observation))
+
     def joint(
         self,
         observation: SideObservation,
@@ -110,9 +114,7 @@ class Actor:
             speeches: by agent; the units of an agent without one continue.
             seen: by agent, the observation on which it decided; an agent that is not in it decided on the present one.
         """
-        translator = Translator(
-            observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents}
-        )
+        translator = self._translator(observation)
         commands: list[Command] = []
         accepted: dict[str, tuple[str, ...]] = {}
         rejections: dict[str, tuple[Rejection, ...]] = {}
@@ -123,7 +125,7 @@ class Actor:
                 continue
             saw = seen[name] if seen and name in seen else observation.agents[name]
             ordered, said, faults, hindered = self._carry_out(translator, saw, speech)
-            taken, refused = self._stand(translator, observation, saw, speech)
+            taken, refused = self._stand(translator, observation, saw, speech, self.standing)
             commands += ordered
             said += taken
             faults += refused
@@ -139,6 +141,21 @@ class Actor:
         for order in automatic(self._task.auto, observation.snapshot, translator.ledger, frozenset(translator.ordered)):
             commands += translator.commands(order)
         return JointAction(tuple(commands), accepted, rejections, fates)
+
+    def judge(
+        self, observation: SideObservation, speech: Speech, saw: AgentObservation
+    ) -> tuple[Sequence[str], Sequence[Rejection]]:
+        """Return which calls of an agent are possible now, without those of others, and why the others are not.
+
+        Nothing comes of it: no order is given, and none begins to stand.
+        """
+        translator = self._translator(observation)
+        outcome = self._carry_out(translator, saw, speech)
+        taken, refused = self._stand(translator, observation, saw, speech, self.standing.copy())
+        return [*outcome.accepted, *taken], [*speech.faults, *outcome.faults, *refused]
+
+    def _translator(self, observation: SideObservation) -> Translator:
+        return Translator(observation, {agent.name: self._task.max_actions_of(agent) for agent in self._task.agents})
 
     def _carry_out(self, translator: Translator, saw: AgentObservation, speech: Speech) -> _Outcome:
         words = self._words[saw.agent.name]
@@ -168,7 +185,12 @@ class Actor:
         return _Outcome(commands, accepted, faults, hindered)
 
     def _stand(
-        self, translator: Translator, observation: SideObservation, saw: AgentObservation, speech: Speech
+        self,
+        translator: Translator,
+        observation: SideObservation,
+        saw: AgentObservation,
+        speech: Speech,
+        standing: StandingOrders,
     ) -> tuple[list[str], list[Rejection]]:
         """Begin and end the standing orders of one agent; return what was accepted, and what was not."""
         accepted: list[str] = []
@@ -177,16 +199,21 @@ class Actor:
         for item in speech.standing[:MOST_WRONG]:
             try:
                 if isinstance(item, Revoke):
-                    self.standing.revoke(saw.agent.name, item.number)
+                    standing.revoke(saw.agent.name, item.number)
                     accepted.append(render(_call_of(item)))
                 else:
-                    accepted += self._begin_standing(translator, observation, saw, item)
+                    accepted += self._begin_standing(translator, observation, saw, item, standing)
             except CallRejected as refused:
                 faults.append(reject(_call_of(item), refused))
         return accepted, faults
 
     def _begin_standing(
-        self, translator: Translator, observation: SideObservation, saw: AgentObservation, item: Standing
+        self,
+        translator: Translator,
+        observation: SideObservation,
+        saw: AgentObservation,
+        item: Standing,
+        standing: StandingOrders,
     ) -> Iterator[str]:
         """Begin a standing order of each team that it is for, and yield it as it was accepted.
 
@@ -201,7 +228,7 @@ class Actor:
         for said in meant:
             if not words.has(said.team, said.action):
                 raise CallRejected("not_available", f"Team {said.team.name} has no action {said.action.name}.")
-            self.standing.begin(said, until, translator, observation)
+            standing.begin(said, until, translator, observation)
             end = f", until {until.text}" if until.text else ""
             yield f"{said.team.name} <Standing({said.written[1:-1]}{end})>"
 
@@ -220,7 +247,7 @@ def _call_of(item: Standing | Revoke) -> Call:
 def _unread(calls: Sequence[Call]) -> Rejection:
     """Return the rejection of the calls of a reply that has far too many."""
     what = f"These are too many calls for one reply: this one and all behind it, {len(calls)}, were not read."
-    return reject(calls[0], CallRejected("too_many_actions", what))
+    return reject(calls[0], CallRejected("too_many_actions", what)).but(others={"too_many_actions": len(calls)})
 
 
 def executor_of(task: TaskConfig) -> Executor:

@@ -82,13 +82,17 @@ class Addressees:
         meant = [tag for tag in tags if digits == f"{tag:x}" or digits in mark_digits(tag)]
         return meant[0] if len(meant) == 1 else None
 
-    def sample_tags(self, own: int, others: int) -> Sequence[str]:
-        """Return tags in sight for an example, so many of own units and then of others; nothing if there are fewer."""
+    def sample_tags(self, action: Action) -> Sequence[str]:
+        """Return tags in sight for an example of an action, the actors first; nothing if there are not enough."""
         views = [team.view for team in self._agent.teams]
-        of_own = [unit.tag for view in views for unit in view.units][:own]
-        of_others = [unit.tag for view in views for unit in (*view.enemies, *view.allies)][:others]
-        found = (*of_own, *of_others)
-        return found if len(found) == own + others else ()
+        actors = [unit.tag for view in views for unit in view.units][: action.actor_count]
+        enemies = [unit.tag for view in views for unit in view.enemies]
+        own = [unit.tag for view in views for unit in (*view.allies, *view.units)]
+        aims = {"enemy": enemies, "own": own}.get(action.target or "", [*enemies, *own])
+        targets = [tag for tag in aims if tag not in actors]
+        wanted = action.args.count("tag")
+        found = (*actors, *targets[: wanted - action.actor_count])
+        return found if len(found) == wanted else ()
 
     def _tags(self) -> Iterator[str]:
         """Return the tags of all units that the agent sees."""

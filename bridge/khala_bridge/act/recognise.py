@@ -131,10 +131,10 @@ def _is_nothing(given: list[int | Point | str]) -> bool:
 def _right_form(action: Action, addressees: Addressees) -> str:
     if not action.args:
         return f"{action.name} takes no arguments: write <{action.name}()>."
-    wanted = action.args.count("tag")
-    tags = addressees.sample_tags(action.actor_count, wanted - action.actor_count)
-    if len(tags) < wanted:
-        return f"{action.name} takes ({', '.join(action.args)})."
+    tags = addressees.sample_tags(action)
+    if len(tags) < action.args.count("tag"):
+        whose = {"enemy": "an enemy", "own": "a unit of yours"}.get(action.target or "", "a unit")
+        return f"{action.name} takes ({', '.join(action.args)}), the tag of {whose} in sight; you see none now."
     left = iter(tags)
     example = ", ".join(POINTS.get(kind) or next(left) for kind in action.args)
     return f"{action.name} takes ({', '.join(action.args)}): write it like <{action.name}({example})>."

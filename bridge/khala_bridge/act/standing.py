@@ -2,18 +2,22 @@
 
 A standing order goes the way of every other call, through `khala_bridge.act.translate` and its judgement. It comes
 after what agents say in the same turn, and is given at most once a turn. An order to a team with units is for those
-that are idle; one to the whole side waits while all that could do it are busy, so that no queue ties up minerals.
+that are idle. One to the whole side that makes something waits while all that could make it are busy, so that no queue
+ties up minerals; a cast needs no place in a queue, so a Nexus that trains Probes can boost itself.
 
-State of one episode, a function of the words and the snapshots since its beginning. `khala_bridge.act.actor` is above.
+State of one episode, a function of the words and the snapshots since its beginning. What an order waits for is no
+state: it is judged at the moment in which an agent is shown it. `khala_bridge.act.actor` is above.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.act.rejected import CallRejected
+from khala_bridge.act.translate import Trial
 from khala_bridge.observe.triggers import were_attacked
+from khala_bridge.rules import facts_for
 from khala_protocol.messages import Rejection, StandingView
 
 if TYPE_CHECKING:
@@ -41,25 +45,26 @@ class _Order:
     vitals: dict[int, float]
     """Health and shield by tag of the units whose fate may end it, in the step before."""
     times: int = 0
-    waits_for: str = ""
     ended: str = ""
-
-    def end(self, why: str) -> None:
-        """End the order, which its agent is yet to be told."""
-        self.ended = why
-        self.waits_for = ""
+    """Why it has ended, which its agent is yet to be told; "" if it is in force."""
 
     @property
     def text(self) -> str:
         """The order as its agent reads it, `Developer <Train_Probe()> until 22 Probe`."""
         return f"{self.said.text} until {self.until.text}" if self.until.text else self.said.text
 
-    @property
-    def view(self) -> StandingView:
-        """The order as its agent sees it."""
+    def view(self, waits_for: str = "") -> StandingView:
+        """Return the order as its agent sees it."""
         return StandingView(
-            number=self.number, order=self.text, times=self.times, waits_for=self.waits_for, ended=self.ended
+            number=self.number, order=self.text, times=self.times, waits_for=waits_for, ended=self.ended
         )
+
+
+class _Wait(NamedTuple):
+    """Why an order is not given."""
+
+    why: str
+    for_good: bool = False
 
 
 @dataclass(slots=True)
@@ -78,9 +83,30 @@ class StandingOrders:
         self._orders.clear()
         self._given.clear()
 
-    def views(self, agent: str) -> tuple[StandingView, ...]:
-        """Return an agent's orders in force, and those that have ended since it was asked."""
-        return tuple(order.view for order in self._orders.get(agent, ()))
+    def copy(self) -> StandingOrders:
+        """Return the same orders, to try what a reply would do to them."""
+        orders = {agent: [replace(order) for order in mine] for agent, mine in self._orders.items()}
+        return StandingOrders(self.most, orders, dict(self._given))
+
+    def views(self, agent: str, observation: SideObservation, translator: Translator) -> tuple[StandingView, ...]:
+        """Return an agent's orders in force, and those that have ended since it was asked.
+
+        What they wait for is judged now, for all agents in their order, as if none of them said anything more.
+
+        Args:
+            agent: the agent.
+            observation: of this moment.
+            translator: of a turn in which nothing was said.
+        """
+        if not self._orders.get(agent):
+            return ()
+        waits: dict[int, str] = {}
+        for name in observation.configs:
+            found = {order.number: _try(order, observation, translator) for order in self._in_force(name)}
+            if name == agent:
+                waits = {number: tried.why for number, tried in found.items() if isinstance(tried, _Wait)}
+                break
+        return tuple(order.view(waits.get(order.number, "")) for order in self._orders[agent])
 
     def forget_ended(self, agent: str) -> None:
         """Forget the orders of an agent that have ended, once it was shown them."""
@@ -133,7 +159,7 @@ class StandingOrders:
                 attacked = were_attacked(order.vitals, vitals, observation.died)
                 order.vitals = vitals
                 if order.until.is_reached(observation.snapshot, attacked=attacked):
-                    order.end("its end is reached")
+                    order.ended = "its end is reached"
                 else:
                     yield from _give(order, observation, translator)
 
@@ -150,24 +176,28 @@ class StandingOrders:
 
 
 def _give(order: _Order, observation: SideObservation, translator: Translator) -> Sequence[Command]:
-    """Return the commands of an order, none if it has to wait; note why."""
+    """Return the commands of an order, none if it has to wait."""
+    tried = _try(order, observation, translator)
+    if isinstance(tried, Trial):
+        order.times += 1
+        return [replace(command, said=None) for command in tried.commands]
+    if tried.for_good:
+        order.ended = tried.why
+    return ()
+
+
+def _try(order: _Order, observation: SideObservation, translator: Translator) -> Trial | _Wait:
+    """Return the commands of an order, entered in the accounts of the turn; or why it has to wait."""
     said = _for_the_idle(order.said, observation, translator)
     if isinstance(said, str):
-        order.waits_for = said
-        return ()
+        return _Wait(said)
     trial = translator.try_(said)
     if isinstance(trial, Rejection):
-        order.waits_for = trial.message.rpartition(" now: ")[2].rstrip(".")
-        if trial.reason in LASTING:
-            order.end(order.waits_for)
-        return ()
-    if any(_is_busy(tag, observation.snapshot) for command in trial.commands for tag in command.units):
-        order.waits_for = "all that could do it are busy"
-        return ()
+        return _Wait(trial.message.rpartition(" now: ")[2].rstrip("."), for_good=trial.reason in LASTING)
+    if any(_has_to_queue(command, tag, observation.snapshot) for command in trial.commands for tag in command.units):
+        return _Wait("all that could do it are busy")
     translator.keep(trial)
-    order.times += 1
-    order.waits_for = ""
-    return [replace(command, said=None) for command in trial.commands]
+    return trial
 
 
 def _for_the_idle(said: Recognised, observation: SideObservation, translator: Translator) -> Recognised | str:
@@ -184,9 +214,13 @@ def _for_the_idle(said: Recognised, observation: SideObservation, translator: Tr
     return replace(said, team=replace(said.team, team=replace(team, tags=idle)))
 
 
-def _is_busy(tag: int, snapshot: Snapshot) -> bool:
+def _has_to_queue(command: Command, tag: int, snapshot: Snapshot) -> bool:
+    """Return whether a structure would make something only after what it makes now."""
     unit = snapshot.units[tag]
-    return unit.is_structure and bool(unit.orders)
+    if not (unit.is_structure and unit.orders):
+        return False
+    facts = facts_for(command.function.ability_id, unit.name, snapshot.upgrades)
+    return facts is None or bool(facts.produces or facts.researches)
 
 
 def _vitals(said: Recognised, observation: SideObservation) -> dict[int, float]:

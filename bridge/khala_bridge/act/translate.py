@@ -13,6 +13,11 @@ if the action queues (the catalogue says), and replaces it if not. In the paper 
 replaces. Then an order to a second unit would wait behind that unit's old order, and an attack would cancel a skill of
 the same reply, since here all commands of a turn reach the game in one loop.
 
+An instant ability (Stimpack, Guardian Shield, a cloak) is no order: the game carries it out at once and leaves the
+orders of the unit alone. So it does not count as the first one: a move after it replaces what the unit did before the
+reply, and waits for nothing. After an order of the same reply it waits its turn, as it was said. A cast that is an
+order, such as Blink or a storm, replaces what the unit did, and the move waits for it. A switch of an autocast is none.
+
 A unit that a reply orders by name is left out of the orders to its whole team in that reply: "all attack, and this one
 steps back" is two calls.
 """
@@ -28,7 +33,18 @@ from khala_bridge.act.targets import Targets
 from khala_bridge.auto import RULES, NotAvailable, RuleOrder, RuleRequest
 from khala_bridge.auto.aims import aim_of, reaches
 from khala_bridge.frames import WorldPoint
-from khala_bridge.rules import Cost, facts_for, is_attack, is_free, nearest, of_team, price_of, use_of, why_not
+from khala_bridge.rules import (
+    Cost,
+    facts_for,
+    is_attack,
+    is_free,
+    is_instant,
+    nearest,
+    of_team,
+    price_of,
+    use_of,
+    why_not,
+)
 from khala_bridge.state.means import ledger_of, side_of
 from khala_protocol.messages import Rejection
 
@@ -80,7 +96,7 @@ class Translator:
         self.ledger = ledger_of(observation.snapshot)
         self._side = side_of(observation.snapshot)
         self.ordered: set[int] = set()
-        """Tags of the units that were told something in this turn."""
+        """Tags of the units that got an order in this turn; an instant ability is none."""
         self._targets = Targets(observation)
         self._count: Counter[tuple[str, str]] = Counter()
         """By agent and team, the actions of this turn."""
@@ -130,9 +146,12 @@ class Translator:
         queues = said is not None and said.action.queue
         first = tuple(tag for tag in order.units if not (queues and tag in self.ordered))
         later = tuple(tag for tag in order.units if queues and tag in self.ordered)
-        self.ordered.update(order.units)
+        self.ordered.update(tag for tag in order.units if not self._leaves_orders_alone(order.function, tag))
         found = [Command(said, order.function, first, order.target, order.queued)] if first else []
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
+
+    def _leaves_orders_alone(self, function: Function, tag: int) -> bool:
+        return function.kind == "autocast" or is_instant(function.ability_id, self._side.units[tag].type)
 
     def _commands(self, said: Recognised, orders: Iterable[RuleOrder]) -> list[Command]:
         return [command for order in orders for command in self.commands(order, said)]

@@ -63,7 +63,8 @@ class Vocabulary:
         alike = [action.form for action in ranked if likeness[action.name] >= ALIKE]
         if alike:
             return f"like it {'is' if len(alike) == 1 else 'are'} {', '.join(alike)}."
-        others = f" and {len(known) - NEAREST} others" if len(known) > NEAREST else ""
+        more = len(known) - NEAREST
+        others = f" and {more} other{'s' if more > 1 else ''}" if more > 0 else ""
         return f"you can say {', '.join(action.form for action in known[:NEAREST])}{others}."
 
     def _sayable(self, teams: list[TeamObservation]) -> Iterable[Action]:

@@ -175,6 +175,8 @@ class AbilityFacts(Frozen):
     """Seconds until its product or its research is finished."""
     autocast: Literal["on", "off"] | None = None
     """Its first setting; None for what units never do by themselves."""
+    instant: bool = False
+    """Whether it happens at once and leaves the orders of its user as they are; all others are orders themselves."""
     must: tuple[str, ...] = ()
     """What a target must be, all of it: `visible`, `structure`, `biological`, …"""
     must_not: tuple[str, ...] = ()

@@ -14,5 +14,14 @@ Everything here is a function of snapshots and of agents' replies; no clock, no 
 from khala_bridge.observe.feedback import Feedback, shorten
 from khala_bridge.observe.observation import AgentObservation, SideObservation, TeamObservation
 from khala_bridge.observe.observer import Observer
+from khala_bridge.observe.text.reply import rejection_line
 
-__all__ = ["AgentObservation", "Feedback", "Observer", "SideObservation", "TeamObservation", "shorten"]
+__all__ = [
+    "AgentObservation",
+    "Feedback",
+    "Observer",
+    "SideObservation",
+    "TeamObservation",
+    "rejection_line",
+    "shorten",
+]

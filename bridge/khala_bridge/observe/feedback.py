@@ -15,7 +15,7 @@ from khala_protocol.messages import count_refusals
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala_protocol.messages import NoteView, Received, Rejection, StandingView
+    from khala_protocol.messages import NoteView, Received, Rejection
 
 MAX_REJECTIONS = 10
 """Rejections that an observation lists; the others are counted."""
@@ -36,8 +36,6 @@ class Feedback:
     """Whether it gave an order or wrote a message."""
     notes: tuple[NoteView, ...] = ()
     """All of its notes."""
-    standing: tuple[StandingView, ...] = ()
-    """Its standing orders, and those that have ended since it was asked."""
 
 
 def shorten(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:

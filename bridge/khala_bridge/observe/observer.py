@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from khala_bridge.observe import army, economy, landmarks, side
 from khala_bridge.observe.body import to_tenth
@@ -40,7 +40,15 @@ if TYPE_CHECKING:
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig, TaskConfig
-    from khala_protocol.messages import Landmark, Toll, View
+    from khala_protocol.messages import Landmark, StandingView, Toll, View
+
+Standing: TypeAlias = "Callable[[str], tuple[StandingView, ...]]"
+"""Returns the standing orders of an agent, and those that have ended since it was asked."""
+
+
+def _none(_agent: str) -> tuple[StandingView, ...]:
+    """Return no standing orders."""
+    return ()
 
 
 class Observer:
@@ -64,7 +72,9 @@ class Observer:
         """Forget the episode before."""
         self._episode = _Episode(self._new_roster(self._task.agents))
 
-    def observe(self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None) -> SideObservation:
+    def observe(
+        self, snapshot: Snapshot, feedback: Mapping[str, Feedback] | None = None, standing: Standing = _none
+    ) -> SideObservation:
         """Return what the side sees now, with the feedback on each agent's last reply.
 
         An agent's observation is made on the first access through `agents`, so that one agent can think while the
@@ -73,6 +83,7 @@ class Observer:
         Args:
             snapshot: the state of the game.
             feedback: by agent; an agent that is not in it gets none.
+            standing: returns an agent's standing orders at this moment; called when its observation is made.
         """
         episode = self._episode
         world = snapshot.info.frame(self._task.frames)
@@ -82,7 +93,7 @@ class Observer:
             episode.places.note(snapshot)
         episode.note_orders(feedback or {})
         teams = {name: episode.roster.teams(name) for name in self._configs}
-        moment = episode.now = _Moment(self._task, snapshot, episode, teams, feedback or {})
+        moment = episode.now = _Moment(self._task, snapshot, episode, teams, feedback or {}, standing)
         moment.reach(world)
         agents = _WhenAsked(self._configs, partial(self._agent, moment))
         return SideObservation(snapshot, world, self._configs, teams, dict(episode.chronicle.died), agents)
@@ -129,7 +140,8 @@ class Observer:
         """Return the view of an agent: the common part, its teams, and the parts that its page shows."""
         scene = moment.scene
         parts = self._parts[agent.name]
-        view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=heard.standing)
+        standing = moment.standing(agent.name)
+        view = scene.view.but(teams=tuple(team.view for team in teams), notes=heard.notes, standing=standing)
         more: dict[str, object] = {}
         if "counts" in parts:
             more["counts"] = side.counts(scene, moment.episode.chronicle)
@@ -207,6 +219,7 @@ class _Moment:
     teams: Mapping[str, Sequence[Team]]
     """By agent."""
     feedback: Mapping[str, Feedback]
+    standing: Standing
     tasks: dict[tuple[str, str], str] = field(default_factory=dict)
     """By agent and team, the present task of a team with stages."""
     _changes: dict[int, Changes] = field(default_factory=dict)

@@ -11,7 +11,7 @@ refuses them, and `khala_bridge.auto`, which finds the host's orders; below is `
 targets are not judged here: they need the ground.
 """
 
-from khala_bridge.rules.cost import Cost, Shortfall, cases, facts_for, is_free, price_of
+from khala_bridge.rules.cost import Cost, Shortfall, cases, facts_for, is_free, is_instant, price_of
 from khala_bridge.rules.judge import AT_ONCE, Use, asked_by, nearest, nobody, sure, use_of, why_no_one, why_not
 from khala_bridge.rules.ledger import Ledger
 from khala_bridge.rules.unavailable import Kind, Unavailable, rank
@@ -37,6 +37,7 @@ __all__ = [
     "facts_for",
     "is_attack",
     "is_free",
+    "is_instant",
     "nearest",
     "nobody",
     "of_side",

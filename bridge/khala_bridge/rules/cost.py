@@ -54,6 +54,13 @@ def is_free(ability: int, unit_type: str) -> bool:
     return not any(any(price_of(case)) or case.energy or case.researches for case in cases(ability, unit_type))
 
 
+@functools.cache
+def is_instant(ability: int, unit_type: str) -> bool:
+    """Return True if an ability happens at once, and the orders of its user stay as they are."""
+    found = cases(ability, unit_type)
+    return bool(found) and all(case.instant for case in found)
+
+
 def facts_for(ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:
     """Return the facts of an ability for a type of unit; of several levels of research, the next one."""
     found = cases(ability, unit_type)

@@ -59,6 +59,7 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         executor=task.executor,
         clock=task.clock,
         agents=tuple(card for side in task.per_side() for card in side.cards()),
+        rethink=config.rethink,
         advisers=tuple(dict.fromkeys(adviser.name for side in task.per_side() for adviser in side.advisers)),
         catalogue_sha256=catalogue_sha256(),
         versions=versions(),

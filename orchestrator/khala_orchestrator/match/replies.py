@@ -8,11 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from khala_bridge.observe import rejection_line, shorten
+from khala_protocol.manual import VERDICT
 from khala_protocol.messages import Rejection
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.match.schedule import Decision
@@ -50,14 +52,13 @@ def is_too_old(decision: Decision, task: TaskConfig) -> bool:
     return limit is not None and decision.due_loop - decision.asked_loop > limit
 
 
-def say_unread(decision: Decision, speech: Speech | None, task: TaskConfig) -> Iterator[Rejection]:
+def say_unread(answer: Answer, agent: str, speech: Speech | None, task: TaskConfig) -> Iterator[Rejection]:
     """Yield one sentence to an agent of whose answer nothing could be read, or not the end.
 
     An answer with the heading of its actions, and none below it, says that there is nothing to do; so does one that
     only thinks, but a model whose form is not read would never learn it.
     """
-    answer = decision.answer
-    form = _ORDERS if task.agent(decision.seat.agent).teams else _WORDS
+    form = _ORDERS if task.agent(agent).teams else _WORDS
     if why := _WHY_NOTHING.get(answer.status):
         yield _unread(f"{why} {form}")
     elif answer.status != "ok" or speech is None or not answer.text:
@@ -70,6 +71,13 @@ def say_unread(decision: Decision, speech: Speech | None, task: TaskConfig) -> I
         yield _unread(f"Nothing could be read in your last answer. If it was meant to do something: {form}")
 
 
+def verdict_words(rejections: Sequence[Rejection]) -> str:
+    """Return what an agent is told of its reply, of which nothing is possible, for its next reply in the same step."""
+    lines = (rejection_line(rejection) for rejection in shorten(rejections))
+    return "\n".join([VERDICT, *(f"    {line}" for line in lines), _AGAIN])
+
+
+_AGAIN = "Answer the same observation again, and in full: only your new answer counts."
 _ORDERS = 'write your actions under "Actions:" and "Team <name>:", each as <Name(arguments)> on a line of its own.'
 _WORDS = "write your messages under \"Communications:\", each as <MessageTo(name, '''text''')> on a line of its own."
 _CUT = "Your last answer was cut at the limit of tokens; what was cut off was not read. Write less before your actions."

@@ -23,7 +23,7 @@ from khala_orchestrator.words.notebook import Notebook
 from khala_orchestrator.words.repeats import Repeats
 from khala_protocol.manual import manual
 from khala_protocol.messages import LOOPS_PER_S, AgentReport, Message, Observation, Received, Rejection, Report
-from khala_protocol.speech import ShownText
+from khala_protocol.speech import ShownText, parse
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -35,9 +35,14 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.match.schedule import Decision, StepId
+    from khala_orchestrator.match.turn import Answer
     from khala_orchestrator.words.mailbox import Post
-    from khala_protocol.messages import Advice, Fate, Timings, Trigger, Unasked
+    from khala_protocol.messages import Advice, Fate, StandingView, Timings, Trigger, Unasked
     from khala_protocol.speech import Speech
+
+
+JUDGED = frozenset({"ok", "empty", "cut", "refused", "filtered"})
+"""Statuses of replies that a model gave, after which its agent may rethink."""
 
 
 class SideTurn(NamedTuple):
@@ -73,9 +78,9 @@ class _Member:
     news: Feedback = field(default_factory=Feedback)
     """The feedback and the messages since that observation."""
 
-    def shown(self) -> ShownText:
-        """Return what it has read: a reply that repeats it orders nothing."""
-        return ShownText(self.seen.text, earlier=self.manual) if self.seen else self.manual
+    def shown(self, verdicts: Sequence[str] = ()) -> ShownText:
+        """Return what it has read, also of the host's verdicts: a reply that repeats it orders nothing."""
+        return ShownText(self.seen.text, *verdicts, earlier=self.manual) if self.seen else self.manual
 
     def offers(self) -> dict[str, Sequence[str]]:
         """Return by team the actions that were possible when it decided."""
@@ -144,11 +149,13 @@ class MatchSide:
                 member.news,
                 messages=member.letters.read(member.news.messages, snapshot.game_loop),
                 notes=member.notebook.notes,
-                standing=self._actor.standing.views(name),
             )
             for name, member in self._members.items()
         }
-        self._now = self._observer.observe(snapshot, feedback)
+        self._now = self._observer.observe(snapshot, feedback, self._standing)
+
+    def _standing(self, agent: str) -> tuple[StandingView, ...]:
+        return self._actor.standing_views(agent, self._now)
 
     def triggers_of(self, agent: str) -> Collection[Trigger]:
         """Return what happened to an agent since its last observation."""
@@ -192,6 +199,25 @@ class MatchSide:
         )
         return Question(observation, [picture.data for picture in seen.pictures])
 
+    # --- judging ------------------------------------------------------------------------------------
+
+    def judge(self, agent: str, answer: Answer) -> str:
+        """Return the verdict on a reply of which nothing is possible; "" if something is, or if it tries nothing.
+
+        It is judged alone and at this moment, as if it took effect now, and nothing comes of it. A reply that only
+        writes to others is possible. What an agent did not get from its model is not judged.
+        """
+        member = self._members[agent]
+        if member.seen is None or answer.status not in JUDGED:
+            return ""
+        speech = parse(answer.text or "", member.shown(answer.verdicts))
+        if speech.messages and not speech.calls and not speech.standing:
+            return ""
+        accepted, refused = self._actor.judge(self._now, speech, member.seen)
+        unread = replies.say_unread(answer, agent, speech, self.task)
+        rejections = (*refused, *unread)
+        return replies.verdict_words(rejections) if rejections and not accepted else ""
+
     # --- acting -------------------------------------------------------------------------------------
 
     def act(self, at: StepId, decisions: Sequence[Decision], advice: Sequence[Advice] = ()) -> SideTurn:
@@ -204,7 +230,9 @@ class MatchSide:
         """
         own = [decision for decision in decisions if decision.seat.side == self.name]
         words = {
-            decision.seat.agent: replies.read(decision, self.task, self._members[decision.seat.agent].shown())
+            decision.seat.agent: replies.read(
+                decision, self.task, self._members[decision.seat.agent].shown(decision.answer.verdicts)
+            )
             for decision in own
         }
         speeches = {agent: speech for agent, speech in words.items() if speech is not None}
@@ -231,7 +259,7 @@ class MatchSide:
                 yield fault
         time_s = round(self._now.snapshot.game_loop / LOOPS_PER_S, 1)
         yield from self._members[seat.agent].notebook.take(speech.notes if speech else (), time_s)
-        yield from replies.say_unread(decision, speech, self.task)
+        yield from replies.say_unread(decision.answer, seat.agent, speech, self.task)
 
     def _message(self, at: StepId, agent: str, recipient: str, text: str, *, human: bool = False) -> Message:
         return Message(
@@ -333,6 +361,7 @@ def _agent_report(at: StepId, decision: Decision, loop: int, fate: Fate | None, 
         accepted=heard.accepted,
         rejections=heard.rejections,
         ignored=answer.ignored,
+        rethinks=len(answer.verdicts),
         usage=answer.usage,
         asked_step=None if decision.asked == at else decision.asked.step,
         age_loops=loop - decision.asked_loop,

@@ -58,6 +58,7 @@ class Tally:
         self._fates: dict[str, Counter[str]] = defaultdict(Counter)
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
+        self._rethinks = Counter[str]()
         self._incidents: list[str] = []
         self._advisers: Counter[str] = Counter()
         self._lag_s = 0.0
@@ -73,6 +74,8 @@ class Tally:
             self._deeds.add(agent)
             self._usage[name] += agent.usage
             self._rejections.update(count_refusals(agent.rejections))
+            if agent.rethinks:
+                self._rethinks[name] += agent.rethinks
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:
@@ -126,6 +129,7 @@ class Tally:
             fates={name: dict(count) for name, count in self._fates.items()},
             accepted_of=dict(self._deeds.accepted),
             fallbacks={name: dict(count) for name, count in self._deeds.causes.items()},
+            rethinks=dict(self._rethinks),
             incidents=tuple(self._incidents[:MAX_INCIDENTS]),
             advisers=dict(self._advisers),
             age_p50_loops=_quantile(self._ages_loops, 0.5),

@@ -5,6 +5,9 @@ Below it: publishers of observations and their pictures, and one inbox of replie
 `khala_orchestrator.match.replies` reads the text of an answer. A question is open until its answer is collected. The
 first valid reply to an open question counts; all others are counted as ignored and dropped.
 
+An agent may ask to rethink (`Reply.rethink`): a reply of which nothing is possible is answered with a verdict, and its
+next reply counts, within the same deadline. If none comes, the reply before stands.
+
 The wait for an agent ends early when what it sent is not a reply, or when its liveliness token goes: it may still
 answer while the question is open. A required agent that goes is waited for as long as the clock's grace, and once it
 is back, as long as anybody: a restarted agent finds the question on the bus. If it does not come, it is lost.
@@ -24,7 +27,7 @@ from khala_protocol.bus import Delivery
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.errors import BusClosed, PeerError, WrongKey
 from khala_protocol.keys import Topic, agent_key, every_agent, image_key, parse
-from khala_protocol.messages import AgentStatus, Observation, Reply, Usage
+from khala_protocol.messages import AgentStatus, Observation, Reply, Usage, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -48,6 +51,7 @@ class Answer:
         status: who decided, or why nobody did; `late` and `gone` have no reply.
         latency_s: from the publication of the observation to the reply's arrival.
         ignored: replies of this agent that arrived since its answer before and were not accepted.
+        verdicts: the host's words on its replies to the same question before this one.
     """
 
     status: AgentStatus
@@ -55,6 +59,7 @@ class Answer:
     detail: str = ""
     latency_s: float | None = None
     ignored: int = 0
+    verdicts: tuple[str, ...] = ()
 
     @property
     def text(self) -> str | None:
@@ -102,6 +107,14 @@ class Question(NamedTuple):
     pictures: Sequence[bytes] = ()
 
 
+class Judge(Protocol):
+    """Judges a reply when it arrives."""
+
+    def __call__(self, seat: Seat, answer: Answer) -> str:
+        """Return the verdict on a reply of which nothing is possible; "" if something is, or nothing was tried."""
+        ...
+
+
 class AgentPool(Protocol):
     """The agents of a match, as the match sees them; a recording can stand in for live ones."""
 
@@ -125,8 +138,11 @@ class _Question:
     held_at: float | None = None
     """When its agent, which is required, went away."""
     reply: Reply | None = None
+    """The newest one that counts."""
     arrived_at: float = 0.0
     fault: str = ""
+    verdicts: list[str] = field(default_factory=list)
+    """On the replies so far."""
 
     @property
     def held(self) -> bool:
@@ -138,9 +154,22 @@ class _Question:
         if not self.held and self.observation.answer_within_s is not None:
             self.until = now + self.observation.answer_within_s
 
+    @property
+    def is_answered(self) -> bool:
+        """Whether a reply came to what was asked last: the observation, or the verdict on the reply before."""
+        return self.reply is not None and self.reply.rethinks == len(self.verdicts)
+
     def answers_to(self, reply: Reply) -> bool:
-        """Return whether a reply is the first one to this question."""
-        return self.reply is None and (reply.episode, reply.step) == (self.observation.episode, self.observation.step)
+        """Return whether a reply is the first one to what was asked last."""
+        asked = (self.observation.episode, self.observation.step, len(self.verdicts))
+        return not self.is_answered and (reply.episode, reply.step, reply.rethinks) == asked
+
+    def ask_again(self, verdict: str) -> None:
+        """Ask the same again, with a verdict on the newest reply."""
+        self.verdicts.append(verdict)
+        number = len(self.verdicts)
+        self.observation = self.observation.model_copy(update={"verdict": Verdict(number=number, text=verdict)})
+        self.payload = encode(self.observation)
 
 
 class Turn:
@@ -155,10 +184,12 @@ class Turn:
         required: Iterable[Seat] = (),
         grace_s: float = 0.0,
         advice: Callable[[], Sequence[Advice]] = lambda: (),
+        judge: Judge = lambda seat, answer: "",  # noqa: ARG005  # the names that a judge's arguments have
     ) -> None:
         """Take a bus, the run's name, its agents, and the required ones, which are waited for when they are away.
 
-        `advice` returns what advisers have written since it was last called.
+        `advice` returns what advisers have written since it was last called; `judge` says whose reply is answered with
+        a verdict.
         """
         self._bus = bus
         self._run = run
@@ -166,6 +197,7 @@ class Turn:
         self._required = frozenset(required)
         self._grace_s = grace_s
         self._advice = advice
+        self._judge = judge
         self._publishers: dict[Seat, Publisher] = {}
         self._frames: dict[tuple[Seat, int], Publisher] = {}
         self._inbox: Subscription[Sample] | None = None
@@ -249,7 +281,9 @@ class Turn:
         asked = self._open.get(seat)
         if asked is None or not asked.waiting or asked.held:
             return
-        if seat in self._required:
+        if asked.reply is not None:  # which stands
+            asked.waiting = False
+        elif seat in self._required:
             asked.held_at = asyncio.get_running_loop().time()
             asked.until = asked.held_at + self._grace_s
             log.warning("required agent %s is away; waiting for it for %g s", seat, self._grace_s)
@@ -260,7 +294,7 @@ class Turn:
     async def _here(self, seat: Seat) -> None:
         """Ask an agent again that is back: what it sent while its link was down is lost, and it may send it again."""
         asked = self._open.get(seat)
-        if asked is None or asked.reply is not None:
+        if asked is None or asked.is_answered:
             return
         if asked.held_at is not None:
             now = asyncio.get_running_loop().time()
@@ -336,7 +370,8 @@ class Turn:
         ignored = self._ignored.pop(seat, 0)
         if asked.reply is not None:
             latency_s = asked.arrived_at - asked.asked_at
-            return Answer(asked.reply.status, asked.reply, asked.reply.detail, latency_s, ignored)
+            verdicts = tuple(asked.verdicts[: asked.reply.rethinks])
+            return Answer(asked.reply.status, asked.reply, asked.reply.detail, latency_s, ignored, verdicts)
         if asked.fault:
             return Answer("malformed", detail=asked.fault, ignored=ignored)
         if not self._roster.is_present(seat):
@@ -360,9 +395,9 @@ class Turn:
                 log.warning("%s", error)
                 continue
             assert address.side is not None and address.agent is not None
-            self._take_reply(Seat(address.side, address.agent), sample.payload)
+            await self._take_reply(Seat(address.side, address.agent), sample.payload)
 
-    def _take_reply(self, seat: Seat, payload: bytes) -> None:
+    async def _take_reply(self, seat: Seat, payload: bytes) -> None:
         if seat not in self._publishers:
             log.warning("%s is not in this match, and sent a reply", seat)
             return
@@ -373,7 +408,7 @@ class Turn:
         except PeerError as error:
             log.warning("agent %s sent no valid reply: %s", seat, error)
             self._ignored[seat] += 1
-            if asked is not None and asked.reply is None and not asked.held:  # one that is away did not send it
+            if asked is not None and not asked.is_answered and not asked.held:  # one that is away did not send it
                 asked.fault = str(error)
                 asked.waiting = False
                 self._changed.set()
@@ -383,11 +418,21 @@ class Turn:
             return
         asked.reply = reply
         asked.arrived_at = asyncio.get_running_loop().time()
-        asked.waiting = False
         if asked.held:
             self._end_hold(asked, asked.arrived_at)
+        if verdict := self._verdict_on(seat, asked, reply):
+            asked.ask_again(verdict)
+            await self._publishers[seat].put(asked.payload)
+            return
+        asked.waiting = False
         if not any(other.waiting for other in self._open.values()):
             self._changed.set()
+
+    def _verdict_on(self, seat: Seat, asked: _Question, reply: Reply) -> str:
+        """Return what is said to an agent that rethinks of a reply of which nothing is possible; "" to go on."""
+        if not asked.waiting or reply.rethinks >= reply.rethink:
+            return ""
+        return self._judge(seat, Answer(reply.status, reply, verdicts=tuple(asked.verdicts)))
 
     def _check_sender(self, seat: Seat, reply: Reply) -> None:
         if (reply.run, reply.side, reply.agent) != (self._run, *seat):

@@ -116,6 +116,10 @@ class RecordedTurn:
         self._sides = len({report.side for report in recording.of(Report)} or {None})
         self._steps: Iterator[RecordedStep] = (s for s in recording.by_step() if s.episode >= first_episode)
         self._replies = accepted_replies(recording)
+        self._verdicts = {
+            (seen.episode, seen.step, Seat(seen.side, seen.agent), seen.verdict.number): seen.verdict.text
+            for seen in recording.of(Observation) if seen.verdict is not None
+        }  # fmt: skip
         self._outcomes: dict[tuple[int, int, Seat], AgentReport] = {}
         for report in recording.of(Report):
             for agent in report.agents:
@@ -159,19 +163,24 @@ class RecordedTurn:
         reply = self._replies.get((episode, asked, seat))
         if reply is None:
             return Answer("late", detail="no reply before the deadline")
-        return Answer(reply.status, reply, reply.detail, reply.latency_s)
+        return Answer(reply.status, reply, reply.detail, reply.latency_s, verdicts=self._verdicts_before(reply))
 
     def _answer(self, episode: int, asked: int, seat: Seat, agent: AgentReport) -> Answer:
         reply = self._replies[episode, asked, seat] if agent.latency_s is not None else None
-        return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored)
+        verdicts = self._verdicts_before(reply) if reply else ()
+        return Answer(agent.status, reply, agent.detail, agent.latency_s, agent.ignored, verdicts)
+
+    def _verdicts_before(self, reply: Reply) -> tuple[str, ...]:
+        place = reply.episode, reply.step, Seat(reply.side, reply.agent)
+        return tuple(self._verdicts[*place, number] for number in range(1, reply.rethinks + 1))
 
     def _compare(self, step: RecordedStep, observations: Iterable[Observation]) -> None:
         sent = {(observation.side, observation.agent): encode(observation).decode() for observation in observations}
         missing = dict(sent)
         for sample in step.samples:
             message = sample.message if sample.is_of(Observation) else None
-            if not isinstance(message, Observation) or message.step != step.step:
-                continue  # a host that goes on after it was killed asks again what was open, maybe for some steps
+            if not isinstance(message, Observation) or message.step != step.step or message.verdict is not None:
+                continue  # a verdict follows from the reply before it, and a killed host that goes on asks again
             now = sent.get((message.side, message.agent), "")
             recorded = sample.payload.decode()
             missing.pop((message.side, message.agent), None)
@@ -185,18 +194,25 @@ class RecordedTurn:
 
 
 def accepted_replies(recording: Recording) -> dict[tuple[int, int, Seat], Reply]:
-    """Return the first reply to each question since it was last asked.
+    """Return the first reply to each question since it was last asked; of an agent that rethought, the one that counts.
 
     A host asks again only what it has no answer to. What came before was lost with the host before it, or was a guess.
+    A report says which reply counted; where there is none, it was the last one.
     """
-    replies: dict[tuple[int, int, Seat], Reply] = {}
+    replies: dict[tuple[int, int, Seat], dict[int, Reply]] = {}
+    counted: dict[tuple[int, int, Seat], int] = {}
     for sample in recording:
-        match sample.message if sample.is_of(Observation, Reply) else None:
-            case Observation() as seen:
+        match sample.message if sample.is_of(Observation, Reply, Report) else None:
+            case Observation(verdict=None) as seen:
                 replies.pop((seen.episode, seen.step, Seat(seen.side, seen.agent)), None)
             case Reply() as reply if sample.key.endswith(f"/{reply.side}/{reply.agent}/{Topic.REPLY}"):
-                replies.setdefault((reply.episode, reply.step, Seat(reply.side, reply.agent)), reply)
-    return replies
+                place = reply.episode, reply.step, Seat(reply.side, reply.agent)
+                replies.setdefault(place, {}).setdefault(reply.rethinks, reply)
+            case Report() as report:
+                for agent in report.agents:
+                    asked = report.step if agent.asked_step is None else agent.asked_step
+                    counted[report.episode, asked, Seat(agent.side, agent.agent)] = agent.rethinks
+    return {place: found.get(counted.get(place, -1)) or found[max(found)] for place, found in replies.items()}
 
 
 def _advice(message: Message) -> Advice:

@@ -76,7 +76,7 @@ class Unfinished:
         replies = accepted_replies(self.recording)
         found = ((seen, replies.get((seen.episode, seen.step, seat))) for seen in self.recording.of(
             Observation, agent=seat.agent, side=seat.side
-        ) if seen.episode == self.episode)  # fmt: skip
+        ) if seen.episode == self.episode and seen.verdict is None)  # fmt: skip
         return [(seen, reply.text) for seen, reply in found if reply is not None and reply.status == "ok"]
 
     def kept(self) -> Iterator[Recorded]:

@@ -101,8 +101,11 @@ def transcript(path: Path, selection: StepSelection, *, whole: bool = False) -> 
             case Result() as result:
                 yield table(result, named=named)
             case Observation() as seen if whole and selection.holds(seen.step, _seat(seen)):
-                title = Text.assemble(f"step {seen.step}, ", _speaker(seen, named=named), " sees")
-                yield _quotation(title, seen.text, "cyan")
+                heard = " is told" if seen.verdict else " sees"
+                title = Text.assemble(f"step {seen.step}, ", _speaker(seen, named=named), heard)
+                yield _quotation(title, seen.verdict.text if seen.verdict else seen.text, "cyan")
+                if seen.verdict:
+                    continue
                 yield from (_picture(image) for image in seen.images)
             case Reply() as reply if whole and selection.holds(reply.step, _seat(reply)):
                 title = Text.assemble(f"step {reply.step}, ", _speaker(reply, named=named), " says")
@@ -148,10 +151,11 @@ def _report(report: Report, selection: StepSelection, *, named: bool) -> Iterato
 def _agent(agent: AgentReport, *, named: bool) -> Iterator[Text]:
     latency = "" if agent.latency_s is None else f" after {agent.latency_s * 1000:.0f} ms"
     ignored = f", {agent.ignored} ignored" if agent.ignored else ""
+    rethinks = f", asked to rethink {agent.rethinks}×" if agent.rethinks else ""  # noqa: RUF001  # times
     why = ": ".join(filter(None, (agent.detail, agent.reason)))
     detail = f" ({visible_line(why)})" if why else ""
     status = (agent.status, style_of(agent.status))
-    yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{ignored}")
+    yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{rethinks}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
         yield Text.assemble(

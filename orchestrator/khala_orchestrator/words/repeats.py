@@ -1,4 +1,4 @@
-"""Refusals that an agent gets again and again: from the third on the sentence says so, and what else there is.
+"""Refusals that an agent gets again and again: from the third on the sentence says so, and what else there was.
 
 A model that orders what was refused reads the same sentence again, and orders it again: one did so 92 times in a game.
 `khala_orchestrator.match.side` is above.
@@ -31,10 +31,13 @@ class Repeats:
 
         Args:
             rejections: of all calls in the decision; a decision without one ends the row.
-            offers: by team, the actions that were possible when the agent decided.
+            offers: by team, the actions that were possible when the agent decided. Those of which a call is refused now
+                are not recommended in place of another one.
         """
         self._counts = {key: self._counts.get(key, 0) + 1 for key in map(_key, rejections)}
-        return tuple(_with_count(rejection, self._counts[_key(rejection)], offers) for rejection in rejections)
+        refused = {(rejection.team, _name_of(rejection)) for rejection in rejections}
+        left = {team: [name for name in names if (team, name) not in refused] for team, names in offers.items()}
+        return tuple(_with_count(rejection, self._counts[_key(rejection)], left) for rejection in rejections)
 
 
 def _key(rejection: Rejection) -> Key:
@@ -43,11 +46,15 @@ def _key(rejection: Rejection) -> Key:
     return rejection.team, call, rejection.reason
 
 
+def _name_of(rejection: Rejection) -> str:
+    return rejection.text.partition("(")[0].lstrip("<")
+
+
 def _with_count(rejection: Rejection, times: int, offers: Mapping[str, Sequence[str]]) -> Rejection:
     if times < OFTEN or not rejection.text:
         return rejection
     names = offers.get(rejection.team or "") or [name for its in offers.values() for name in its]
-    others = [name for name in dict.fromkeys(names) if f"<{name}(" not in rejection.text][:MOST_OFFERS]
-    instead = f"; possible now: {', '.join(others)}" if others else ""
+    others = list(dict.fromkeys(name for name in names if name != _name_of(rejection)))[:MOST_OFFERS]
+    instead = f"; what was possible: {', '.join(others)}" if others else ""
     more = f"Refused {times} times in a row for the same reason{instead}."
     return rejection.but(message=f"{rejection.message} {more}")

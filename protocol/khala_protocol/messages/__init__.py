@@ -44,6 +44,7 @@ from khala_protocol.messages.to_agents import (
     Rejection,
     RejectionReason,
     TeamSpec,
+    Verdict,
     count_refusals,
     refusals_by_reason,
 )
@@ -198,6 +199,7 @@ __all__ = [
     "UnitView",
     "Usage",
     "ValidArguments",
+    "Verdict",
     "View",
     "WarpGates",
     "Wire",

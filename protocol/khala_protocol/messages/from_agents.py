@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from khala_protocol.messages.base import Count, Frozen, Point, Wire
 from khala_protocol.messages.to_agents import ImageRef
 from khala_protocol.messages.usage import Pace, Usage
+from khala_protocol.rethinks import MAX_RETHINKS
 
 MAX_DETAIL_CHARACTERS = 200
 """Longest reason why an agent did not decide."""
@@ -51,7 +52,7 @@ class Call(Frozen):
 
 
 class Reply(Wire):
-    """Agent → host: the answer to one observation. The first valid one of a step counts."""
+    """Agent → host: the answer to one observation. The first valid one of a step counts; after a verdict, the next."""
 
     kind: Literal["reply"] = "reply"
     agent: str
@@ -69,10 +70,15 @@ class Reply(Wire):
     """Whether the agent's endpoint refuses it for good: its key or its model is wrong."""
     cut: bool = False
     """Whether its model reached its limit of tokens within the text."""
+    rethink: int = Field(default=0, ge=0, le=MAX_RETHINKS)
+    """How often the agent wants to reply again to one observation, if nothing of its reply is possible."""
+    rethinks: int = Field(default=0, ge=0, le=MAX_RETHINKS)
+    """Number of the verdict that it answers; 0 for a reply to the observation itself."""
     latency_s: float = 0.0
     """From the arrival of the observation to this reply."""
     attempts: Count = 0
     usage: Usage = Usage()
+    """Of all requests since the observation first arrived."""
     pace: Pace | None = None
     """The pace of its model, if the model file gives one; see `Clock.pace`."""
 

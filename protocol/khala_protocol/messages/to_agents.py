@@ -11,6 +11,7 @@ from khala_protocol.clock_rule import ClockRule
 from khala_protocol.messages.base import Count, Frozen, Wire
 from khala_protocol.messages.usage import Pace
 from khala_protocol.messages.view import ActionSpec, View
+from khala_protocol.rethinks import MAX_RETHINKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -207,6 +208,15 @@ class Received(Frozen):
     """Whether an earlier observation had it, too."""
 
 
+class Verdict(Frozen):
+    """The host's answer to a reply of which nothing is possible: the agent may reply once more (`Reply.rethink`)."""
+
+    number: int = Field(ge=1, le=MAX_RETHINKS)
+    """From 1, of the verdicts on the replies to this observation."""
+    text: str
+    """What was refused and why, in words; the game and the deadline are those of the observation."""
+
+
 class Observation(Wire):
     """Host → agent: what one agent sees at one step. A pure function of what was recorded before."""
 
@@ -228,3 +238,5 @@ class Observation(Wire):
     rejections: tuple[Rejection, ...] = ()
     """The agent's calls of the last step that were not carried out."""
     messages: tuple[Received, ...] = ()
+    verdict: Verdict | None = Field(default=None, exclude_if=lambda verdict: verdict is None)
+    """On the agent's reply to this very observation, which is sent again for it; absent when it is sent first."""

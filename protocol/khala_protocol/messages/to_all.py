@@ -77,6 +77,9 @@ class Run(Wire):
     executor: Literal["raw", "screen"]
     clock: Clock
     agents: tuple[AgentCard, ...]
+    rethink: dict[str, int] = {}
+    """By agent that may be asked again in a step because nothing of its reply is possible: how often. Only of agents
+    that the host itself starts; `Result.rethinks` has the others, too."""
     advisers: tuple[str, ...] = ()
     """Who may write to agents from outside the match; `Result.advisers` says who did."""
     catalogue_sha256: str
@@ -126,6 +129,8 @@ class AgentReport(Frozen):
     rejections: tuple[Rejection, ...] = ()
     ignored: int = 0
     """Replies that arrived and were not executed: duplicates, late or foreign ones."""
+    rethinks: int = 0
+    """How many replies it gave before this one, of which nothing was possible (`Reply.rethink`)."""
     usage: Usage = Usage()
     asked_step: int | None = Field(default=None, ge=0)
     """Step of the observation that it answers; None for the step of the report."""
@@ -231,6 +236,8 @@ class Result(Wire):
     """By agent: how many of its orders were carried out."""
     fallbacks: dict[str, dict[str, int]] = {}
     """By agent: how often it did not decide itself, by reason."""
+    rethinks: dict[str, int] = {}
+    """By agent that was asked to rethink: how often, over all steps."""
     incidents: tuple[str, ...] = ()
     """The first incidents of its reports, each with its step."""
     advisers: dict[str, int] = {}

@@ -366,7 +366,7 @@ class StandingView(Frozen):
     times: int = 0
     """How often it was carried out."""
     waits_for: str = ""
-    """Why it was not carried out in the last step; "" if it was."""
+    """Why it cannot be carried out at this moment; "" if it can."""
     ended: str = ""
     """Why it is no longer in force; "" if it is. The next observation no longer has it."""
 

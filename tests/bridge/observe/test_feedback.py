@@ -60,5 +60,5 @@ def test_no_message_passes_for_other_text(text: str) -> None:
 
 @given(st.text(st.sampled_from("'\"\n\r\x0b\x0c\x1c\x85\u2028 ab<>/"), max_size=60))
 def test_no_rejection_has_several_lines(text: str) -> None:
-    line = reply._rejection(rejection(text, message=text, team=text))
+    line = reply.rejection_line(rejection(text, message=text, team=text))
     assert line.splitlines() == [line] or not line

@@ -88,6 +88,15 @@ def test_settings_reach_the_task() -> None:
     assert (task.map_spec.difficulty, task.map_spec.opponent) == ("hard", "terran")
 
 
+def test_models_may_rethink_and_those_that_may_not_are_the_matches_that_they_were() -> None:
+    def match(**fields: Any) -> PlannedMatch:
+        return plan(experiment(seeds=[7], fixed={"task": "2s3z"} | fields, factors={"player": PLAYERS[:1]}))[0]
+
+    plain, none, one = match(), match(rethink=0), match(rethink=1)
+    assert one.minds["blue"].rethink == 1
+    assert plain.key == none.key != one.key
+
+
 def test_an_agent_may_have_a_model_of_its_own() -> None:
     found = experiment(fixed={"model": "silent", "agents": {"Zealots": "skilled"}}, factors={"task": ["2s3z_pair"]})
     (match, *_) = plan(found)

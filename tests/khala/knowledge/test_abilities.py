@@ -42,6 +42,7 @@ def special(version: str) -> dict[int, AbilityFacts]:
         ("supply", lambda row: row.supply),
         ("charges", lambda row: row.charges.max if row.charges else 0),
         ("autocast", lambda row: row.autocast or None),
+        ("instant", lambda row: row.transient),
         ("must", lambda row: tuple(word.lower() for word in row.filters.required)),
         ("must_not", lambda row: tuple(word.lower() for word in row.filters.excluded)),
     ],

@@ -31,7 +31,7 @@ def rejections(page: Page) -> Iterator[str]:
     """Show the calls that were not carried out, and why."""
     if page.observation.heard.rejections:
         yield "Your last errors"
-    yield from (f"{INDENT}{_rejection(fault)}" for fault in page.observation.heard.rejections)
+    yield from (f"{INDENT}{rejection_line(fault)}" for fault in page.observation.heard.rejections)
 
 
 @section("messages")
@@ -55,7 +55,8 @@ def communication(page: Page) -> Iterator[str]:
         yield f"{INDENT}Channels: {', '.join(page.channels)}"
 
 
-def _rejection(fault: Rejection) -> str:
+def rejection_line(fault: Rejection) -> str:
+    """Return a refusal as an agent reads it, on one line."""
     words = one_line(f"{fault.team} {fault.text}" if fault.team else fault.text)
     return f"rejected: {words}: {one_line(fault.message)}" if words else one_line(fault.message)
 
