@@ -19,12 +19,13 @@ from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
+from khala_agents.llm.gemini import Gemini
 from khala_agents.llm.limits import LONGEST_ANSWER, RequestLimits, own_turns
 from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices, check_priced, price_of
-from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.replay import ReplayClient
+from khala_agents.llm.responses import Responses
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
@@ -66,20 +67,22 @@ def client_for(config: ModelConfig) -> LLMClient:
         "headers": {name: _sent(value) for name, value in config.headers.items()},
         "query": {name: _sent(value) for name, value in config.query.items()},
         "temperature": config.temperature,
+        "reasoning_effort": config.reasoning_effort,
         "extra": config.extra,
     }
     if config.key_header is not None:
         sent["key_header"] = config.key_header.name, config.key_header.prefix
-    if config.profile == "anthropic":
-        return Anthropic(max_tokens=config.max_tokens or 1024, **sent)
-    return OpenAICompatible(
-        PROFILES[config.profile],
-        max_tokens=config.max_tokens,
-        seed=config.seed,
-        system_role=config.system_role,
-        detail=config.images.detail if config.images else "auto",
-        **sent,
-    )
+    if config.row.api == "anthropic":
+        return Anthropic(max_tokens=config.max_tokens or 1024, stop=config.stop, **sent)
+    sent |= {"max_tokens": config.max_tokens, "system_role": config.system_role}
+    detail = config.images.detail if config.images else "auto"
+    match config.row.api:
+        case "gemini":
+            return Gemini(config.row, seed=config.seed, stop=config.stop, **sent)
+        case "responses":
+            return Responses(config.row, detail=detail, **sent)
+        case "chat":
+            return OpenAICompatible(config.row, seed=config.seed, stop=config.stop, detail=detail, **sent)
 
 
 def _sent(value: SentValue) -> str:

@@ -225,7 +225,8 @@ def _identity(mind: Minds) -> dict[str, Any]:
 
 def _model_file(name: str) -> Mapping[str, Any]:
     """Return what a model file says of the answers; how it is reached and limited is no part of that."""
-    fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
+    fields = {"profile", "model", "system_role", "answer", "max_tokens", "temperature", "seed", "stop"}
+    fields |= {"reasoning_effort", "extra", "images", "pace", "try_timeout_s"}
     return load_model(name).model_dump(mode="json", include=fields)
 
 

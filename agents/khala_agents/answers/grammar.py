@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from khala_agents.answers.schema import written_point
+from khala_agents.answers.schema import ANALYSIS_CHARACTERS, written_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from khala_agents.answers.choices import Argument, Choices, Option
 
-ANALYSIS_CHARACTERS: Final = 300
 MESSAGE_CHARACTERS: Final = 200
 MOST_LINES: Final = 4
 """Messages and notes in an answer."""

@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 
 Schema = dict[str, Any]
 
+ANALYSIS_CHARACTERS: Final = 300
+"""Of the thoughts in front of the orders: a small model that goes on with them reaches its limit of tokens."""
 NO_FIELDS: Final[Mapping[str, Schema]] = MappingProxyType({})
 ANY_TAG: Final[Schema] = {"type": "string", "pattern": "^0x[0-9a-f]+$"}
 TEXT: Final[Schema] = {"type": "string"}
+ANALYSIS: Final[Schema] = {**TEXT, "maxLength": ANALYSIS_CHARACTERS}
 NUMBER: Final[Schema] = {"type": "integer"}
 UNTIL: Final[Schema] = {
     "type": ["string", "null"],
@@ -31,7 +34,7 @@ UNTIL: Final[Schema] = {
 def answer_schema(choices: Choices) -> Schema:
     """Return the schema of an answer: an object with an analysis and lists of what is said."""
     definitions: dict[str, Schema] = {}
-    fields: dict[str, Schema] = {"analysis": TEXT}
+    fields: dict[str, Schema] = {"analysis": ANALYSIS}
     if choices.options:
         orders = [_order(choices, *alike, definitions) for alike in _alike(choices)]
         fields["orders"] = {**_list({"anyOf": orders}), "maxItems": choices.most * len(choices.teams)}

@@ -21,7 +21,14 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from khala_agents.llm.address import checked_address
-from khala_agents.llm.client import Departure, LLMError, MalformedCompletion, RequestRefused, Unreachable
+from khala_agents.llm.client import (
+    Departure,
+    LLMError,
+    MalformedCompletion,
+    RequestRefused,
+    Unauthorized,
+    Unreachable,
+)
 from khala_agents.llm.faults import error_for
 from khala_agents.llm.network import Trust, find_trust, proxy_for
 from khala_agents.secret import excerpt
@@ -33,7 +40,9 @@ if TYPE_CHECKING:
     from pydantic import SecretStr
 
 _WARM_TIMEOUT_S = 5.0
-OK, UNAUTHORIZED = 200, 401
+OK = 200
+UNAUTHORIZED = frozenset({400, 401})
+"""Statuses with which the list of models is refused for a wrong key; the first is Gemini's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +146,8 @@ class HttpEndpoint:
         with suppress(httpx.HTTPError, httpx.InvalidURL, TimeoutError):
             async with asyncio.timeout(_WARM_TIMEOUT_S):
                 answer = await self._answer("GET", "/models")
-            if answer.status == UNAUTHORIZED:
-                raise answer.error
+            if answer.status in UNAUTHORIZED and isinstance(error := answer.error, Unauthorized):
+                raise error
 
     async def close(self) -> None:
         """Close the connections; the next request opens new ones."""

@@ -226,6 +226,6 @@ async def test_a_gateway_that_refuses_marks_for_a_cache_gets_none() -> None:
 
 
 def test_a_name_that_is_a_usual_word_counts_only_where_it_is_named() -> None:
-    body = {"model": "m", "messages": [], "stop": ["x"], "user": "me"}
+    body = {"stop": ["x"], "user": "me"}
     assert Quirks().learn(b"unsupported: a user may not stop here", body, None) == ""
     assert Quirks().learn(b"unsupported: 'stop'", body, None) == "leaves stop out, which it refuses"
