@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from khala_agents.answers.form import AnswerRule
+from khala_agents.batch_policy import LONGEST_BATCH_S, BatchPolicy
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
 from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
@@ -68,6 +69,7 @@ def client_for(config: ModelConfig) -> LLMClient:
         "query": {name: _sent(value) for name, value in config.query.items()},
         "temperature": config.temperature,
         "reasoning_effort": config.reasoning_effort,
+        "batch": config.batch,
         "extra": config.extra,
     }
     if config.key_header is not None:
@@ -126,12 +128,13 @@ class Workshop:
             return load_policy(spec.policy)
         assert spec.model is not None
         config, limits = self._model(spec.model)
-        model = LLMPolicy(
+        kind = BatchPolicy if config.batch else LLMPolicy
+        model = kind(
             client_for(config),
             memory=spec.memory,
             retry=config.retry,
             limits=limits,
-            try_timeout_s=config.try_timeout_s,
+            try_timeout_s=config.try_timeout_s or (LONGEST_BATCH_S if config.batch else None),
             vision=config.vision,
             pace=config.pace,
             answer=config.answer,
@@ -166,7 +169,8 @@ def _with_address(config: ModelConfig) -> ModelConfig:
 def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
     """Return the prices of a model: those of its file if it is the model of the file, or else the list price."""
     is_of_the_file = config.model == file.model or config.profile == "scripted"  # all of whose players are free
-    return config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
+    prices = config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
+    return prices.in_batch if config.batch else prices
 
 
 def _change(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:

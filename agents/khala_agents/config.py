@@ -124,6 +124,9 @@ class ModelConfig(Frozen):
     """How much the model thinks; each model takes some of the words. None: as much as it does by default."""
     extra: dict[str, JsonValue] = Field(default_factory=dict)
     """Fields of the request body, as they are."""
+    batch: bool = False
+    """Whether requests wait for a batch, at half of the `prices`: OpenAI and Anthropic answer most within an hour and
+    all within a day. For clocks on which the game stands still, with a wait of an hour or more for each step."""
     try_timeout_s: float | None = Field(default=None, gt=0)
     """Time for one try; the time to the step's deadline if that is shorter. None: half of what the step gives, at least
     45 s, so that a slow model answers and a lost request is made again; 10 minutes without a deadline."""
@@ -202,6 +205,11 @@ class ModelConfig(Frozen):
         if self.system_role is not None and self.system_role not in row.system_roles:
             roles = " or ".join(row.system_roles)
             raise ValueError(f"{self.profile} has a field for the system message: {_instead('system_role', roles)}")
+        if self.batch and not row.batch:
+            takers = ", ".join(name for name, profile in PROFILES.items() if profile.batch)
+            raise ValueError(f"{self.profile} takes no batches: {takers} do")
+        if self.batch and self.limits != LimitRules():
+            raise ValueError("a batch has all requests at once: remove limits")
         if self.stop and not row.stop:
             raise ValueError(f"{self.profile} takes no stop: remove it")
         return self

@@ -180,6 +180,14 @@ BAD_MODELS = [
         GOOD.replace("vllm", "responses") + "api_key_env: A\nstop: [END]",
         "m.yaml:1: responses takes no stop: remove it",
     ),
+    (
+        GOOD + "batch: true",
+        "m.yaml:1: vllm takes no batches: openai, openai-reasoning, responses, anthropic do",
+    ),
+    (
+        GOOD.replace("vllm", "openai") + "api_key_env: A\nbatch: true\nlimits: {in_flight: 4}",
+        "m.yaml:1: a batch has all requests at once: remove limits",
+    ),
     (GOOD + "stop: ['']", "m.yaml:4 (stop.0): string should have at least 1 character, not ''"),
     (
         GOOD + "reasoning_effort: much",

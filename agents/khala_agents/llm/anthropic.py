@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
+from khala_agents.llm.batches import AnthropicBatches
 from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.quirks import CACHE_MARK
 from khala_agents.llm.schemas import LIMITING, without
@@ -43,6 +44,7 @@ class Anthropic(HttpClient[_Answer]):
     KEY_HEADER = ("x-api-key", "")
     HEADERS: ClassVar = {"anthropic-version": "2023-06-01"}
     MARKS_CACHE = True
+    BATCHES = AnthropicBatches
 
     def __init__(
         self,

@@ -12,11 +12,13 @@ import asyncio
 from abc import ABC, abstractmethod
 from base64 import b64encode
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Required, TypedDict, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import to_json
 
+from khala_agents.llm.batches import BatchApi, Batcher, batcher_for
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
 from khala_agents.llm.faults import no_completion, verdict_of, without_byte_order_mark
 from khala_agents.llm.http import OK, HttpEndpoint
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from pydantic import JsonValue, SecretStr
 
     from khala_agents.answers.form import AnswerShape
+    from khala_agents.llm.client import Departure
     from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
     from khala_protocol.messages import ChatMessage, Usage
@@ -62,6 +65,8 @@ class ClientOptions(TypedDict, total=False):
     """Fields of the request body, unchanged."""
     system_role: SystemRole | None
     """Of the system message; None: as the API has it."""
+    batch: bool
+    """Whether requests wait for a batch (`khala_agents.llm.batches`)."""
 
 
 class AnswerBody(BaseModel):
@@ -88,6 +93,7 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         CALLED: what errors call an answer.
         KEY_HEADER: name and prefix of the header that carries the key.
         HEADERS: sent with each request, before those of the options.
+        BATCHES: the batches of the API; None if it has none.
         MARKS_CACHE: whether requests mark the messages that a cache should keep.
     """
 
@@ -97,15 +103,18 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
     KEY_HEADER: ClassVar[tuple[str, str]] = ("Authorization", "Bearer ")
     HEADERS: ClassVar[Mapping[str, str]] = {}
     MARKS_CACHE: ClassVar[bool] = False
+    BATCHES: ClassVar[type[BatchApi] | None] = None
 
     def __init__(self, asked: Mapping[str, Any], options: ClientOptions) -> None:
-        http = HttpEndpoint(
+        self._connect = partial(
+            HttpEndpoint,
             options["base_url"],
             headers={**self.HEADERS, **options.get("headers", {})},
             query=options.get("query"),
             key_header=options.get("key_header", self.KEY_HEADER),
             key=options.get("key"),
         )
+        http = self._connect()
         fields = {name: value for name, value in asked.items() if value is not None} | dict(options.get("extra", {}))
         limits = [value for name in ALL_LIMITS if isinstance(value := fields.get(name), int)]
         self.model = options["model"]
@@ -115,6 +124,10 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         self.params: Mapping[str, Scalar] = {}
         self._system_role = options.get("system_role")
         self._path = self.PATH.format(model=self.model)
+        key = options.get("key")
+        self._account = (self.endpoint, self.model, key.get_secret_value() if key else "")
+        self._in_batches = options.get("batch", False)
+        self._batcher: Batcher | None = None
         self._http = http
         self._prices = options["prices"]
         self._all_fields = fields
@@ -146,7 +159,9 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         await self._http.refresh()
 
     async def close(self) -> None:
-        """Close the connections."""
+        """Close the connections; cancel a batch in which nothing else waits."""
+        if self._batcher is not None:
+            await self._batcher.settle()
         await self._http.close()
 
     @abstractmethod
@@ -232,13 +247,21 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
             self._fields = self._fit()  # another client may have learned something
             body = self._body(request)
             role = self._role if any(message.role == "system" for message in request.messages) else None
-            answer = await self._http.post(self._path, to_json(body), request.delivery)
+            answer = await self._post(to_json(body), request.delivery)
             if answer.status not in REFUSALS or verdict_of(answer.status, answer.body):
                 return answer
             learned = self._learn(answer.body, request, role)
             if not learned:
                 return answer
             self.quirks.note_once(learned, f"{self.model} at {self.endpoint}: from now on Khala {learned}")
+
+    async def _post(self, body: bytes, delivery: Departure) -> HttpAnswer:
+        api = self.BATCHES
+        if api is None or not self._in_batches:
+            return await self._http.post(self._path, body, delivery)
+        if self._batcher is None:
+            self._batcher = batcher_for(self._account, lambda: Batcher(api(self._connect(), self._path)))
+        return await self._batcher.post(body, delivery)
 
     def _learn(self, refusal: bytes, request: Request, role: SystemRole | None) -> str:
         shape = self.quirks.fit(self._shape_for(request))

@@ -91,7 +91,6 @@ class HttpEndpoint:
         self._proxy = proxy_for(self.address)
         self._trust = find_trust() if self.address.startswith("https:") else None
         self._headers = {
-            "Content-Type": "application/json",
             "Accept": "application/json",
             "Accept-Encoding": "gzip, deflate",
             "User-Agent": "khala",
@@ -110,12 +109,27 @@ class HttpEndpoint:
         Raises:
             LLMError: there is none.
         """
+        return await self.send("POST", path, body, delivery=delivery)
+
+    async def send(
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        kind: str = "application/json",
+        delivery: Departure | None = None,
+    ) -> HttpAnswer:
+        """Return the answer to any request; `kind` is the media type of its body.
+
+        Raises:
+            LLMError: there is none.
+        """
         import httpx  # noqa: PLC0415  # see above
 
         from khala_agents.llm.transport import BodyTooLarge  # noqa: PLC0415
 
         try:
-            return await self._answer("POST", path, body, delivery)
+            return await self._answer(method, path, body, delivery, kind)
         except BodyTooLarge as error:
             raise MalformedCompletion(f"{self.address} cannot be used: {error}") from None
         except httpx.DecodingError:
@@ -156,7 +170,12 @@ class HttpEndpoint:
             await transport.aclose()
 
     async def _answer(
-        self, method: str, path: str, body: bytes | None = None, delivery: Departure | None = None
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        delivery: Departure | None = None,
+        kind: str = "application/json",
     ) -> HttpAnswer:
         """Return the answer to a request.
 
@@ -168,7 +187,8 @@ class HttpEndpoint:
         if path not in self._urls:
             self._urls[path] = httpx.URL(self.address + path + self._query)
         extensions = {} if delivery is None else {Departure.EXTENSION: delivery}
-        request = httpx.Request(method, self._urls[path], headers=self._headers, content=body, extensions=extensions)
+        headers = self._headers | {"Content-Type": kind}
+        request = httpx.Request(method, self._urls[path], headers=headers, content=body, extensions=extensions)
         answer = await self._connect().handle_async_request(request)
         return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 

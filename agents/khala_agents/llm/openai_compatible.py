@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from pydantic import BaseModel, Field
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
+from khala_agents.llm.batches import OpenAIBatches
 from khala_agents.llm.client import MalformedCompletion
 from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.faults import broken_off, is_error
@@ -78,6 +79,7 @@ class OpenAICompatible(HttpClient[_Answer]):
     PATH = "/chat/completions"
     ANSWER = _Answer
     CALLED = "chat completion"
+    BATCHES = OpenAIBatches
 
     def __init__(
         self,

@@ -52,6 +52,7 @@ class Profile:
         stop: whether the texts that end an answer may be sent.
         effort_field: the field that says how much the model thinks.
         json_schema: whether it takes a schema; another is only asked for some object of JSON.
+        batch: whether it takes requests in batches, at half the price.
         cached_path: where in `usage` the number of cached prompt tokens stands.
         reasoning_path: where in `usage` the number of reasoning tokens stands.
         needs_key: whether it requires a key.
@@ -68,6 +69,7 @@ class Profile:
     stop: bool = True
     effort_field: EffortField = "reasoning_effort"
     json_schema: bool = True
+    batch: bool = False
     cached_path: tuple[str, ...] = ("prompt_tokens_details", "cached_tokens")
     reasoning_path: tuple[str, ...] = ("completion_tokens_details", "reasoning_tokens")
     needs_key: bool = False
@@ -77,13 +79,14 @@ class Profile:
 
 PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
     {
-        "openai": Profile(length_field="max_completion_tokens", needs_key=True, image_tokens=OPENAI),
+        "openai": Profile(length_field="max_completion_tokens", batch=True, needs_key=True, image_tokens=OPENAI),
         # `max_tokens`, a temperature and `stop` are refused with 400; the system role is called `developer`
         "openai-reasoning": Profile(
             length_field="max_completion_tokens",
             system_role="developer",
             temperature=False,
             stop=False,
+            batch=True,
             needs_key=True,
             image_tokens=OPENAI_REASONING,
         ),
@@ -94,6 +97,7 @@ PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
             seed=False,
             stop=False,
             effort_field="reasoning.effort",
+            batch=True,
             cached_path=("input_tokens_details", "cached_tokens"),
             reasoning_path=("output_tokens_details", "reasoning_tokens"),
             needs_key=True,
@@ -104,6 +108,7 @@ PROFILES: Mapping[ProfileName, Profile] = MappingProxyType(
             system_roles=(),
             seed=False,
             effort_field="output_config.effort",
+            batch=True,
             cached_path=("cache_read_input_tokens",),
             reasoning_path=(),
             needs_key=True,

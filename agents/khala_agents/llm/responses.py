@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Unpack
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
+from khala_agents.llm.batches import OpenAIBatches
 from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.faults import broken_off, fault_of, is_error
 from khala_agents.llm.verdict import AnswerParts, tool_words
@@ -42,6 +43,7 @@ class Responses(HttpClient[_Answer]):
     PATH = "/responses"
     ANSWER = _Answer
     CALLED = "response"
+    BATCHES = OpenAIBatches
 
     def __init__(
         self,
