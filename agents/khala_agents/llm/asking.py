@@ -123,9 +123,8 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         self.answer_tokens: int | None = max(limits, default=None)
         self.params: Mapping[str, Scalar] = {}
         self._system_role = options.get("system_role")
-        self._path = self.PATH.format(model=self.model)
-        key = options.get("key")
-        self._account = (self.endpoint, self.model, key.get_secret_value() if key else "")
+        self._path = self.PATH.format(model=self.model.removeprefix("models/"))
+        self._account = (self.endpoint, self.PATH, self.model, options.get("key"))
         self._in_batches = options.get("batch", False)
         self._batcher: Batcher | None = None
         self._http = http
@@ -259,8 +258,7 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         api = self.BATCHES
         if api is None or not self._in_batches:
             return await self._http.post(self._path, body, delivery)
-        if self._batcher is None:
-            self._batcher = batcher_for(self._account, lambda: Batcher(api(self._connect(), self._path)))
+        self._batcher = batcher_for(self._account, lambda: Batcher(api(self._connect(), self._path)))
         return await self._batcher.post(body, delivery)
 
     def _learn(self, refusal: bytes, request: Request, role: SystemRole | None) -> str:

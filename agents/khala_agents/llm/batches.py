@@ -25,7 +25,7 @@ from khala_agents.llm.faults import fault_of, is_error
 from khala_agents.llm.http import OK, HttpAnswer, HttpEndpoint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
 log = logging.getLogger(__name__)
 
@@ -307,15 +307,15 @@ class Batcher:
 
 EXPIRED: Final = "batch"
 """The status of a request whose batch has no answer to it. Such a request is not billed."""
-_batchers: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[tuple[str, ...], Batcher]] = WeakKeyDictionary()
+_batchers: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[Hashable, Batcher]] = WeakKeyDictionary()
 
 
-def batcher_for(key: tuple[str, ...], make: Callable[[], Batcher]) -> Batcher:
-    """Return the batcher of this key in the running event loop, which is made if there is none."""
+def batcher_for(account: Hashable, make: Callable[[], Batcher]) -> Batcher:
+    """Return the batcher of a model, an endpoint and a key in the running event loop; it is made if there is none."""
     batchers = _batchers.setdefault(asyncio.get_running_loop(), {})
-    if key not in batchers:
-        batchers[key] = make()
-    return batchers[key]
+    if account not in batchers:
+        batchers[account] = make()
+    return batchers[account]
 
 
 def _deliver(call: _Call, said: HttpAnswer | LLMError) -> None:
@@ -349,7 +349,7 @@ def _name(said: Mapping[str, Any]) -> str:
     return name
 
 
-def _lines(body: bytes) -> Iterable[Mapping[str, Any]]:
+def _lines(body: bytes) -> Iterator[Mapping[str, Any]]:
     """Yield the objects of lines of JSON, without those that are none."""
     for line in body.splitlines():
         with suppress(ValueError):
