@@ -22,7 +22,7 @@ from khala_agents.llm.batches import BatchApi, Batcher, batcher_for
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
 from khala_agents.llm.faults import no_completion, verdict_of, without_byte_order_mark
 from khala_agents.llm.http import OK, HttpEndpoint
-from khala_agents.llm.quirks import ALL_LIMITS, CACHE_MARK, REFUSALS, SystemRole, quirks_of
+from khala_agents.llm.quirks import ALL_LIMITS, CACHE_MARK, REFUSALS, SentFields, SystemRole, quirks_of
 from khala_agents.llm.schemas import without
 from khala_agents.llm.verdict import AnswerParts, judge
 from khala_protocol.messages import MOST
@@ -245,11 +245,12 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         while True:
             self._fields = self._fit()  # another client may have learned something
             body = self._body(request)
+            sent = self._sent(request)
             role = self._role if any(message.role == "system" for message in request.messages) else None
             answer = await self._post(to_json(body), request.delivery)
             if answer.status not in REFUSALS or verdict_of(answer.status, answer.body):
                 return answer
-            learned = self._learn(answer.body, request, role)
+            learned = self.quirks.learn(answer.body, sent, role)
             if not learned:
                 return answer
             self.quirks.note_once(learned, f"{self.model} at {self.endpoint}: from now on Khala {learned}")
@@ -261,10 +262,11 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
         self._batcher = batcher_for(self._account, lambda: Batcher(api(self._connect(), self._path)))
         return await self._batcher.post(body, delivery)
 
-    def _learn(self, refusal: bytes, request: Request, role: SystemRole | None) -> str:
-        shape = self.quirks.fit(self._shape_for(request))
+    def _sent(self, request: Request) -> SentFields:
+        """Return what an endpoint may refuse of a request."""
         marks = {CACHE_MARK: None} if self.MARKS_CACHE and request.stable else {}
-        return self.quirks.learn(refusal, {**shape, **self._fields, **self.quirks.fit(marks)}, role, form=shape)
+        form = self.quirks.fit(self._shape_for(request))
+        return SentFields(form, {**self._fields, **self.quirks.fit(marks)})
 
     def _fit(self) -> dict[str, Any]:
         fields = self.quirks.fit(self._all_fields)

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import logging
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 from weakref import WeakValueDictionary
 
-from khala_agents.llm.schemas import LIMITING, keywords_in
+from khala_agents.llm.schemas import keywords_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -80,6 +81,18 @@ _ROLES = re.compile(r"roles must alternate|only user and assistant roles", re.IG
 _WRONG_ROLE = re.compile(r"invalid (?:value|role)|input should be|must be one of", re.IGNORECASE)
 
 
+@dataclass(frozen=True, slots=True)
+class SentFields:
+    """The fields of a request beside its model and its messages, by name or path.
+
+    Attributes:
+        form: those that hold its answer to a form.
+    """
+
+    form: Mapping[str, Any]
+    others: Mapping[str, Any]
+
+
 class Quirks:
     """What one model at one endpoint was found to refuse.
 
@@ -107,16 +120,13 @@ class Quirks:
                     fitted.setdefault(self.limit, value)
         return fitted
 
-    def learn(
-        self, refusal: bytes, fields: Mapping[str, Any], role: SystemRole | None, form: Iterable[str] = ()
-    ) -> str:
+    def learn(self, refusal: bytes, sent: SentFields, role: SystemRole | None) -> str:
         """Learn from the words with which a request was refused; return what is done from now on, "" for nothing.
 
         Args:
             refusal: body of the answer.
-            fields: of the request, without its model and its messages.
+            sent: of the request; another client may have learned meanwhile.
             role: of its system message; None if it has none that could change.
-            form: names of those fields that hold its answer to a form.
         """
         said = refusal.decode("utf-8", "replace").replace("\\", "")
         next_role = _NEXT_ROLE.get(role) if role else None
@@ -124,17 +134,16 @@ class Quirks:
             self.system_role = next_role
             place = "in front of the first message of the user" if next_role == "fold" else "as the role system"
             return f"sends the system message {place}: it refuses the role {role}"
-        form = [name for name in form if name in fields]
-        used = keywords_in([fields[name] for name in form]) - self.keywords
+        used = keywords_in(list(sent.form.values()))
         if _TOO_COMPLEX.search(said):
-            return self._simplify(form, used & LIMITING)
+            return self._simplify(list(sent.form), used)
         if not _REFUSES.search(said):
             return ""
         named = {word for word in used if _names_keyword(said, word)}
         if named:
             self.keywords |= named
             return f"leaves {' and '.join(sorted(named))} out of schemas, which it refuses"
-        return self._leave_out(fields, said)
+        return self._leave_out([*sent.form, *sent.others], said)
 
     def _simplify(self, form: Sequence[str], limiting: set[str]) -> str:
         """Leave the limits out of a form that is too much for the endpoint, or else the form."""
@@ -151,7 +160,7 @@ class Quirks:
             if name not in ALL_LIMITS:
                 self.left_out |= {name, _GO_WITH.get(name, name)}
                 return f"leaves {name} out, which it refuses"
-            if name in LIMITS and self.limit is None and not _RANGE.search(said):
+            if name in LIMITS and name != self.limit and not _RANGE.search(said):
                 self.limit = next(other for other in LIMITS if other != name)
                 return f"calls the limit of tokens {self.limit}, because it refuses {name}"
         return ""

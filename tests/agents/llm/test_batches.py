@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala_agents.answers.form import AnswerShape
 from khala_agents.batch_policy import BatchPolicy
 from khala_agents.build import Workshop, client_for
 from khala_agents.config import ModelConfig, WorkerSpec
@@ -107,9 +108,8 @@ def client(server: Canned, profile: str = "openai", **fields: Any) -> LLMClient:
     return client_for(ModelConfig.model_validate(config | fields))
 
 
-async def ask(model: LLMClient, words: str, delivery: Departure | None = None) -> Completion:
-    request = Request((ChatMessage(role="user", content=words),), timeout_s=20, delivery=delivery or Departure())
-    return await model.complete(request)
+async def ask(model: LLMClient, words: str, **changes: Any) -> Completion:
+    return await model.complete(Request((ChatMessage(role="user", content=words),), timeout_s=20, **changes))
 
 
 async def test_requests_of_all_agents_are_sent_in_one_batch_and_each_gets_its_answer() -> None:
@@ -162,17 +162,33 @@ async def test_the_results_of_claude_are_answers_errors_and_requests_that_came_t
     }
 
 
-async def test_a_field_that_is_refused_in_a_batch_is_left_out_of_the_next() -> None:
+UNSUPPORTED = "Unsupported parameter: '{}' is not supported with this model."
+REFUSED = [
+    ("temperature", UNSUPPORTED.format("temperature")),
+    ("max_completion_tokens", UNSUPPORTED.format("max_completion_tokens")),
+    ("response_format", UNSUPPORTED.format("response_format")),
+    ("maxLength", "Invalid schema for response_format 'answer': 'maxLength' is not permitted."),
+]
+
+
+@pytest.mark.parametrize(("field", "words"), REFUSED)
+async def test_clients_whose_requests_are_refused_at_once_all_ask_again(field: str, words: str) -> None:
     def reply(body: Any) -> dict[str, Any]:
-        fault = refusal(400, "Unsupported parameter: 'temperature' is not supported with this model.")
-        return {"response": {"status_code": 400, "body": fault.body}} if "temperature" in body else good(body)
+        refused = {"response": {"status_code": 400, "body": refusal(400, words).body}}
+        return refused if field in json.dumps(body) else good(body)
 
     endpoint = OpenAI(reply)
+    shape = AnswerShape(schema={"type": "object", "properties": {"say": {"type": "string", "maxLength": 9}}})
     async with Canned(endpoint) as server:
-        model = client(server, temperature=0.5)
-        assert (await ask(model, "a")).text == "a!"
-        await model.close()
-    assert ["temperature" in requests[0]["body"] for requests in endpoint.files] == [True, False]
+        models = [client(server, temperature=0.5, max_tokens=9) for _ in range(2)]
+        answers = await asyncio.gather(*(ask(model, "a", shape=shape) for model in models))
+        for model in models:
+            await model.close()
+    assert [answer.text for answer in answers] == ["a!", "a!"]
+    assert [[field in json.dumps(request) for request in requests] for requests in endpoint.files] == [
+        [True, True],
+        [False, False],
+    ]
 
 
 async def test_a_full_batch_leaves_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,7 +217,8 @@ async def test_a_batch_is_cancelled_when_the_last_call_has_left_it() -> None:
         models = [client(server), client(server)]
         deliveries = [Departure(), Departure()]
         calls = [
-            asyncio.create_task(ask(model, "a", delivery)) for model, delivery in zip(models, deliveries, strict=True)
+            asyncio.create_task(ask(model, "a", delivery=delivery))
+            for model, delivery in zip(models, deliveries, strict=True)
         ]
         await sent.wait()
         assert all(delivery.left for delivery in deliveries), "an answer may be billed from now on"
@@ -220,7 +237,7 @@ async def test_a_call_that_leaves_before_its_batch_costs_nothing() -> None:
     async with Canned(endpoint) as server:
         model = client(server)
         delivery = Departure()
-        call = asyncio.create_task(ask(model, "a", delivery))
+        call = asyncio.create_task(ask(model, "a", delivery=delivery))
         other = asyncio.create_task(ask(model, "b"))
         await asyncio.sleep(0)  # both wait for their batch
         call.cancel()
