@@ -13,7 +13,7 @@ from khala_agents.answers.choices import Choices, argument_names, choices_in, ch
 from khala_agents.answers.form import AnswerRule
 from khala_agents.answers.grammar import answer_grammar
 from khala_agents.answers.render import shape_for
-from khala_agents.answers.schema import ANALYSIS_CHARACTERS, answer_schema
+from khala_agents.answers.schema import TEXT_CHARACTERS, answer_schema
 from khala_agents.answers.tools import tools_for
 from khala_agents.answers.wording import in_json
 from khala_agents.build import client_for
@@ -266,7 +266,20 @@ async def test_an_endpoint_is_sent_the_same_form_in_all_steps_or_one_for_each(
     assert ("0x21" in json.dumps(sent[0])) == exact
 
 
-def test_an_analysis_is_bounded_in_a_schema_as_in_a_grammar() -> None:
+def bounds(schema: dict[str, Any]) -> Iterator[bool]:
+    """Yield for each list and text of a schema whether it has a bound."""
+    if schema.get("type") == "array":
+        yield "maxItems" in schema
+    if schema.get("type") in ("string", ["string", "null"]):
+        yield bool(schema.keys() & {"maxLength", "enum", "pattern"})
+    inner = [*schema.get("properties", {}).values(), *schema.get("anyOf", ()), *schema.get("$defs", {}).values()]
+    for each in (*inner, *([schema["items"]] if "items" in schema else [])):
+        yield from bounds(each)
+
+
+def test_no_answer_in_json_goes_on_for_ever_and_no_analysis_in_a_grammar() -> None:
     choices = choices_in(TOLD, VIEW)
-    assert answer_schema(choices)["properties"]["analysis"]["maxLength"] == ANALYSIS_CHARACTERS
-    assert f"{{1,{ANALYSIS_CHARACTERS}}}" in answer_grammar(choices)
+    found = list(bounds(answer_schema(choices)))
+    assert len(found) > 10
+    assert all(found)
+    assert f"{{1,{TEXT_CHARACTERS}}}" in answer_grammar(choices)
