@@ -25,18 +25,20 @@ class BatchPolicy(LLMPolicy):
         Raises:
             RequestRefused: the clock of the match does not wait for a batch.
         """
-        why = _too_soon(context.briefing.clock)
+        why = reason_against_batches(context.briefing.clock)
         if why:
-            error = RequestRefused(f"a model file with `batch: true` is for matches that wait: {why}", status="batch")
+            error = RequestRefused(why, status="batch")
             error.hopeless = True
             raise error
         return await super().decide(context)
 
 
-def _too_soon(clock: Clock) -> str:
-    """Return why a clock does not wait for a batch; "" if it does."""
+def reason_against_batches(clock: Clock) -> str:
+    """Return why a match with this clock does not wait for batches; "" if it does."""
     if clock.rule == "realtime":
-        return "in real time the game goes on while a batch is answered; play with --clock frozen"
-    if clock.max_wait_s is not None and clock.max_wait_s < SHORTEST_WAIT_S:
-        return f"a step waits {clock.max_wait_s:g} s, and a batch takes up to a day; play with --max-wait 86400"
-    return ""
+        why = "in real time the game goes on while a batch is answered; play with --clock frozen"
+    elif clock.max_wait_s is not None and clock.max_wait_s < SHORTEST_WAIT_S:
+        why = f"a step waits {clock.max_wait_s:g} s, and a batch takes up to a day; play with --max-wait 86400"
+    else:
+        return ""
+    return f"a model file with `batch: true` is for matches that wait: {why}"

@@ -101,10 +101,10 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
                 for side in task.per_side():
                     Observer(side)
             for _, mind, _ in groups_of(task, match.minds):
-                if (known := repr(mind)) not in checked:
+                if (known := f"{mind!r} {task.clock!r}") not in checked:
                     checked.add(known)
                     check_keys(mind.keys_sent())
-                    replace(mind, budget_usd=budget_usd).check()
+                    replace(mind, budget_usd=budget_usd).check(task.clock)
         except ConfigError as error:
             raise ConfigError(f"{_title(match.cell)}: {error}") from None
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala.playing.minds import Minds
 from khala_agents.answers.form import AnswerShape
 from khala_agents.batch_policy import BatchPolicy
 from khala_agents.build import Workshop, client_for
@@ -20,6 +21,7 @@ from khala_agents.llm.money import SharedBudget
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Context
 from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
+from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ChatMessage, Clock
 
 if TYPE_CHECKING:
@@ -325,14 +327,26 @@ CLOCKS = [
 
 
 @pytest.mark.parametrize(("clock", "words"), CLOCKS)
-async def test_a_match_that_does_not_wait_is_refused_in_its_first_step(
-    clock: Clock, words: str, briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+async def test_a_match_that_does_not_wait_is_refused_before_it_begins_or_in_its_first_step(
+    clock: Clock,
+    words: str,
+    tmp_path: Path,
+    briefing: Callable[..., Briefing],
+    observation: Callable[..., Observation],
 ) -> None:
     async with Canned(OpenAI(good)) as server:
         policy = BatchPolicy(client(server))
         with pytest.raises(RequestRefused) as caught:
             await policy.decide(Context(briefing(clock=clock), observation()))
         await policy.close()
-    assert str(caught.value) == f"a model file with `batch: true` is for matches that wait: {words}"
+    sentence = f"a model file with `batch: true` is for matches that wait: {words}"
+    assert str(caught.value) == sentence
     assert caught.value.hopeless
     assert server.asked == []
+    file = tmp_path / "batch.yaml"
+    file.write_text(FILE.format(profile="anthropic", base="http://127.0.0.1:1/v1"))
+    minds = Minds(model=str(file))
+    with pytest.raises(ConfigError) as before:
+        minds.check(clock)
+    assert str(before.value) == f"{file}: {sentence}"
+    minds.check(Clock(max_wait_s=86400))
