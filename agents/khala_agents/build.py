@@ -14,17 +14,19 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from khala_agents.answers.form import AnswerRule
+from khala_agents.batch_policy import LONGEST_BATCH_S, BatchPolicy
 from khala_agents.config import ModelConfig, WorkerSpec, load_model
 from khala_agents.fallback import Fallback
 from khala_agents.llm.address import sends_openly
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.breaker import Breaker
+from khala_agents.llm.gemini import Gemini
 from khala_agents.llm.limits import LONGEST_ANSWER, RequestLimits, own_turns
 from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices, check_priced, price_of
-from khala_agents.llm.profiles import PROFILES
 from khala_agents.llm.replay import ReplayClient
+from khala_agents.llm.responses import Responses
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
 from khala_agents.llm_policy import LLMPolicy
@@ -66,20 +68,23 @@ def client_for(config: ModelConfig) -> LLMClient:
         "headers": {name: _sent(value) for name, value in config.headers.items()},
         "query": {name: _sent(value) for name, value in config.query.items()},
         "temperature": config.temperature,
+        "reasoning_effort": config.reasoning_effort,
+        "batch": config.batch,
         "extra": config.extra,
     }
     if config.key_header is not None:
         sent["key_header"] = config.key_header.name, config.key_header.prefix
-    if config.profile == "anthropic":
-        return Anthropic(max_tokens=config.max_tokens or 1024, **sent)
-    return OpenAICompatible(
-        PROFILES[config.profile],
-        max_tokens=config.max_tokens,
-        seed=config.seed,
-        system_role=config.system_role,
-        detail=config.images.detail if config.images else "auto",
-        **sent,
-    )
+    if config.row.api == "anthropic":
+        return Anthropic(max_tokens=config.max_tokens or 1024, stop=config.stop, **sent)
+    sent |= {"max_tokens": config.max_tokens, "system_role": config.system_role}
+    detail = config.images.detail if config.images else "auto"
+    match config.row.api:
+        case "gemini":
+            return Gemini(config.row, seed=config.seed, stop=config.stop, **sent)
+        case "responses":
+            return Responses(config.row, detail=detail, **sent)
+        case "chat":
+            return OpenAICompatible(config.row, seed=config.seed, stop=config.stop, detail=detail, **sent)
 
 
 def _sent(value: SentValue) -> str:
@@ -123,12 +128,13 @@ class Workshop:
             return load_policy(spec.policy)
         assert spec.model is not None
         config, limits = self._model(spec.model)
-        model = LLMPolicy(
+        kind = BatchPolicy if config.batch else LLMPolicy
+        model = kind(
             client_for(config),
             memory=spec.memory,
             retry=config.retry,
             limits=limits,
-            try_timeout_s=config.try_timeout_s,
+            try_timeout_s=config.try_timeout_s or (LONGEST_BATCH_S if config.batch else None),
             vision=config.vision,
             pace=config.pace,
             answer=config.answer,
@@ -164,7 +170,8 @@ def _with_address(config: ModelConfig) -> ModelConfig:
 def _prices(config: ModelConfig, file: ModelConfig) -> Prices:
     """Return the prices of a model: those of its file if it is the model of the file, or else the list price."""
     is_of_the_file = config.model == file.model or config.profile == "scripted"  # all of whose players are free
-    return config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
+    prices = config.prices if is_of_the_file and config.prices.known else price_of(config.model, config.base_url)
+    return prices.in_batch if config.batch else prices
 
 
 def _change(config: ModelConfig, changes: Mapping[str, str | float | None], *, source: str | None) -> ModelConfig:

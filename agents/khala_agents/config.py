@@ -9,19 +9,20 @@ from __future__ import annotations
 import difflib
 import re
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, JsonValue, field_validator, model_validator
 
 from khala_agents.answers.form import AnswerForm, AnswerRule
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.breaker import BreakerRule
+from khala_agents.llm.effort import Effort  # noqa: TC001  # pydantic evaluates it
 from khala_agents.llm.limits import LimitRules
 from khala_agents.llm.pricing import Prices
-from khala_agents.llm.profiles import PROFILES, ProfileName
-from khala_agents.llm.quirks import SystemRole  # noqa: TC001  # pydantic evaluates it
+from khala_agents.llm.profiles import PROFILES, Profile, ProfileName
+from khala_agents.llm.quirks import ALL_LIMITS, SystemRole
 from khala_agents.llm.retry import RetryRule
-from khala_agents.llm.vision import ANTHROPIC, Vision
+from khala_agents.llm.vision import Vision  # noqa: TC001  # pydantic evaluates it
 from khala_configs import CONFIGS
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, WrongKey
@@ -35,15 +36,18 @@ _HEADER = r"^[A-Za-z0-9!#$%&'*+.^_`|~-]{1,100}$"
 _SENDABLE = r"^[ -~]{0,1000}$"
 _OWN_HEADERS = frozenset({"accept", "accept-encoding", "connection", "content-length", "content-type", "host",
                           "transfer-encoding"})  # fmt: skip
-_LIMITS = frozenset({"max_tokens", "max_completion_tokens"})
 _OWN_FIELDS: dict[str, tuple[JsonValue, str]] = {
     "stream": (False, "Khala reads whole answers"),
     "n": (1, "one answer is read, and all would be billed"),
     "best_of": (1, "one answer is read, and all would be billed"),
     "messages": (None, "Khala writes them"),
+    "input": (None, "Khala writes it"),
+    "contents": (None, "Khala writes them"),
     "model": (None, "the field `model` of the file names it"),
 }
 """Fields of a request body that cannot stand under `extra`, the value that does no harm, and why."""
+
+_OWN_OF_GEMINI = frozenset({"maxOutputTokens", "candidateCount"})
 
 
 class SentValue(Frozen):
@@ -88,7 +92,7 @@ class KeyHeader(Frozen):
 class ModelConfig(Frozen):
     """One model at one endpoint."""
 
-    profile: ProfileName | Literal["anthropic"]
+    profile: ProfileName
     """The kind of endpoint; `compatible` for one that speaks OpenAI's chat completions and has no row."""
     model: str = Field(min_length=1)
     """As the endpoint calls it."""
@@ -115,8 +119,15 @@ class ModelConfig(Frozen):
     """Limit of generated tokens."""
     temperature: float | None = Field(default=None, ge=0)
     seed: int | None = None
+    stop: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Texts that end an answer where the model writes them; they are not part of it."""
+    reasoning_effort: Effort | None = None
+    """How much the model thinks; each model takes some of the words. None: as much as it does by default."""
     extra: dict[str, JsonValue] = Field(default_factory=dict)
     """Fields of the request body, as they are."""
+    batch: bool = False
+    """Whether requests wait for a batch, at half of the `prices`: OpenAI and Anthropic answer most within an hour and
+    all within a day. For clocks on which the game stands still, with a wait of an hour or more for each step."""
     try_timeout_s: float | None = Field(default=None, gt=0)
     """Time for one try; the time to the step's deadline if that is shorter. None: half of what the step gives, at least
     45 s, so that a slow model answers and a lost request is made again; 10 minutes without a deadline."""
@@ -160,8 +171,10 @@ class ModelConfig(Frozen):
         for name, sent in value.items():
             if _KEY_LIKE.search(name):
                 raise ValueError(f"'{name}' looks like a key, and extra fields are recorded: use api_key_env")
-            if name in _LIMITS and not (isinstance(sent, int) and sent > 0):
+            if name in ALL_LIMITS and not (isinstance(sent, int) and sent > 0):
                 raise ValueError(f"'{name}' must be a number of tokens above 0: it limits what an answer may cost")
+            if name == "generationConfig" and isinstance(sent, dict) and (own := sorted(_OWN_OF_GEMINI & sent.keys())):
+                raise ValueError(f"'{own[0]}' cannot be sent: Khala asks for one answer, of max_tokens at most")
             if name in _OWN_FIELDS and sent != _OWN_FIELDS[name][0]:
                 raise ValueError(f"'{name}' cannot be sent: {_OWN_FIELDS[name][1]}")
         return value
@@ -184,21 +197,33 @@ class ModelConfig(Frozen):
 
     @model_validator(mode="after")
     def _has_what_it_needs(self) -> Self:
-        needs_key = self.profile == "anthropic" or PROFILES[self.profile].needs_key
-        if needs_key and self.api_key_env is None:
+        row = self.row
+        if row.needs_key and self.api_key_env is None:
             raise ValueError(f"{self.profile} needs a key: name the environment variable that holds it in api_key_env")
         if self.answer.form not in self.forms:
             takers = " and ".join(name for name, profile in PROFILES.items() if profile.grammar_field)
             raise ValueError(f"{self.profile} takes no grammar: {takers} do; write `answer: json` or `answer: tools`")
-        if self.profile == "anthropic" and self.system_role is not None:
-            raise ValueError("system_role is for chat completions: Anthropic's messages have a field for it")
+        if self.system_role is not None and self.system_role not in row.system_roles:
+            roles = " or ".join(row.system_roles)
+            raise ValueError(f"{self.profile} has a field for the system message: {_instead('system_role', roles)}")
+        if self.batch and not row.batch:
+            takers = ", ".join(name for name, profile in PROFILES.items() if profile.batch)
+            raise ValueError(f"{self.profile} takes no batches: {takers} do")
+        if self.batch and self.limits != LimitRules():
+            raise ValueError("a batch has all requests at once: remove limits")
+        if self.stop and not row.stop:
+            raise ValueError(f"{self.profile} takes no stop: remove it")
         return self
+
+    @property
+    def row(self) -> Profile:
+        """The particulars of its kind of endpoint."""
+        return PROFILES[self.profile]
 
     @property
     def forms(self) -> tuple[AnswerForm, ...]:
         """The forms that its endpoint can hold an answer to."""
-        takes_grammars = self.profile != "anthropic" and PROFILES[self.profile].grammar_field
-        return ("text", "json", "tools", "grammar") if takes_grammars else ("text", "json", "tools")
+        return ("text", "json", "tools", "grammar") if self.row.grammar_field else ("text", "json", "tools")
 
     @property
     def secrets(self) -> tuple[str, ...]:
@@ -215,8 +240,11 @@ class ModelConfig(Frozen):
     @property
     def vision(self) -> Vision | None:
         """How the model sees, with a rule to count pictures by; None if it does not see."""
-        rule = ANTHROPIC if self.profile == "anthropic" else PROFILES[self.profile].image_tokens
-        return self.images.counted_by(rule) if self.images else None
+        return self.images.counted_by(self.row.image_tokens) if self.images else None
+
+
+def _instead(field: str, values: str) -> str:
+    return f"{field} is {values}" if values else f"remove {field}"
 
 
 class WorkerSpec(Frozen):

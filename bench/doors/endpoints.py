@@ -170,6 +170,8 @@ def _anthropic(*content: Any, stop: str = "end_turn", usage: Any = None) -> Give
 
 OK = Expected("ok")
 ANTHROPIC = {"profile": "anthropic"}
+GEMINI = {"profile": "gemini"}
+RESPONSES = {"profile": "responses"}
 AZURE = {"key_header": "api-key", "query": {"api-version": "2024-10-21"}}
 TOOL = {"id": "1", "type": "function", "function": {"name": "Attack_Unit", "arguments": "{}"}}
 BROKEN = Expected(error=EndpointUnavailable, words=("broke its answer off",), billed=True)
@@ -291,6 +293,36 @@ QUIRKS: Final[tuple[Quirk, ...]] = (
         _anthropic({"type": "thinking"}, stop="max_tokens"),
         Expected("cut", words=("99",)),
         ANTHROPIC,
+    ),
+    Quirk(
+        "a prompt that Gemini blocks",
+        Given({"promptFeedback": {"blockReason": "SAFETY"}}),
+        Expected("filtered", words=("SAFETY",)),
+        GEMINI,
+    ),
+    Quirk(
+        "thoughts alone of Gemini",
+        Given({"candidates": [{"finishReason": "MAX_TOKENS"}], "usageMetadata": {"thoughtsTokenCount": 99}}),
+        Expected("cut", words=("99", "on its reasoning")),
+        GEMINI,
+    ),
+    Quirk(
+        "a wrong key of Gemini, as 400",
+        refusal(400, "API key not valid. Please pass a valid API key."),
+        Expected(error=Unauthorized),
+        GEMINI,
+    ),
+    Quirk(
+        "an incomplete response",
+        Given({"output": [{"type": "reasoning"}], "incomplete_details": {"reason": "max_output_tokens"}}),
+        Expected("cut", words=("99",)),
+        RESPONSES,
+    ),
+    Quirk(
+        "a response that failed",
+        Given({"output": [], "status": "failed", "error": {"code": "server_error", "message": "gone"}}),
+        BROKEN,
+        RESPONSES,
     ),
     Quirk("input_tokens: null", _anthropic(TEXT, usage={"input_tokens": None, "output_tokens": 5}), OK, ANTHROPIC),
 )

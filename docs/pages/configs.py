@@ -101,19 +101,17 @@ def _variables(model: ModelConfig) -> tuple[str, ...]:
 
 def _profiles() -> str:
     names = [field.name for field in fields(Profile)]
-    rows = [(code(name), *(_said(getattr(profile, field)) for field in names)) for name, profile in PROFILES.items()]
-    rows.append((code("anthropic"), "Anthropic's own messages API"))
+    rows = [(code(name), *(_said(field, getattr(row, field)) for field in names)) for name, row in PROFILES.items()]
     attributes = (inspect.getdoc(Profile) or "").partition("Attributes:\n")[2]
     meanings = [line.strip().split(": ", 1) for line in attributes.splitlines() if line.strip()]
-    wide = [(*row, *[""] * (len(names) + 1 - len(row))) for row in rows]
     return join(
         "What endpoints of one kind must be sent or asked differently.",
-        table(("profile", *names), wide),
+        table(("profile", *names), rows),
         table(("column", "meaning"), [(code(name), meaning) for name, meaning in meanings]),
     )
 
 
-def _said(value: object) -> str:
+def _said(field: str, value: object) -> str:
     if isinstance(value, tuple):
-        return code(".".join(map(str, value)))
+        return code((", " if field == "system_roles" else ".").join(map(str, value))) if value else ""
     return {True: "yes", False: "no"}[value] if isinstance(value, bool) else code(value)

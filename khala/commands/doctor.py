@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from khala_protocol.bus.certificate import Certificate
 
 State = Literal["ok", "note", "wrong"]
-
-KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "DEEPSEEK_API_KEY")
-"""Variables that the shipped model files read; each may also name a file, `<NAME>_FILE`."""
 PORTS = {7447: "the router of `khala router`"}
 
 
@@ -201,8 +198,12 @@ def _certificate(certificate: Certificate) -> Finding:
     return Finding(f"certificate {certificate.name}", state, said, advice)
 
 
-def _keys() -> Iterator[Finding]:
-    given = [name for name in KEYS if os.environ.get(name) or os.environ.get(f"{name}_FILE")]
+def keys() -> Iterator[Finding]:
+    """Yield which keys of the shipped model files are set."""
+    from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only two checks need them
+
+    variables = dict.fromkeys(load_model(name).api_key_env for name in model_files())
+    given = [name for name in variables if name and (os.environ.get(name) or os.environ.get(f"{name}_FILE"))]
     if given:
         yield Finding("model keys", "ok", ", ".join(given) + " set")
     else:
@@ -215,7 +216,7 @@ def _keys() -> Iterator[Finding]:
 
 
 def _network() -> Iterator[Finding]:
-    from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only this check needs them
+    from khala_agents.config import load_model, model_files  # noqa: PLC0415  # only two checks need them
     from khala_agents.llm.address import checked_address  # noqa: PLC0415
     from khala_agents.llm.network import find_trust, proxy_for  # noqa: PLC0415
     from khala_protocol.errors import ConfigError  # noqa: PLC0415
@@ -244,4 +245,4 @@ def _network() -> Iterator[Finding]:
     yield Finding("trusted certificates", "ok", visible_line(str(trust)) if trust else "those of the package certifi")
 
 
-CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _engine, _bus, _keys, _network)
+CHECKS: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _pysc2, _game, _engine, _bus, keys, _network)

@@ -101,10 +101,10 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
                 for side in task.per_side():
                     Observer(side)
             for _, mind, _ in groups_of(task, match.minds):
-                if (known := repr(mind)) not in checked:
+                if (known := f"{mind!r} {task.clock!r}") not in checked:
                     checked.add(known)
                     check_keys(mind.keys_sent())
-                    replace(mind, budget_usd=budget_usd).check()
+                    replace(mind, budget_usd=budget_usd).check(task.clock)
         except ConfigError as error:
             raise ConfigError(f"{_title(match.cell)}: {error}") from None
 
@@ -231,7 +231,8 @@ def _identity(mind: Minds) -> dict[str, Any]:
 
 def _model_file(name: str) -> Mapping[str, Any]:
     """Return what a model file says of the answers; how it is reached and limited is no part of that."""
-    fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
+    fields = {"profile", "model", "system_role", "answer", "max_tokens", "temperature", "seed", "stop"}
+    fields |= {"reasoning_effort", "extra", "images", "pace", "try_timeout_s"}
     return load_model(name).model_dump(mode="json", include=fields)
 
 

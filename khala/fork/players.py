@@ -35,7 +35,7 @@ def players_of(
         _check_all_are_named(task, sides, named)
     players = {side: replace(minds, agents=named.get(side, {})) for side, minds in by_side.items()}
     for _, minds, _ in groups_of(task, players):
-        minds.check()
+        minds.check(task.clock)
     return players
 
 

@@ -88,7 +88,7 @@ async def play(
         KhalaError: the user can fix something; the text says what.
     """
     for _, mind, _ in groups_of(config.task, minds):
-        mind.check()
+        mind.check(config.task.clock)
     supplies = supplies or Supplies()
     config, sc2path = _prepare(config, directory, game)
     groups = [(side, mind, names) for side, mind, names in groups_of(config.task, minds) if not mind.policy]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from khala.playing import environment
+from khala_agents.batch_policy import reason_against_batches
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model, model_files
 from khala_agents.llm.limits import own_turns
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from khala_agents.policy import Policy
     from khala_bridge.task.config import TaskConfig
     from khala_orchestrator.config import MatchConfig
+    from khala_protocol.messages import Clock
 
 SCRIPTED = "scripted"
 """The model whose endpoint is started along with a match."""
@@ -103,13 +105,19 @@ class Minds:
         """Whether any of its agents does, and so may spend money."""
         return any(mind.policy is None for mind in (self, *map(self.with_name, self.agents.values())))
 
-    def check(self) -> None:
+    def check(self, clock: Clock | None = None) -> None:
         """Check that an agent could decide this way, before anything is started.
 
+        Args:
+            clock: of the match, if it is known.
+
         Raises:
-            ConfigError: a model file, a key or a policy is missing or wrong.
+            ConfigError: a model file, a key or a policy is missing or wrong, or the match is too fast for the model.
         """
         self.policies([""], self.base_url, SharedBudget(self.budget_usd))
+        in_batches = self.policy is None and load_model(self.model).batch
+        if clock is not None and in_batches and (why := reason_against_batches(clock)):
+            raise ConfigError(why, source=self.model)
 
     def policies(
         self, names: Sequence[str], base_url: str | None, budget: SharedBudget, gates: Gates = own_turns

@@ -56,7 +56,7 @@ def match_of(order: Submit, out: Path, *, trusts: bool) -> tuple[MatchConfig, di
     for side in config.task.per_side():
         Observer(side)
     for mind in alike:
-        mind.check()
+        mind.check(config.task.clock)
     return config.model_copy(update={"record": free_recording(out / order.run)}), minds
 
 

@@ -13,11 +13,17 @@ from khala_agents.answers.choices import Choices, argument_names, choices_in, ch
 from khala_agents.answers.form import AnswerRule
 from khala_agents.answers.grammar import answer_grammar
 from khala_agents.answers.render import shape_for
-from khala_agents.answers.schema import answer_schema
+from khala_agents.answers.schema import TEXT_CHARACTERS, answer_schema
 from khala_agents.answers.tools import tools_for
 from khala_agents.answers.wording import in_json
+from khala_agents.build import client_for
+from khala_agents.config import ModelConfig
 from khala_agents.llm.verdict import tool_words
+from khala_agents.llm_policy import LLMPolicy
+from khala_agents.policy import Context
+from khala_agents.scripted.canned import Canned, completion
 from khala_bridge.catalogue.catalogue import catalogue
+from khala_protocol.codec import decode_as, encode
 from khala_protocol.messages import (
     ActionSpec,
     Briefing,
@@ -35,7 +41,9 @@ from khala_protocol.messages import (
 from khala_protocol.speech import parse, written
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from khala_protocol.messages import Observation
 
 ATTACK = ActionSpec(name="Attack_Unit", args=("tag",), target="enemy")
 MOVE = ActionSpec(name="Move_Screen", args=("screen",))
@@ -237,3 +245,41 @@ def test_a_form_that_is_the_same_in_all_steps_has_no_tags() -> None:
     assert shape is not None
     assert "0x21" not in json.dumps(shape.schema)
     assert shape_for(AnswerRule(), TOLD, VIEW) is None
+    told_again = decode_as(Briefing, encode(TOLD))
+    assert shape_for(AnswerRule(form="json", exact=False), told_again, VIEW) is shape, "it is made once"
+
+
+@pytest.mark.parametrize(("exact", "forms"), [(True, 2), (False, 1)])
+@pytest.mark.parametrize("form", ["json", "tools", "grammar"])
+async def test_an_endpoint_is_sent_the_same_form_in_all_steps_or_one_for_each(
+    form: Any, exact: bool, forms: int, observation: Callable[..., Observation]
+) -> None:
+    there, gone = VIEW, VIEW.model_copy(update={"teams": VIEW.teams[1:]})
+    async with Canned(completion("Analysis: go.")) as server:
+        config = {"profile": "llamacpp", "model": "m", "base_url": server.base_url}
+        policy = LLMPolicy(client_for(ModelConfig.model_validate(config)), answer=AnswerRule(form=form, exact=exact))
+        for view in (there, gone):
+            await policy.decide(Context(TOLD, observation(view=view)))
+        await policy.close()
+    sent = [{name: asked.body.get(name) for name in ("response_format", "tools", "grammar")} for asked in server.asked]
+    assert len({json.dumps(fields) for fields in sent}) == forms
+    assert ("0x21" in json.dumps(sent[0])) == exact
+
+
+def bounds(schema: dict[str, Any]) -> Iterator[bool]:
+    """Yield for each list and text of a schema whether it has a bound."""
+    if schema.get("type") == "array":
+        yield "maxItems" in schema
+    if schema.get("type") in ("string", ["string", "null"]):
+        yield bool(schema.keys() & {"maxLength", "enum", "pattern"})
+    inner = [*schema.get("properties", {}).values(), *schema.get("anyOf", ()), *schema.get("$defs", {}).values()]
+    for each in (*inner, *([schema["items"]] if "items" in schema else [])):
+        yield from bounds(each)
+
+
+def test_no_answer_in_json_goes_on_for_ever_and_no_analysis_in_a_grammar() -> None:
+    choices = choices_in(TOLD, VIEW)
+    found = list(bounds(answer_schema(choices)))
+    assert len(found) > 10
+    assert all(found)
+    assert f"{{1,{TEXT_CHARACTERS}}}" in answer_grammar(choices)

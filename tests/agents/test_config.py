@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from khala.commands.doctor import keys as keys_found
 from khala.playing.environment import plain, with_model
 from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic
 from khala_agents.llm.client import LLMError, Request
+from khala_agents.llm.gemini import Gemini
 from khala_agents.llm.money import SharedBudget
 from khala_agents.llm.openai_compatible import OpenAICompatible
+from khala_agents.llm.pricing import price_of
+from khala_agents.llm.responses import Responses
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import FunctionPolicy, ObjectPolicy
 from khala_agents.scripted.canned import Canned, Given
@@ -27,21 +31,29 @@ from khala_protocol.trust import trust_named
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from khala_agents.llm.asking import HttpClient
+
 from khala_agents.config import AgentsFile, ModelConfig
 
-KEYS = ("OPENAI_API_KEY", "DEEPSEEK_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY", "OPENROUTER_API_KEY")
 ROOT = Path(__file__).resolve().parents[2]
 
 
+OWN_APIS: dict[str, type[HttpClient[Any]]] = {
+    "anthropic": Anthropic, "gemini": Gemini, "openai-responses": Responses,
+}  # fmt: skip
 SHIPPED = [
     "anthropic",
+    "azure",
     "deepseek",
     "gemini",
+    "glm",
     "llamacpp",
     "lmstudio",
     "ollama",
     "openai",
+    "openai-responses",
     "openrouter",
+    "qwen",
     "scripted",
     "vllm",
 ]
@@ -49,16 +61,30 @@ SHIPPED = [
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_model_file_makes_a_client(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for variable in KEYS:
-        monkeypatch.setenv(variable, "sk-0123456789")
     config = load_model(name)
+    for variable in config.secrets:
+        monkeypatch.setenv(variable, "sk-0123456789")
     client = client_for(config)
-    assert isinstance(client, Anthropic if name == "anthropic" else OpenAICompatible)
+    assert type(client) is OWN_APIS.get(name, OpenAICompatible)
     assert (client.model, client.endpoint) == (config.model, config.base_url)
 
 
 def test_every_shipped_model_file_is_tried() -> None:
     assert sorted(model_files()) == SHIPPED
+
+
+@pytest.mark.parametrize("name", ["anthropic", "deepseek", "gemini", "glm", "openai", "openai-responses"])
+def test_the_price_of_a_shipped_model_is_known_where_its_provider_has_a_list(name: str) -> None:
+    config = load_model(name)
+    assert price_of(config.model, config.base_url).known
+
+
+def test_a_key_of_any_shipped_model_file_is_seen_by_the_doctor(monkeypatch: pytest.MonkeyPatch) -> None:
+    keys = {key for name in SHIPPED if (key := load_model(name).api_key_env)}
+    for key in keys:
+        monkeypatch.setenv(key, "sk-0123456789")
+    (finding,) = keys_found()
+    assert keys == set(finding.found.removesuffix(" set").split(", "))
 
 
 def test_the_shipped_agents_file_makes_policies() -> None:
@@ -144,7 +170,32 @@ BAD_MODELS = [
     ),
     (
         GOOD.replace("vllm", "anthropic") + "api_key_env: A\nsystem_role: fold",
-        "m.yaml:1: system_role is for chat completions: Anthropic's messages have a field for it",
+        "m.yaml:1: anthropic has a field for the system message: remove system_role",
+    ),
+    (
+        GOOD.replace("vllm", "gemini") + "api_key_env: A\nsystem_role: developer",
+        "m.yaml:1: gemini has a field for the system message: system_role is system or fold",
+    ),
+    (
+        GOOD.replace("vllm", "responses") + "api_key_env: A\nstop: [END]",
+        "m.yaml:1: responses takes no stop: remove it",
+    ),
+    (
+        GOOD + "batch: true",
+        "m.yaml:1: vllm takes no batches: openai, openai-reasoning, responses, anthropic do",
+    ),
+    (
+        GOOD.replace("vllm", "openai") + "api_key_env: A\nbatch: true\nlimits: {in_flight: 4}",
+        "m.yaml:1: a batch has all requests at once: remove limits",
+    ),
+    (GOOD + "stop: ['']", "m.yaml:4 (stop.0): string should have at least 1 character, not ''"),
+    (
+        GOOD + "reasoning_effort: much",
+        "m.yaml:4 (reasoning_effort): 'much' is none of 'none', 'minimal', 'low', 'medium', 'high', 'xhigh' or 'max'",
+    ),
+    (
+        GOOD + "extra: {generationConfig: {candidateCount: 4}}",
+        "m.yaml:4 (extra): 'candidateCount' cannot be sent: Khala asks for one answer, of max_tokens at most",
     ),
     (GOOD + "try_timeout_s: 0", "m.yaml:4 (try_timeout_s): input should be greater than 0, not 0"),
     (GOOD + "retry: {tries: 0}", "m.yaml:4 (retry.tries): input should be greater than or equal to 1, not 0"),

@@ -17,7 +17,7 @@ from check_jsonschema import main as check_jsonschema  # type: ignore[import-unt
 from click.testing import CliRunner
 
 from khala.cli import app
-from khala.commands.doctor import KEYS
+from khala_agents.config import load_model, model_files
 from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ VARIABLE = re.compile(r"\$\{(?P<name>\w+)(?::-(?P<default>[^}]*))?\}")
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / FILES[0]).read_text())
 LAN: dict[str, Any] = yaml.safe_load((ROOT / FILES[1]).read_text())
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
+KEYS = {key for name in model_files() if (key := load_model(name).api_key_env)}
 every_service = pytest.mark.parametrize("service", SERVICES)
 
 

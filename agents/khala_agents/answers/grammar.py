@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from khala_agents.answers.schema import written_point
+from khala_agents.answers.schema import MOST_LINES, TEXT_CHARACTERS, written_point
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from khala_agents.answers.choices import Argument, Choices, Option
 
-ANALYSIS_CHARACTERS: Final = 300
 MESSAGE_CHARACTERS: Final = 200
-MOST_LINES: Final = 4
-"""Messages and notes in an answer."""
 _ANY_TAG: Final = '"0x" [0-9a-f]{5,16}'
 _END: Final = "[A-Za-z0-9: ]{1,40}"
 
@@ -39,7 +36,7 @@ class _Rules:
             self.made["talk"] = f'"Communications:\\n" ("    <" ({" | ".join(lines)}) ")>\\n"){{1,{MOST_LINES}}}'
         behind = {(True, True): f"({orders} talk? | talk)", (True, False): orders, (False, True): "talk?"}
         rest = behind.get((bool(orders), bool(lines)), "")
-        self.made["root"] = f'"Analysis: " [^\\n<]{{1,{ANALYSIS_CHARACTERS}}} "\\n" {rest}'.rstrip()
+        self.made["root"] = f'"Analysis: " [^\\n<]{{1,{TEXT_CHARACTERS}}} "\\n" {rest}'.rstrip()
 
     def _orders(self) -> str:
         """Return the orders of one team or more, in the order of the teams."""

@@ -17,12 +17,21 @@ if TYPE_CHECKING:
 
 Schema = dict[str, Any]
 
+TEXT_CHARACTERS: Final = 300
+"""Of an analysis, and of each message in JSON: a small model that goes on with one reaches its limit of tokens."""
+MOST_LINES: Final = 4
+"""Messages in an answer, or as many as there are recipients; and notes."""
 NO_FIELDS: Final[Mapping[str, Schema]] = MappingProxyType({})
-ANY_TAG: Final[Schema] = {"type": "string", "pattern": "^0x[0-9a-f]+$"}
-TEXT: Final[Schema] = {"type": "string"}
+ANY_TAG: Final[Schema] = {"type": "string", "pattern": "^0x[0-9a-f]{1,16}$"}
+TEXT: Final[Schema] = {
+    "type": "string",
+    "maxLength": TEXT_CHARACTERS,
+    "description": f"at most {TEXT_CHARACTERS} characters",
+}
 NUMBER: Final[Schema] = {"type": "integer"}
 UNTIL: Final[Schema] = {
     "type": ["string", "null"],
+    "maxLength": 40,
     "description": "null for an order that is given once; else the end of a standing order: a time of the game's clock "
     "such as 4:30, '22 Probe', an upgrade, 'attacked', 'minerals 400', or 'revoked'",
 }
@@ -34,15 +43,16 @@ def answer_schema(choices: Choices) -> Schema:
     fields: dict[str, Schema] = {"analysis": TEXT}
     if choices.options:
         orders = [_order(choices, *alike, definitions) for alike in _alike(choices)]
-        fields["orders"] = {**_list({"anyOf": orders}), "maxItems": choices.most * len(choices.teams)}
+        fields["orders"] = _list({"anyOf": orders}, choices.most * len(choices.teams))
     if choices.recipients:
-        fields["messages"] = _list(object_with({"to": one_of(choices.recipients), "text": TEXT}))
+        message = object_with({"to": one_of(choices.recipients), "text": TEXT})
+        fields["messages"] = _list(message, max(MOST_LINES, len(choices.recipients)))
     if choices.channels:
-        fields["listen"] = _list(one_of(choices.channels))
+        fields["listen"] = _list(one_of(choices.channels), len(choices.channels))
     if choices.keeps_notes:
-        fields |= {"notes": _list(TEXT), "forget": _list(NUMBER)}
+        fields |= {"notes": _list(TEXT, MOST_LINES), "forget": _list(NUMBER, MOST_LINES)}
     if choices.stands:
-        fields["revoke"] = _list(NUMBER)
+        fields["revoke"] = _list(NUMBER, MOST_LINES)
     return {**object_with(fields), "$defs": definitions} if definitions else object_with(fields)
 
 
@@ -106,5 +116,5 @@ def _refer(schema: Schema, definitions: dict[str, Schema]) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def _list(items: Schema) -> Schema:
-    return {"type": "array", "items": items}
+def _list(items: Schema, most: int) -> Schema:
+    return {"type": "array", "items": items, "maxItems": most}

@@ -7,7 +7,7 @@ import re
 from urllib.parse import urlsplit, urlunsplit
 
 MAX_CHARACTERS = 1000
-_PASTED = ("/chat/completions", "/messages")
+_PASTED = re.compile(r"/(?:chat/completions|messages|responses|models/[^/]+:\w+)$")
 """Paths that clients append, which people copy with the address from an endpoint's documentation."""
 _VERSION = re.compile(r"/v\d\w*(?:/|$)")
 
@@ -39,9 +39,7 @@ def is_versioned(url: str) -> bool:
 def base_of(url: str) -> str:
     """Return an address without query and without the path that a client appends to its base."""
     parts = urlsplit(url)
-    path = parts.path.rstrip("/")
-    for pasted in _PASTED:
-        path = path.removesuffix(pasted)
+    path = _PASTED.sub("", parts.path.rstrip("/"))
     return urlunsplit((parts.scheme, parts.netloc, path.rstrip("/"), "", ""))
 
 

@@ -5,18 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
+from khala_agents.llm.batches import AnthropicBatches
+from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.quirks import CACHE_MARK
+from khala_agents.llm.schemas import LIMITING, without
 from khala_agents.llm.verdict import AnswerParts, tool_words
 from khala_protocol.messages import Usage
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.client import Request
+    from khala_agents.llm.effort import Effort
 
-
-_REFUSED = frozenset({"minimum", "maximum", "minItems", "maxItems"})
+_REFUSED = LIMITING - {"pattern"}
+"""Limits of numbers, texts and lists, which the API refuses in schemas."""
 
 
 class _Answer(AnswerBody):
@@ -29,7 +33,8 @@ class Anthropic(HttpClient[_Answer]):
 
     Args:
         max_tokens: limit of generated tokens; the API requires one.
-        temperature: sent if given.
+        temperature, stop: sent if given.
+        reasoning_effort: how much the model thinks; None: as much as it does by default.
         options: see `ClientOptions`.
     """
 
@@ -38,11 +43,25 @@ class Anthropic(HttpClient[_Answer]):
     CALLED = "message"
     KEY_HEADER = ("x-api-key", "")
     HEADERS: ClassVar = {"anthropic-version": "2023-06-01"}
+    MARKS_CACHE = True
+    BATCHES = AnthropicBatches
 
     def __init__(
-        self, *, max_tokens: int = 1024, temperature: float | None = None, **options: Unpack[ClientOptions]
+        self,
+        *,
+        max_tokens: int = 1024,
+        temperature: float | None = None,
+        stop: Sequence[str] = (),
+        reasoning_effort: Effort | None = None,
+        **options: Unpack[ClientOptions],
     ) -> None:
-        super().__init__({"max_tokens": max_tokens, "temperature": temperature}, options)
+        asked = {
+            "max_tokens": max_tokens,
+            "temperature": temperature,
+            "stop_sequences": list(stop) or None,
+            **effort_fields("output_config.effort", reasoning_effort, options["model"]),
+        }
+        super().__init__(asked, options)
 
     def _body(self, request: Request) -> dict[str, Any]:
         system = "\n\n".join(message.content for message in request.messages if message.role == "system")
@@ -60,7 +79,7 @@ class Anthropic(HttpClient[_Answer]):
 
     def _shape(self, shape: AnswerShape) -> dict[str, Any]:
         if shape.schema:
-            return {"output_config": {"format": {"type": "json_schema", "schema": _without_limits(shape.schema)}}}
+            return {"output_config.format": {"type": "json_schema", "schema": without(shape.schema, _REFUSED)}}
         tools = [
             {"name": tool.name, "description": tool.description, "input_schema": tool.parameters}
             for tool in shape.tools
@@ -99,13 +118,6 @@ class Anthropic(HttpClient[_Answer]):
             cache_write_tokens=kept,
             cost_usd=self._prices.cost_usd(prompt=prompt, completion=written, cached=cached, cache_write=kept),
         )
-
-
-def _without_limits(schema: object) -> object:
-    """Return a schema without the limits of numbers and lists, which the API refuses."""
-    if isinstance(schema, dict):
-        return {name: _without_limits(value) for name, value in schema.items() if name not in _REFUSED}
-    return [_without_limits(value) for value in schema] if isinstance(schema, list) else schema
 
 
 def _cached_content(text: str) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 Errors also come with "200 OK": gateways do it, and servers that do not know the address that was asked. Their code, or
 the name of their kind, then says what the status would have been. Texts of a server are quoted on one line, without
-keys. Above it are `openai_compatible` and `anthropic`.
+keys. Above it are the clients of all APIs.
 """
 
 from __future__ import annotations
@@ -74,11 +74,13 @@ class EndpointFault:
         status: the HTTP status that its code or kind stands for; None if nobody knows.
         names: its code and its kind, in the endpoint's words.
         message: its text, on one line.
+        retry_after_s: the time to wait before the next try, if it says so.
     """
 
     status: int | None
     names: tuple[str, ...]
     message: str
+    retry_after_s: float | None = None
 
 
 def without_byte_order_mark(body: bytes) -> bytes:
@@ -116,7 +118,18 @@ def fault_of(error: Any) -> EndpointFault:
     metadata = error.get("metadata")
     raw = metadata.get("raw") if isinstance(metadata, dict) else None  # OpenRouter: what its provider said
     message = ": ".join(str(part) for part in (error.get("message"), raw) if part) or to_json(error)
-    return EndpointFault(_status(names), names, excerpt(message, _LONGEST_MESSAGE))
+    return EndpointFault(_status(names), names, excerpt(message, _LONGEST_MESSAGE), _retry_delay_s(error))
+
+
+def _retry_delay_s(error: Mapping[str, Any]) -> float | None:
+    """Return the wait that Gemini asks for: `{"retryDelay": "34s"}` among the details."""
+    details = error.get("details")
+    said = (
+        [detail.get("retryDelay") for detail in details if isinstance(detail, dict)]
+        if isinstance(details, list)
+        else []
+    )
+    return next((_number(delay.removesuffix("s")) for delay in said if isinstance(delay, str)), None)
 
 
 def _status(names: tuple[str, ...]) -> int | None:
@@ -139,7 +152,10 @@ def error_for(url: str, status: int, headers: Mapping[str, str], body: bytes) ->
     if status == 402 or not _SPENT.isdisjoint(names) or (status == 400 and _NO_CREDIT.search(message)):
         return OutOfMoney(f"{said}; the account has no money or quota left", status=name)
     if is_retried(status):
-        return EndpointUnavailable(said, status=name, retry_after_s=retry_after_s(headers))
+        wait_s = retry_after_s(headers)
+        if wait_s is None and fault is not None:
+            wait_s = fault.retry_after_s
+        return EndpointUnavailable(said, status=name, retry_after_s=wait_s)
     return RequestRefused(said + (_without_version(url) if status in {404, 405} else ""), status=name)
 
 

@@ -21,7 +21,14 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from khala_agents.llm.address import checked_address
-from khala_agents.llm.client import Departure, LLMError, MalformedCompletion, RequestRefused, Unreachable
+from khala_agents.llm.client import (
+    Departure,
+    LLMError,
+    MalformedCompletion,
+    RequestRefused,
+    Unauthorized,
+    Unreachable,
+)
 from khala_agents.llm.faults import error_for
 from khala_agents.llm.network import Trust, find_trust, proxy_for
 from khala_agents.secret import excerpt
@@ -33,7 +40,9 @@ if TYPE_CHECKING:
     from pydantic import SecretStr
 
 _WARM_TIMEOUT_S = 5.0
-OK, UNAUTHORIZED = 200, 401
+OK = 200
+UNAUTHORIZED = frozenset({400, 401})
+"""Statuses with which the list of models is refused for a wrong key; the first is Gemini's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +91,6 @@ class HttpEndpoint:
         self._proxy = proxy_for(self.address)
         self._trust = find_trust() if self.address.startswith("https:") else None
         self._headers = {
-            "Content-Type": "application/json",
             "Accept": "application/json",
             "Accept-Encoding": "gzip, deflate",
             "User-Agent": "khala",
@@ -101,12 +109,27 @@ class HttpEndpoint:
         Raises:
             LLMError: there is none.
         """
+        return await self.send("POST", path, body, delivery=delivery)
+
+    async def send(
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        kind: str = "application/json",
+        delivery: Departure | None = None,
+    ) -> HttpAnswer:
+        """Return the answer to any request; `kind` is the media type of its body.
+
+        Raises:
+            LLMError: there is none.
+        """
         import httpx  # noqa: PLC0415  # see above
 
         from khala_agents.llm.transport import BodyTooLarge  # noqa: PLC0415
 
         try:
-            return await self._answer("POST", path, body, delivery)
+            return await self._answer(method, path, body, delivery, kind)
         except BodyTooLarge as error:
             raise MalformedCompletion(f"{self.address} cannot be used: {error}") from None
         except httpx.DecodingError:
@@ -137,8 +160,8 @@ class HttpEndpoint:
         with suppress(httpx.HTTPError, httpx.InvalidURL, TimeoutError):
             async with asyncio.timeout(_WARM_TIMEOUT_S):
                 answer = await self._answer("GET", "/models")
-            if answer.status == UNAUTHORIZED:
-                raise answer.error
+            if answer.status in UNAUTHORIZED and isinstance(error := answer.error, Unauthorized):
+                raise error
 
     async def close(self) -> None:
         """Close the connections; the next request opens new ones."""
@@ -147,7 +170,12 @@ class HttpEndpoint:
             await transport.aclose()
 
     async def _answer(
-        self, method: str, path: str, body: bytes | None = None, delivery: Departure | None = None
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        delivery: Departure | None = None,
+        kind: str = "application/json",
     ) -> HttpAnswer:
         """Return the answer to a request.
 
@@ -159,7 +187,8 @@ class HttpEndpoint:
         if path not in self._urls:
             self._urls[path] = httpx.URL(self.address + path + self._query)
         extensions = {} if delivery is None else {Departure.EXTENSION: delivery}
-        request = httpx.Request(method, self._urls[path], headers=self._headers, content=body, extensions=extensions)
+        headers = self._headers | {"Content-Type": kind}
+        request = httpx.Request(method, self._urls[path], headers=headers, content=body, extensions=extensions)
         answer = await self._connect().handle_async_request(request)
         return HttpAnswer(self.address + path, answer.status_code, answer.headers, answer.content)
 

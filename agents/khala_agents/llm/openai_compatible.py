@@ -5,12 +5,14 @@ A row of `khala_agents.llm.profiles` says how an endpoint differs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Unpack, cast
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from pydantic import BaseModel, Field
 
 from khala_agents.llm.asking import AnswerBody, ClientOptions, HttpClient, count
+from khala_agents.llm.batches import OpenAIBatches
 from khala_agents.llm.client import MalformedCompletion
+from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.faults import broken_off, is_error
 from khala_agents.llm.verdict import CUT, FILTERED, AnswerParts, tool_words
 from khala_protocol.messages import Usage
@@ -20,10 +22,9 @@ if TYPE_CHECKING:
 
     from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.client import Request
+    from khala_agents.llm.effort import Effort
     from khala_agents.llm.profiles import Profile
-    from khala_agents.llm.quirks import SystemRole
     from khala_agents.llm.vision import Detail
-    from khala_protocol.messages import ChatMessage
 
 
 class _Message(BaseModel):
@@ -69,8 +70,8 @@ class OpenAICompatible(HttpClient[_Answer]):
     Args:
         profile: the particulars of the endpoint.
         max_tokens: limit of generated tokens.
-        temperature, seed: sent if given and if the endpoint accepts them.
-        system_role: of the system message; None: as the profile says.
+        temperature, seed, stop: sent if given and if the endpoint accepts them.
+        reasoning_effort: how much the model thinks; None: as much as it does by default.
         detail: how finely the model looks at pictures.
         options: see `ClientOptions`.
     """
@@ -78,6 +79,7 @@ class OpenAICompatible(HttpClient[_Answer]):
     PATH = "/chat/completions"
     ANSWER = _Answer
     CALLED = "chat completion"
+    BATCHES = OpenAIBatches
 
     def __init__(
         self,
@@ -86,7 +88,8 @@ class OpenAICompatible(HttpClient[_Answer]):
         max_tokens: int | None = None,
         temperature: float | None = None,
         seed: int | None = None,
-        system_role: SystemRole | None = None,
+        stop: Sequence[str] = (),
+        reasoning_effort: Effort | None = None,
         detail: Detail = "auto",
         **options: Unpack[ClientOptions],
     ) -> None:
@@ -94,28 +97,27 @@ class OpenAICompatible(HttpClient[_Answer]):
             profile.length_field: max_tokens,
             "temperature": temperature if profile.temperature else None,
             "seed": seed if profile.seed else None,
+            "stop": list(stop) or None if profile.stop else None,
+            **effort_fields(profile.effort_field, reasoning_effort, options["model"]),
         }
+        options["system_role"] = options.get("system_role") or profile.system_role
         super().__init__(asked, options)
         self._profile = profile
-        self._system_role: SystemRole = system_role or profile.system_role
         self._detail = detail
 
-    @property
-    def _role(self) -> SystemRole:
-        return self.quirks.system_role or self._system_role
-
     def _body(self, request: Request) -> dict[str, Any]:
-        prompt = _fold(request.messages) if self._role == "fold" else request.messages
         messages = [
             {
                 "role": self._role if message.role == "system" else message.role,
                 "content": self._content(message, request.pictures),
             }
-            for message in prompt
+            for message in self._prompt(request)
         ]
         return {"model": self.model, **self._fields_for(request), "messages": messages}
 
     def _shape(self, shape: AnswerShape) -> dict[str, Any]:
+        if shape.schema and not self._profile.json_schema:
+            return {"response_format": {"type": "json_object"}}
         if shape.schema:
             named = {"name": "answer", "strict": True, "schema": shape.schema}
             return {"response_format": {"type": "json_schema", "json_schema": named}}
@@ -125,10 +127,7 @@ class OpenAICompatible(HttpClient[_Answer]):
                 for tool in shape.tools
             )
             return {"tools": [{"type": "function", "function": function} for function in functions]}
-        field: Any = shape.grammar
-        for name in reversed(self._profile.grammar_field):
-            field = {name: field}
-        return cast("dict[str, Any]", field)
+        return {".".join(self._profile.grammar_field): shape.grammar}
 
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
         return {"type": "image_url", "image_url": {"url": f"data:{media_type};base64,{data}", "detail": self._detail}}
@@ -158,19 +157,6 @@ class OpenAICompatible(HttpClient[_Answer]):
             reasoning_tokens=count(counts, *self._profile.reasoning_path) or 0,
             cost_usd=self._prices.cost_usd(prompt=prompt, completion=completion, cached=cached),
         )
-
-
-def _fold(messages: Sequence[ChatMessage]) -> Sequence[ChatMessage]:
-    """Return messages with the system message in front of the first one of the user."""
-    if not messages or messages[0].role != "system":
-        return messages
-    system, *others = messages
-    place = next((place for place, message in enumerate(others) if message.role == "user"), None)
-    if place is None:
-        return [system.model_copy(update={"role": "user"}), *others]
-    first = others[place]
-    others[place] = first.model_copy(update={"content": f"{system.content}\n\n{first.content}"})
-    return others
 
 
 def _kind(part: object) -> object:

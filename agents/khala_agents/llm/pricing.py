@@ -34,6 +34,11 @@ class Prices(Frozen):
     """Prompt tokens that it put into its cache; the price of `prompt` if not given."""
 
     @property
+    def in_batch(self) -> Prices:
+        """The prices in a batch."""
+        return Prices(**{name: None if usd is None else usd / 2 for name, usd in self})
+
+    @property
     def known(self) -> bool:
         """Whether a request can be priced."""
         return self.prompt is not None and self.completion is not None

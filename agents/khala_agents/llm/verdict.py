@@ -22,9 +22,10 @@ anything, it declined, or a filter of the endpoint took the answer away."""
 CUT: Final = frozenset({"length", "max_tokens", "model_length", "max_output_tokens", "model_context_window_exceeded"})
 """Why an answer ended, in the words of endpoints in lower case: at a limit of tokens."""
 FILTERED: Final = frozenset(
-    {"content_filter", "content-filter", "sensitive", "safety", "recitation", "blocklist", "prohibited_content", "spii"}
+    {"content_filter", "content-filter", "sensitive"}
+    | {"safety", "recitation", "blocklist", "prohibited_content", "spii", "language", "image_safety"}
 )
-"""The same: a filter took it away. The last five are Gemini's."""
+"""The same: a filter took it away. Those of the second line are Gemini's."""
 
 _TOOLS = "the model called tools, of which none are offered; they are read as its orders"
 _CALL = re.compile(r"<\s*+[A-Za-z]\w*+\s*+\(")
@@ -52,6 +53,7 @@ class AnswerParts:
         reasoned: whether it reasoned in any other place.
         tools: the tools that it called, in words (`tool_words`).
         limit: of generated tokens, None for none.
+        blocked: why a filter took the prompt, "" if none did.
     """
 
     text: str
@@ -61,6 +63,7 @@ class AnswerParts:
     reasoned: bool = False
     tools: tuple[str, ...] = ()
     limit: int | None = None
+    blocked: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +87,8 @@ def judge(said: AnswerParts, *, tools_offered: bool = False) -> AnswerJudgement:
     """Return what became of an answer to a request that offered tools or not."""
     text = scrub("\n".join(filter(None, (said.text, *said.tools))))
     finish = said.finish.lower()
+    if said.blocked:
+        return AnswerJudgement(text, "filtered", f"a filter took the prompt: {excerpt(said.blocked)}")
     if finish in FILTERED:
         return AnswerJudgement(
             text, "filtered", f"a filter of the endpoint took the answer away ({excerpt(said.finish, 40)})"

@@ -66,6 +66,8 @@ class TokenRule(Frozen):
 ANTHROPIC = TokenRule(kind="area", pixels=750, longest_px=1568, most=1600)
 OPENAI = TokenRule(kind="tiles", base=85, each=170, pixels=512)
 OPENAI_REASONING = TokenRule(kind="tiles", base=75, each=150, pixels=512)
+GEMINI = TokenRule(kind="fixed", base=1120)
+"""The most that Gemini's models from 3 on spend on a picture as they look at it by default; those before spend 258."""
 QWEN = TokenRule(kind="patches", pixels=28, most=16384)
 """Many open vision models are Qwen's, or cut pictures as Qwen's do."""
 

@@ -21,7 +21,7 @@ class CannedRequest:
 
     Attributes:
         headers: names in lower case.
-        body: what its JSON says; None if it has no body.
+        body: what its JSON says, or its bytes if it is none; None if it has no body.
         peer: the connection that it came on.
     """
 
@@ -82,7 +82,7 @@ class Canned:
             path=request.path,
             query=dict(request.query),
             headers={name.lower(): value for name, value in request.headers.items()},
-            body=from_json(body) if body else None,
+            body=_read(body) if request.content_type == "application/json" else body or None,
             peer=request.transport.get_extra_info("peername") if request.transport else None,
         )
         self.asked.append(asked)
@@ -91,6 +91,10 @@ class Canned:
         return web.Response(
             status=given.status, body=content, headers={"Content-Type": "application/json", **given.headers}
         )
+
+
+def _read(body: bytes) -> Any:
+    return from_json(body) if body else None
 
 
 def completion(content: Any, finish: Any = "stop", usage: Any = None, **message: Any) -> Given:

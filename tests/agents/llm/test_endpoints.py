@@ -271,7 +271,7 @@ async def test_a_request_is_sent_as_the_profile_says(profile: Profile, params: d
             {"role": "user", "content": PROMPT[1].content},
         ],
     }
-    assert model.params == {**params, "top_p": 0.9}, "what is recorded"
+    assert model.params == {**params, "thinking.type": "disabled", "top_p": 0.9}, "what is recorded"
 
 
 SCHEMA = {"type": "object", "properties": {"n": {"type": "array", "items": {"type": "number", "minimum": 0}}}}

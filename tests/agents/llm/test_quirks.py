@@ -12,7 +12,7 @@ from khala_agents.llm.client import Completion, Request, RequestRefused
 from khala_agents.llm.openai_compatible import OpenAICompatible
 from khala_agents.llm.pricing import Prices
 from khala_agents.llm.profiles import PROFILES
-from khala_agents.llm.quirks import Quirks
+from khala_agents.llm.quirks import Quirks, SentFields
 from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
 from khala_protocol.messages import ChatMessage
 
@@ -226,6 +226,6 @@ async def test_a_gateway_that_refuses_marks_for_a_cache_gets_none() -> None:
 
 
 def test_a_name_that_is_a_usual_word_counts_only_where_it_is_named() -> None:
-    body = {"model": "m", "messages": [], "stop": ["x"], "user": "me"}
-    assert Quirks().learn(b"unsupported: a user may not stop here", body, None) == ""
-    assert Quirks().learn(b"unsupported: 'stop'", body, None) == "leaves stop out, which it refuses"
+    sent = SentFields({}, {"stop": ["x"], "user": "me"})
+    assert Quirks().learn(b"unsupported: a user may not stop here", sent, None) == ""
+    assert Quirks().learn(b"unsupported: 'stop'", sent, None) == "leaves stop out, which it refuses"
