@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.answers.form import AnswerRule
 from khala_agents.answers.render import shape_for
+from khala_agents.fitting import PromptTooLong
 from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.client import (
     Completion,
@@ -26,10 +27,10 @@ from khala_agents.llm.client import (
     TryTimeout,
     Unauthorized,
     estimated_image_tokens,
-    estimated_tokens,
 )
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule, with_retries
+from khala_agents.llm.window import ContextWindow
 from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
@@ -42,18 +43,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from khala_agents.answers.form import AnswerShape
+    from khala_agents.fitting import DraftPrompt
     from khala_agents.llm.client import Scalar
     from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context, Said
-    from khala_protocol.messages import Briefing, ChatMessage, Observation, Pace, Purpose
+    from khala_protocol.messages import Briefing, Observation, Pace, Purpose
 
 log = logging.getLogger(__name__)
 
 UNKNOWN = Usage(requests=1, unknown_requests=1)
 UNBILLED = Usage(requests=1)
 
-
+MOST_SHORTENED = 4
+"""Refusals of one prompt as too long, after each of which it is made shorter."""
 _LEAST_TRY_S = 45.0
 _PATIENCE_S = 600.0
 
@@ -74,6 +77,7 @@ class LLMPolicy(Policy):
         vision: how the model sees; None if it does not see, and pictures are left out.
         pace: how fast the model is, for the clock `token`; None: the task says.
         answer: the form of its answers.
+        window: its context; shared with the agents of the process that ask the same model.
         rng: jitter of the waits between tries.
     """
 
@@ -89,6 +93,7 @@ class LLMPolicy(Policy):
         vision: Vision | None = None,
         pace: Pace | None = None,
         answer: AnswerRule | None = None,
+        window: ContextWindow | None = None,
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
@@ -98,9 +103,11 @@ class LLMPolicy(Policy):
         self.vision = vision
         self.pace = pace
         self.answer = answer or AnswerRule()
+        self.window = window or ContextWindow(scale=self.limits.scale)
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
         self._answered = False
+        self._asked_again = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
         self._memory: PromptMemory = self._own_memory or NoMemory()
@@ -113,6 +120,7 @@ class LLMPolicy(Policy):
         """Check that the endpoint accepts the key; leave no connection open, because nothing may close it later."""
         try:
             await self.client.check()
+            await self.window.ask()
         finally:
             await self.client.close()
 
@@ -134,15 +142,16 @@ class LLMPolicy(Policy):
         prompt = self._prompt_for(context.briefing)
         self._summary.begin_decision(observation)
         recalled = self._memory.recall(observation)
-        above = [text for text in (self._summary.above, recalled.text) if text]
-        messages = prompt.messages(
-            "\n".join([*above, observation.text]),
-            recalled.messages,
+        draft = prompt.draft(
+            observation.text,
+            recalled=recalled.messages,
+            summary=self._summary.above,
+            steps=recalled.text,
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
         shape = shape_for(self.answer, context.briefing, observation.view)
-        completion = await self._complete(_Tries(self, context, messages, pictures, prompt.stable, shape))
+        completion = await self._complete(_Tries(self, context, draft, pictures, shape))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
@@ -157,7 +166,10 @@ class LLMPolicy(Policy):
         self._summary.end_decision(observation, reply)
 
     async def reflect(self, context: Context) -> None:
-        """Ask for a new summary of the game, if one is due."""
+        """Ask for a new summary of the game, if one is due, and once for the context of the model."""
+        if self._answered and not self._asked_again:  # some servers load a model only when it is asked first
+            self._asked_again = True
+            await self.window.ask()
         if not self._summary.is_due:
             return
         summary = self._summary
@@ -166,27 +178,29 @@ class LLMPolicy(Policy):
             summary.note(exchange)
             context.trace(exchange)
 
-        prompt = self._prompt_for(context.briefing)
-        messages = prompt.messages(summary.ask(context.observation))
-        asking = _Tries(self, dataclasses.replace(context, trace=trace), messages, {}, prompt.stable, purpose="summary")
+        draft = self._prompt_for(context.briefing).draft(summary.ask(context.observation))
+        asking = _Tries(self, dataclasses.replace(context, trace=trace), draft, {}, purpose="summary")
         try:
             await self._complete(asking)
         except LLMError as error:
             log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
 
     async def _complete(self, tries: _Tries) -> Completion:
-        """Return the model's answer.
+        """Return the model's answer; a prompt that is refused as too long is made shorter and sent again.
 
         Raises:
             LLMError: the last try failed; its error.
         """
-        try:
-            completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
-        except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
-            error.hopeless = isinstance(error, Unauthorized) or not self._answered
-            raise
-        self._answered = True
-        return completion
+        while True:
+            try:
+                completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+            except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
+                if tries.shorten(error):
+                    continue
+                error.hopeless = isinstance(error, Unauthorized) or not self._answered
+                raise
+            self._answered = True
+            return completion
 
     async def close(self) -> None:
         """Close the client."""
@@ -245,9 +259,8 @@ class _Tries:
         self,
         policy: LLMPolicy,
         context: Context,
-        prompt: tuple[ChatMessage, ...],
+        draft: DraftPrompt,
         pictures: Mapping[str, bytes],
-        stable: int,
         shape: AnswerShape | None = None,
         *,
         purpose: Purpose = "decision",
@@ -257,35 +270,57 @@ class _Tries:
         self._purpose: Purpose = purpose
         self._policy = policy
         self._context = context
-        self._prompt = prompt
+        self._whole = draft
+        self._draft = draft
+        self._room: int | None = None
         self._origin = Origin(observation.agent, observation.episode, observation.step, purpose)
         self._pictures = pictures
-        self._stable = stable
         self._shape = shape
-        self._tokens = estimated_tokens(prompt, policy.vision) + (shape.estimated_tokens if shape else 0)
         self._images = Usage(
-            images=sum(len(message.images) for message in prompt),
-            image_tokens=estimated_image_tokens(prompt, policy.vision) if policy.vision else 0,
+            images=len(draft.images),
+            image_tokens=estimated_image_tokens(draft.messages[-1:], policy.vision) if policy.vision else 0,
         )
         self._made = 0
+        self._shortened = 0
         self._clock = asyncio.get_running_loop().time
+
+    def shorten(self, refusal: RequestRefused) -> bool:
+        """Learn from a refusal; return whether the prompt was too long, so that the next try sends less of it."""
+        if isinstance(refusal, PromptTooLong) or self._shortened == MOST_SHORTENED:
+            return False
+        self._shortened += 1
+        return self._policy.window.learn(str(refusal), self._tokens, self._policy.client.answer_tokens)
+
+    @property
+    def _tokens(self) -> int:
+        """The estimated tokens of the prompt, with the form of its answer."""
+        return self._draft.tokens(self._policy.vision) + (self._shape.estimated_tokens if self._shape else 0)
+
+    def _fit(self) -> None:
+        """Make the prompt fit the context of the model."""
+        policy = self._policy
+        self._room = policy.window.room(policy.client.answer_tokens, self._origin, self._made + 1)
+        if self._room is not None:
+            beside = self._shape.estimated_tokens if self._shape else 0
+            self._draft = self._whole.fit(max(self._room - beside, 0), policy.vision)
 
     async def once(self) -> Completion:
         """Make one try, as soon as the limits allow it and unless the endpoint is away."""
         policy = self._policy
         policy.breaker.check()
         answer_tokens = policy.client.answer_tokens
+        self._fit()
         async with policy.limits.admit(
             tokens=self._tokens, answer_tokens=answer_tokens, deadline=self._context.deadline
         ) as ticket:
             self._made += 1
             began = self._clock()
             request = self._request(began)
-            outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
+            outcome = _Outcome("cancelled", usage=UNKNOWN + self._beside)
             try:
                 completion = await self._complete(request)
                 outcome = _Outcome(
-                    completion.verdict, completion, completion.reason, self._with_images(completion.usage)
+                    completion.verdict, completion, completion.reason, self._with_beside(completion.usage)
                 )
                 ticket.settle(outcome.usage)
             except LLMError as error:
@@ -317,20 +352,28 @@ class _Tries:
         breaker.note(None)
         return completion
 
-    def _with_images(self, usage: Usage) -> Usage:
-        return usage if usage.images else usage + self._images  # a recorded one has them counted already
+    @property
+    def _beside(self) -> Usage:
+        """What a request has beside its tokens: pictures, and what was left out of its prompt."""
+        left_out = self._draft.left_out
+        if not left_out:
+            return self._images
+        return self._images + Usage(shortened_requests=1, left_out=dict.fromkeys(left_out, 1))
+
+    def _with_beside(self, usage: Usage) -> Usage:
+        return usage if usage.images or usage.shortened_requests else usage + self._beside  # a recorded one has them
 
     def _request(self, now: float) -> Request:
         timeout_s = self._policy.try_timeout_s or _time_for_a_try(self._context.observation.answer_within_s)
         if self._context.deadline is not None:
             timeout_s = min(timeout_s, max(self._context.deadline - now, 0.0))
         return Request(
-            self._prompt,
+            self._draft.messages,
             timeout_s=timeout_s,
             origin=self._origin,
             attempt=self._made,
             pictures=self._pictures,
-            stable=self._stable,
+            stable=self._draft.stable,
             shape=self._shape,
         )
 
@@ -352,7 +395,9 @@ class _Tries:
             attempt=self._made,
             model=self._policy.client.model,
             endpoint=self._policy.client.endpoint,
-            prompt=self._prompt,
+            prompt=self._draft.messages,
+            left_out=self._draft.left_out,
+            room_tokens=self._room if self._draft.left_out else None,
             params=self._params(),
             answered_by=completion.model if completion else "",
             completion=completion.text if completion else None,

@@ -97,7 +97,10 @@ Assemble = Annotated[
 ]
 Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 Model = Annotated[
-    str, typer.Option(help="Model to ask: scripted, openai, deepseek, …, or a YAML file.", metavar="NAME")
+    str,
+    typer.Option(
+        help="Model to ask: scripted, openai, openai/gpt-5, ollama/qwen3:8b, …, or a YAML file.", metavar="MODEL"
+    ),
 ]
 ModelName = Annotated[
     str | None,
@@ -114,6 +117,14 @@ Fallback = Annotated[
     typer.Option(
         help="Policy for when the model has no reply: silent, skilled, focus-fire, random-legal, or module:name.",
         metavar="NAME",
+    ),
+]
+Answer = Annotated[
+    str | None,
+    typer.Option(
+        help="Form that the endpoint holds answers to; `khala try` says which of them it takes.",
+        show_default="as the model file says",
+        metavar="text|json|tools|grammar",
     ),
 ]
 Mind = Annotated[
@@ -164,6 +175,7 @@ class MindOptions:
     base_url: BaseUrl = None
     policy: PolicyName = None
     fallback: Fallback = None
+    answer: Answer = None
     blue: Mind = None
     red: Mind = None
     side_model: SideModel = None

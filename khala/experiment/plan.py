@@ -208,7 +208,12 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     Raises:
         ConfigError: there is no such side.
     """
-    common = Minds(base_url=settings.base_url, latency_s=settings.latency_s or 0.0, fallback=settings.fallback)
+    common = Minds(
+        base_url=settings.base_url,
+        latency_s=settings.latency_s or 0.0,
+        fallback=settings.fallback,
+        answer=settings.answer,
+    )
     if settings.model is not None:
         common = replace(common.with_name(settings.model), base_url=settings.base_url)
     if settings.agents:
@@ -219,6 +224,8 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
 def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
     said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
+    if mind.answer is None:  # matches that were planned before there were forms keep their keys
+        del said["answer"]
     named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
     return said | {"files": [_model_file(mind.model) for mind in named if mind.policy is None]}
 
@@ -226,7 +233,9 @@ def _identity(mind: Minds) -> dict[str, Any]:
 def _model_file(name: str) -> Mapping[str, Any]:
     """Return what a model file says of the answers; how it is reached and limited is no part of that."""
     fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
-    return load_model(name).model_dump(mode="json", include=fields)
+    file = load_model(name)
+    changed = {field for field in ("answer", "context") if field in file.model_fields_set}
+    return file.model_dump(mode="json", include=fields | changed)
 
 
 def _title(cell: Mapping[str, str]) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from khala.playing import environment
+from khala_agents.answers.form import AnswerForm  # noqa: TC001  # pydantic evaluates it, too
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model, model_files
 from khala_agents.llm.limits import own_turns
@@ -47,6 +48,8 @@ class Minds:
     """Latency of the scripted endpoint, if it is started."""
     fallback: str | None = None
     """Policy that decides where the model has no reply."""
+    answer: AnswerForm | None = None
+    """Form of the model's answers, instead of the one in its file."""
     agents: Mapping[str, str] = field(default_factory=dict)
     """Agents that decide in another way, by name, as `named` takes it."""
 
@@ -124,8 +127,11 @@ class Minds:
         """
         spec = WorkerSpec(policy=self.policy) if self.policy else WorkerSpec(model=self.model, fallback=self.fallback)
         address = base_url if self.needs_endpoint else self.base_url
-        workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address}, gates=gates)
+        workshop = Workshop(budget=budget, overrides=self._overrides(address), gates=gates)
         return {name: workshop.policy(spec) for name in names}
+
+    def _overrides(self, address: str | None) -> dict[str, str | float | None]:
+        return {"model": self.model_name, "base_url": address, "answer": self.answer}
 
     @property
     def environ(self) -> dict[str, str]:
@@ -136,14 +142,15 @@ class Minds:
     @property
     def needs_endpoint(self) -> bool:
         """Whether the scripted endpoint is needed."""
-        return self.policy is None and self.base_url is None and self.model == SCRIPTED
+        return self.policy is None and self.base_url is None and self.model.partition("/")[0] == SCRIPTED
 
     def options(self, base_url: str | None) -> list[str]:
         """Return the options of `khala agent` that say this; `base_url` is the scripted endpoint's."""
         if self.policy:
             return ["--policy", self.policy]
         address = base_url if self.needs_endpoint else self.base_url
-        more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
+        more = {"--base-url": address, "--model-name": self.model_name, "--answer": self.answer}
+        more["--fallback"] = self.fallback
         given = [part for option, value in more.items() if value for part in (option, value)]
         return ["--model", self.model, *given]
 

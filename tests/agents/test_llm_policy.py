@@ -170,7 +170,7 @@ async def test_an_answer_without_words_is_a_decision_that_nobody_made_with_the_r
     ("before", "error", "hopeless"),
     [
         ((), RequestRefused("no such model", status="http 404"), True),
-        (("go",), RequestRefused("the prompt is too long", status="http 400"), False),
+        (("go",), RequestRefused("a word is not allowed", status="http 400"), False),
         (("go",), Unauthorized("revoked", status="http 401"), True),
         ((), EndpointUnavailable("busy", status="http 503"), False),
     ],

@@ -7,12 +7,13 @@ each makes the body of a request, takes an answer apart, and counts its tokens.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from abc import ABC, abstractmethod
 from base64 import b64encode
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Required, TypedDict, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import to_json
+from pydantic_core import from_json, to_json
 
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
 from khala_agents.llm.faults import no_completion, verdict_of, without_byte_order_mark
@@ -129,6 +130,13 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
     async def check(self) -> None:
         """Check that the endpoint accepts the key; see `LLMClient.check`."""
         await self._http.check()
+
+    async def read(self, path: str) -> Any:
+        """Return the JSON at an address of the endpoint, see `HttpEndpoint.read`; None if there is none."""
+        body = await self._http.read(path)
+        with contextlib.suppress(ValueError):
+            return from_json(body or b"")
+        return None
 
     async def refresh(self) -> None:
         """Drop old connections and make a new one."""
