@@ -26,6 +26,7 @@ from khala_agents.llm.client import (
     RequestRefused,
     TryTimeout,
     Unauthorized,
+    Unreachable,
     estimated_image_tokens,
 )
 from khala_agents.llm.limits import RequestLimits
@@ -198,6 +199,9 @@ class LLMPolicy(Policy):
                 if tries.shorten(error):
                     continue
                 error.hopeless = isinstance(error, Unauthorized) or not self._answered
+                raise
+            except Unreachable as error:  # nothing listens there: not once in all tries, and never before
+                error.hopeless = not (self._answered or error.may_be_billed)
                 raise
             self._answered = True
             return completion

@@ -344,7 +344,8 @@ def test_a_policy_that_cannot_be_had_is_one_clear_sentence(module: Path, name: s
 
 
 BAD_SPECS = [
-    ("opnai", None, {}, "there is no model file 'opnai': did you mean openai?; write openai, openai/gpt-5, or the path of a .yaml file"),
+    ("opnai", None, {}, ("there is no model file 'opnai': did you mean openai?; write openai, "
+     "openai/gpt-5, or the path of a .yaml file")),
     ("no.yaml", None, {}, "no.yaml: there is no such file"),
     ("vllm", 1.0, {}, ("a budget needs the price of Qwen/Qwen2.5-7B-Instruct at 127.0.0.1:8000, and no price is known: "
      "write `prices: {prompt: …, completion: …}` into its model file, in US dollars per million tokens; 0 for a model "

@@ -173,6 +173,9 @@ async def test_an_answer_without_words_is_a_decision_that_nobody_made_with_the_r
         (("go",), RequestRefused("a word is not allowed", status="http 400"), False),
         (("go",), Unauthorized("revoked", status="http 401"), True),
         ((), EndpointUnavailable("busy", status="http 503"), False),
+        ((), Unreachable("refused", sent=False), True),
+        ((), Unreachable("torn"), False),
+        (("go",), Unreachable("refused", sent=False), False),
     ],
 )
 async def test_a_refusal_that_no_later_request_can_escape_is_hopeless(

@@ -13,18 +13,17 @@ from khala_protocol.messages import Usage
 @pytest.mark.parametrize(
     ("refusal", "limit", "sent"),
     [
-        ("This model's maximum context length is 8192 tokens. However, your messages resulted in 9000 tokens.", 8192, 9000),
-        ("This model's maximum context length is 2048 tokens. However, you requested 2500 tokens (2200 in the messages, "
-         "300 in the completion). Please reduce the length.", 2048, 2200),
-        ("'max_tokens' is too large: 1000. This model's maximum context length is 2048 tokens and your request has 1500 "
-         "input tokens (1000 > 2048 - 1500).", 2048, 1500),
+        ("maximum context length is 8192 tokens. However, your messages resulted in 9000 tokens.", 8192, 9000),
+        ("context length is 2048 tokens. However, you requested 2500 (2200 in the messages, 300 in the completion)",
+         2048, 2200),
+        ("'max_tokens' is too large: 1000. The maximum context length is 2048 tokens, and it has 1500 input tokens",
+         2048, 1500),
         ("request (2311 tokens) exceeds the available context size (1024 tokens), try increasing it", 1024, 2311),
         ("the request exceeds the available context size. try increasing the context size", None, None),
         ("prompt is too long: 213462 tokens > 200000 maximum", 200000, 213462),
         ("The input token count (1200000) exceeds the maximum number of tokens allowed (1048575).", 1048575, 1200000),
         ("Prompt contains 40000 tokens, too large for model with 32768 maximum context length", 32768, 40000),
-        ("Trying to keep the first 4096 tokens when context the overflows. However, the model is loaded with context "
-         "length of only 2048 tokens, which is not enough.", 2048, None),
+        ("Trying to keep 4096 tokens. However, it is loaded with context length of only 2048 tokens", 2048, None),
         ("`inputs` tokens + `max_new_tokens` must be <= 4096. Given: 3900 `inputs` tokens and 1000 `max_new_tokens`",
          4096, 3900),
         ("Requested tokens (2311) exceed context window of 1024", 1024, None),
