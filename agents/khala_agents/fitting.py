@@ -1,8 +1,8 @@
 """A prompt that is longer than its model's context → the same prompt without the parts that matter least.
 
 `CUTS` is the whole rule: what is left out, in which order, and why. The role, the task, the teams, the actions and the
-form of an answer stay, and so do the agent's own units, their enemies, the valid actions and the answers to the last
-orders. A prompt that is still too long then is not sent: the endpoint would refuse it, or read a part of it.
+form of an answer stay, and so do units and enemies that are near, the valid actions and the answers to the last orders.
+ A prompt that is still too long then is not sent: the endpoint would refuse it, or read a part of it.
 
 Above it is `khala_agents.llm_policy`, which knows how much room there is.
 """
@@ -120,8 +120,31 @@ def _section(heading: str, reason: str) -> Cut:
     return Cut(heading, reason, shorten)
 
 
-def _allies(draft: DraftPrompt) -> DraftPrompt:
-    return replace(draft, observation=_ALLIES.sub("", draft.observation))
+def _of_teams(heading: str, reason: str) -> Cut:
+    """Return the cut of a list that each team has."""
+    block = re.compile(rf"^( +){heading}:.*\n(?:\1 +.*(?:\n|\Z))*", re.MULTILINE)
+    return Cut(heading, reason, lambda draft: replace(draft, observation=block.sub("", draft.observation)))
+
+
+def _without_farthest_unit(draft: DraftPrompt) -> DraftPrompt:
+    """Return the draft without the farthest unit of the longest list of a team."""
+    lists = [found.span() for found in _UNITS.finditer(draft.observation)]
+    longest = max(lists, key=lambda span: draft.observation.count("\n", *span), default=(0, 0))
+    lines = draft.observation[slice(*longest)].splitlines(keepends=True)
+    if len(lines) <= FEWEST_UNITS:
+        return draft
+    lines.remove(max(reversed(lines), key=_distance))
+    observation = draft.observation[: longest[0]] + "".join(lines) + draft.observation[longest[1] :]
+    return replace(draft, observation=observation)
+
+
+def _distance(line: str) -> float:
+    found = _DISTANCE.search(line)
+    return float(found[1]) if found else 0.0
+
+
+def _without_descriptions(draft: DraftPrompt) -> DraftPrompt:
+    return replace(draft, system=_DESCRIPTIONS.sub(r"\1", draft.system))
 
 
 def _manual(heading: str, reason: str) -> Cut:
@@ -140,7 +163,11 @@ def _has_heading(section: str, heading: str) -> bool:
 
 _SECTIONS = re.compile(r"\n\n(?=\S)")
 _CHAPTERS = re.compile(r"\n\n(?=# )")
-_ALLIES = re.compile(r"^( +)Allied units:.*\n(?:\1 +.*(?:\n|\Z))*", re.MULTILINE)
+_UNITS = re.compile(r"(?:^ +\S.* \| tag 0x.*(?:\n|\Z))+", re.MULTILINE)
+_DISTANCE = re.compile(r"\| distance (\d+(?:\.\d+)?)")
+_DESCRIPTIONS = re.compile(r"^(- <[^>\n]*>): .*$", re.MULTILINE)
+FEWEST_UNITS: Final = 2
+"""Units of a list that stay."""
 
 _OF_OBSERVATION: Final[tuple[Cut, ...]] = (
     _section("Task", "the system message has it, too"),
@@ -153,12 +180,14 @@ _OF_OBSERVATION: Final[tuple[Cut, ...]] = (
     _section("Economy", "what can be paid is said beside the valid actions"),
     _section("Places to build at", "the host finds a place for a structure that names none"),
     _section("Not possible now", "the refusal of such an action says why"),
-    Cut("Allied units", "others command them; their enemies and the agent's own units stay", _allies),
+    _of_teams("Allied units", "others command them; their enemies and the agent's own units stay"),
+    _of_teams("Since the last observation", "what is there now stands elsewhere"),
     _section("Since the last observation", "what is there now stands elsewhere"),
     _section("Alerts", "what is there now stands elsewhere"),
     _section("Messages", "orders can be given without them"),
 )
-_SEEN: Final = frozenset(cut.name for cut in _OF_OBSERVATION[2:])
+_FAR_UNITS: Final = "the farthest units"
+_SEEN: Final = frozenset({_FAR_UNITS, *(cut.name for cut in _OF_OBSERVATION[2:])})
 """Parts that an agent must not believe to be empty."""
 
 CUTS: Final[tuple[Cut, ...]] = (
@@ -171,7 +200,13 @@ CUTS: Final[tuple[Cut, ...]] = (
     _manual("Memory", "orders can be given without notes"),
     _manual("Communication", "orders can be given without messages"),
     _section("Answer", "the system message has it, too"),
+    Cut("descriptions of actions", "their names and arguments stay", _without_descriptions),
     _manual("Rules", "a refusal names the rule that was broken"),
+    Cut(
+        _FAR_UNITS,
+        "of the longest list, one after the other; near ones matter first",
+        _without_farthest_unit,
+    ),
 )
 """What is left out of a prompt that is too long, in this order; of earlier steps the oldest first."""
 

@@ -130,6 +130,7 @@ class LLMPolicy(Policy):
         self._prompt_for(briefing)
         self._remember_for(briefing)
         await self.client.refresh()
+        await self.window.ask()
 
     async def decide(self, context: Context) -> Said:
         """Return the model's words, or why there are none.

@@ -105,7 +105,7 @@ class FormTrial:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class ModelTrial:
     """What was found of a model; the first form is the one of its file."""
 
     named: str
@@ -129,7 +129,7 @@ def run_trial(wanted: WantedTrial, *, as_json: bool) -> None:
         raise typer.Exit(FAILED)
 
 
-async def _try_model(wanted: WantedTrial) -> Trial:
+async def _try_model(wanted: WantedTrial) -> ModelTrial:
     file = load_model(wanted.model)
     minds = Minds(model=wanted.model, base_url=wanted.base_url)
     forms = _forms(file, wanted.answer)
@@ -150,7 +150,7 @@ async def _try_model(wanted: WantedTrial) -> Trial:
         found, context = await _ask_in_each_form(match, forms, file, policy, wanted.timeout_s)
         client = policy(forms[0]).client
         named = " --base-url ".join(filter(None, (wanted.model, wanted.base_url)))
-        return Trial(named, client.model, client.endpoint, task.name, seats[0].agent, context, found)
+        return ModelTrial(named, client.model, client.endpoint, task.name, seats[0].agent, context, found)
 
 
 def _forms(file: ModelConfig, only: str | None) -> list[AnswerForm]:
@@ -180,7 +180,8 @@ async def _ask_in_each_form(
     context: int | None = None
     for trial in found:
         if trial.form not in file.forms:
-            trial.state, trial.why = "not offered", f"endpoints of profile {file.profile} take no {trial.form}"
+            trial.state = "not offered"
+            trial.why = f"endpoints of profile {file.profile} take no {trial.form}"
             continue
         turn = await match.turn()
         seen = turn.asked.get(first)
@@ -223,11 +224,13 @@ async def _ask(policy: LLMPolicy, seen: Seen, trial: FormTrial, timeout_s: float
             trial.prompt_tokens = call.usage.prompt_tokens
             trial.answer_tokens = call.usage.completion_tokens
     decision = Decision(said) if isinstance(said, str) else said
-    trial.reply, trial.cut = decision.text, decision.cut
+    trial.reply = decision.text
+    trial.cut = decision.cut
     if decision.status == "ok":
         trial.state = _state(policy, trial)
     elif decision.status != "failed":
-        trial.state, trial.why = "no words", decision.reason
+        trial.state = "no words"
+        trial.why = decision.reason
     return said
 
 
@@ -295,7 +298,7 @@ def _note_report(trial: FormTrial, reports: Sequence[Any], agent: str) -> None:
 # --- on the screen ------------------------------------------------------------------------------------
 
 
-def _print(trial: Trial) -> None:
+def _print(trial: ModelTrial) -> None:
     screen = stdout_console()
     first = trial.forms[0]
     facts = {
@@ -330,7 +333,7 @@ def _prompt_tokens(form: FormTrial) -> str:
     return f"{form.prompt_tokens:,} tokens ({ours})"
 
 
-def _context(trial: Trial) -> str:
+def _context(trial: ModelTrial) -> str:
     if trial.context is None:
         return "the endpoint does not tell; name it with `context` in a model file"
     left_out = trial.forms[0].left_out
@@ -367,7 +370,7 @@ _BLANKS = re.compile(r"[^\S\n]{40,}")
 """Blanks that a small model may write until its limit of tokens."""
 
 
-def _verdict(trial: Trial) -> str:
+def _verdict(trial: ModelTrial) -> str:
     first = trial.forms[0]
     better = [form.form for form in trial.forms[1:] if form.usable and form.state == "held"]
     if first.usable:

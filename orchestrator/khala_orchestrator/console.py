@@ -302,11 +302,13 @@ def _tokens(usages: Iterable[Usage]) -> str:
     total = sum(usages, start=Usage())
     if total.shortened_requests:
         parts = ", ".join(f"{count} {part}" for part, count in total.left_out.items())
-        return f"{_counted(total)}; {total.shortened_requests} prompt(s) did not fit the context, left out: {parts}"
-    return _counted(total)
+        return (
+            f"{_sum_in_words(total)}; {total.shortened_requests} prompt(s) did not fit the context, left out: {parts}"
+        )
+    return _sum_in_words(total)
 
 
-def _counted(total: Usage) -> str:
+def _sum_in_words(total: Usage) -> str:
     text = f"{total.prompt_tokens:,} in"
     if total.images:
         text += f" (about {total.image_tokens:,} of them for {total.images} pictures)"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.fitting import CUTS, DraftPrompt, PromptTooLong
+from khala_agents.fitting import CUTS, Cut, DraftPrompt, PromptTooLong
 from khala_agents.llm.client import Completion, RequestRefused
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule
@@ -32,6 +32,10 @@ SYSTEM = "# Who you are\nYou are A.\n\n# Rules\n- Obey.\n\n# Actions\n<Stop()>"
 
 def message(role: Any, content: str) -> ChatMessage:
     return ChatMessage(role=role, content=content)
+
+
+def cut_of(name: str) -> Cut:
+    return next(cut for cut in CUTS if cut.name == name)
 
 
 def full() -> DraftPrompt:
@@ -85,11 +89,27 @@ def test_what_an_agent_would_believe_to_be_empty_is_named() -> None:
 
 
 def test_allies_go_and_own_units_and_enemies_stay() -> None:
-    (cut,) = (cut for cut in CUTS if cut.name == "Allied units")
-    shorter = cut.shorten(DraftPrompt("", observation=OBSERVATION)).observation
+    shorter = cut_of("Allied units").shorten(DraftPrompt("", observation=OBSERVATION)).observation
     assert "0x1000c0001" not in shorter
     assert "    Enemy units:\n        Stalker | tag 0x100200001" in shorter
     assert "0x100040001" in shorter
+
+
+def test_the_farthest_units_go_first_and_two_of_each_list_stay() -> None:
+    draft = DraftPrompt("", observation=OBSERVATION)
+    shorter = cut_of("the farthest units").shorten(draft)
+    gone = set(OBSERVATION.splitlines()) - set(shorter.observation.splitlines())
+    assert [line.split(" | ")[1] for line in gone] == ["tag 0x100200001"]
+    while (after := cut_of("the farthest units").shorten(shorter)) != shorter:
+        shorter = after
+    assert shorter.observation.count("| tag 0x") == 6
+
+
+def test_actions_keep_their_names_and_arguments() -> None:
+    draft = DraftPrompt("# Actions\n- <Stop()>: Stands still.\n- <Move_Screen(screen)>: Walks.\n\n# Arguments\n- x: y")
+    assert cut_of("descriptions of actions").shorten(draft).system == (
+        "# Actions\n- <Stop()>\n- <Move_Screen(screen)>\n\n# Arguments\n- x: y"
+    )
 
 
 def test_a_prompt_that_cannot_fit_is_not_sent_and_says_what_to_do() -> None:
@@ -100,7 +120,8 @@ def test_a_prompt_that_cannot_fit_is_not_sent_and_says_what_to_do() -> None:
 def test_every_heading_of_the_table_is_one_of_an_observation() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in GOLDEN.glob("*.txt"))
     headings = {line.strip().rstrip(":") for line in re.findall(r"^(?:\S| +Allied).*$", text, re.MULTILINE)}
-    own = {"earlier steps", "steps in short", "summary of the game", "worked example"}
+    own = {"earlier steps", "steps in short", "summary of the game", "worked example", "descriptions of actions"}
+    own.add("the farthest units")
     assert {cut.name for cut in CUTS if not cut.name.endswith("(instructions)")} - own <= headings
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections import deque
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ MOST_UNCOUNTED: Final = 2.0
 MARGIN: Final = 1.15
 """From the first count on, it is the highest count of money, and so much more."""
 SPARE: Final = 1.03
-"""Part of a prompt's tokens by which two prompts of one model differ in their tokens for a byte; seen: 1.02."""
+"""So much more than the highest of the last counts is expected of a prompt."""
+RECENT: Final = 8
+"""Counts that this is the highest of."""
 ANSWER_TOKENS: Final = 1_000
 """Room for an answer where the model file has no `max_tokens`, but at most a quarter of the context."""
 
@@ -45,6 +48,7 @@ class TokenScale:
         self._estimated = 0
         self._counted = 0
         self._highest = 0.0
+        self._newest: deque[float] = deque(maxlen=RECENT)
 
     @property
     def known(self) -> bool:
@@ -56,6 +60,11 @@ class TokenScale:
         """The mean over what was counted; 1 before that."""
         return self._counted / self._estimated if self.known else 1.0
 
+    @property
+    def high_factor(self) -> float:
+        """The highest of the last counts: a prompt of tags and points has more tokens than one of words."""
+        return max(self._newest, default=UNCOUNTED)
+
     def most(self, estimated: float) -> float:
         """Return the most tokens that a prompt of so many estimated tokens may be billed with."""
         return estimated * (MARGIN * self._highest if self.known else MOST_UNCOUNTED)
@@ -66,6 +75,7 @@ class TokenScale:
             self._estimated += estimated
             self._counted += counted
             self._highest = max(self._highest, counted / estimated)
+            self._newest.append(counted / estimated)
 
     def learn_from(self, usage: Usage, estimated: int) -> None:
         """Take in the usage of a request that was answered."""
@@ -111,8 +121,7 @@ class ContextWindow:
         if self.tokens is None:
             return None
         answer = _answer(self.tokens, answer_tokens)
-        factor = self.scale.factor * SPARE if self.scale.known else UNCOUNTED
-        return max(int((self.tokens - answer) / factor), 0)
+        return max(int((self.tokens - answer) / (self.scale.high_factor * SPARE)), 0)
 
     def learn(self, refusal: str, estimated: int, answer_tokens: int | None) -> bool:
         """Learn from the words with which a prompt of so many estimated tokens was refused.
