@@ -199,7 +199,7 @@ def try_model(
 ) -> None:
     """Ask a model once, and show what it said, what the host read of it, and what it took.
 
-    It gets the prompt of an agent in the first step of a task, once for each form of answers. Prints the tokens by its
+    It gets the prompt of an agent at the beginning of a task, once for each form of answers. Prints the tokens by its
     own count, the seconds, the price, its context and which forms it takes. Ends with 1 if none of its orders in the
     form of its file was carried out.
     """

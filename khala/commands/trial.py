@@ -1,6 +1,6 @@
 """The work of `khala try`: ask a model once with each form of answers, and show what the host reads of its replies.
 
-The prompts are real ones: a task begins on this machine, one of its agents is asked in each of its first steps, and the
+The prompts are real ones: a task begins on this machine, one of its agents is asked in some of its first steps, and the
 host judges what it says. `khala.cli` above has the options.
 """
 
@@ -35,7 +35,7 @@ from khala_protocol.visible import visible_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from khala.playing.seats import Seen
+    from khala.playing.seats import SeatsTurn, Seen
     from khala_agents.config import ModelConfig
     from khala_agents.policy import Said
     from khala_protocol.messages import AgentReport, ModelCall
@@ -49,6 +49,8 @@ FIELDS: Final = {
 """By form, the fields of a request that ask for it; one that an endpoint refuses is left out from then on."""
 STEP_LOOPS: Final = 8
 """Game loops between two of the steps, so that they are much alike."""
+LONGEST_WALK: Final = 12
+"""Steps that are waited for an enemy to come into sight: an agent that sees none may rightly order nothing."""
 LONGEST_REPLY: Final = 4_000
 """Characters of a reply that are printed."""
 
@@ -120,16 +122,21 @@ class ModelTrial:
 
 def run_trial(wanted: WantedTrial, *, as_json: bool) -> None:
     """Ask a model, print what was found, and end with 1 if nothing that it said in its own form was carried out."""
-    trial = asyncio.run(_try_model(wanted))
+    trial = asyncio.run(try_model(wanted))
     if as_json:
         typer.echo(json.dumps(asdict(trial)))
     else:
-        _print(trial)
+        print_trial(trial)
     if not trial.forms[0].usable:
         raise typer.Exit(FAILED)
 
 
-async def _try_model(wanted: WantedTrial) -> ModelTrial:
+async def try_model(wanted: WantedTrial) -> ModelTrial:
+    """Return what was found of a model.
+
+    Raises:
+        KhalaError: the model file, a key or the task is wrong.
+    """
     file = load_model(wanted.model)
     minds = Minds(model=wanted.model, base_url=wanted.base_url)
     forms = _forms(file, wanted.answer)
@@ -183,10 +190,8 @@ async def _ask_in_each_form(
             trial.state = "not offered"
             trial.why = f"endpoints of profile {file.profile} take no {trial.form}"
             continue
-        turn = await match.turn()
-        seen = turn.asked.get(first)
-        if seen is None:
-            raise ConfigError(f"{first} is not asked in the first steps of the task: take another with --task")
+        turn = await _turn_with_enemies(match)
+        seen = turn.asked[first]
         policy = policy_of(trial.form)
         stderr_console().print(Text(f"asking {file.model}: {trial.form} …", "dim"))
         try:
@@ -201,6 +206,23 @@ async def _ask_in_each_form(
         if trial.state == "failed" and trial is found[0]:  # the others would fail as well
             return found[:1], context
     return found, context
+
+
+async def _turn_with_enemies(match: SeatedMatch) -> SeatsTurn:
+    """Return the next turn in which the first agent sees an enemy; after `LONGEST_WALK` turns any in which it is asked.
+
+    Raises:
+        ConfigError: it is not asked.
+    """
+    first = match.seats[0]
+    for walked in range(LONGEST_WALK + 1):
+        turn = await match.turn()
+        seen = turn.asked.get(first)
+        if seen and (walked == LONGEST_WALK or any(team.enemies for team in seen.observation.view.teams)):
+            return turn
+        for seat in turn.asked:
+            match.act(seat, "")
+    raise ConfigError(f"{first} is not asked in the first steps of this task: take another with --task")
 
 
 async def _ask(policy: LLMPolicy, seen: Seen, trial: FormTrial, timeout_s: float) -> Said:
@@ -298,7 +320,8 @@ def _note_report(trial: FormTrial, reports: Sequence[Any], agent: str) -> None:
 # --- on the screen ------------------------------------------------------------------------------------
 
 
-def _print(trial: ModelTrial) -> None:
+def print_trial(trial: ModelTrial) -> None:
+    """Print what was found as a person reads it."""
     screen = stdout_console()
     first = trial.forms[0]
     facts = {
