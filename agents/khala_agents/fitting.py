@@ -17,7 +17,7 @@ from khala_agents.llm.client import RequestRefused, estimated_tokens
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from khala_agents.llm.vision import Vision
     from khala_protocol.messages import ImageRef
@@ -209,8 +209,3 @@ CUTS: Final[tuple[Cut, ...]] = (
     ),
 )
 """What is left out of a prompt that is too long, in this order; of earlier steps the oldest first."""
-
-
-def cuts_as_table() -> Iterator[tuple[str, str]]:
-    """Yield each part that can be left out and the reason, in the order of `CUTS`; for the reference."""
-    return ((cut.name, cut.reason) for cut in CUTS)
