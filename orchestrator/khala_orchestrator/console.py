@@ -6,6 +6,7 @@ here are the only ones: whatever is printed on them, no character of it does any
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
@@ -69,7 +70,7 @@ def stdout_console() -> Console:
 class Progress:
     """Shows a match while it runs. A context manager; call it with each message of the host.
 
-    On a terminal it is a live picture; elsewhere, such as in a log, it is a line every `HEARTBEAT_S`.
+    On a terminal it is a live picture; elsewhere, such as in a log, it is a line for the first step and every `HEARTBEAT_S`.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Progress:
     ) -> None:
         """Take a screen, the steps of an episode, the directory of the agents' logs, and a clock in seconds."""
         self._clock = clock
-        self._said_at = clock()
+        self._said_at = -math.inf  # the first report is a line as well
         self._screen = screen
         self._logs = logs
         self._failures: set[str] = set()

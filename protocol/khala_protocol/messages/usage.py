@@ -27,7 +27,7 @@ class Usage(Frozen):
     """The most that these may have cost; None if no price is known for the model."""
     shortened_requests: Count = 0
     """Requests whose prompt was shortened to fit the model's context."""
-    left_out: dict[str, Count] = {}
+    left_out: dict[str, int] = {}
     """By part of a prompt: from how many of these requests it was left out."""
     images: Count = 0
     """Number of pictures that were sent along."""
