@@ -365,7 +365,7 @@ def _context(trial: ModelTrial) -> str:
 
 
 def _table(forms: Sequence[FormTrial]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0), collapse_padding=True)
     for name in ("form", "endpoint"):
         table.add_column(name, no_wrap=True)
     for name in ("orders", "refused", "tokens in", "out", "seconds", "USD"):

@@ -70,7 +70,7 @@ def stdout_console() -> Console:
 class Progress:
     """Shows a match while it runs. A context manager; call it with each message of the host.
 
-    On a terminal it is a live picture; elsewhere, such as in a log, it is a line for the first step and every `HEARTBEAT_S`.
+    On a terminal it is a live picture; elsewhere, such as in a log, a line for the first step and every `HEARTBEAT_S`.
     """
 
     def __init__(

@@ -188,6 +188,7 @@ _SENT: Final = tuple(
     for pattern in (
         rf"{_NUMBER} (?:tokens )?(?:in|from|of) the (?:messages|input|prompt)",
         rf"{_NUMBER} (?:`inputs`|input|prompt) tokens",
+        rf"requested tokens \({_NUMBER}\)",
         rf"(?:resulted in |request \(|too long: |count \(|count of |contains |has |got ){_NUMBER}(?: tokens|\))",
     )
 )

@@ -26,7 +26,7 @@ from khala_protocol.messages import Usage
         ("Trying to keep 4096 tokens. However, it is loaded with context length of only 2048 tokens", 2048, None),
         ("`inputs` tokens + `max_new_tokens` must be <= 4096. Given: 3900 `inputs` tokens and 1000 `max_new_tokens`",
          4096, 3900),
-        ("Requested tokens (2311) exceed context window of 1024", 1024, None),
+        ("Requested tokens (2311) exceed context window of 1024", 1024, 2311),
     ],
 )  # fmt: skip
 def test_a_refusal_names_the_context_and_the_prompt(refusal: str, limit: int | None, sent: int | None) -> None:
