@@ -344,7 +344,7 @@ def print_trial(trial: ModelTrial) -> None:
         for call in first.carried_out:
             screen.print(Text(f"carried out  {call}", "green"), soft_wrap=True)
         for refusal in first.refused:
-            screen.print(Text(visible_line(f"refused      {refusal}"), "yellow"), soft_wrap=True)
+            screen.print(Text(f"refused      {visible_line(refusal)}", "yellow"), soft_wrap=True)
     screen.print(Text(f"\n{_verdict(trial)}", "bold green" if first.usable else "bold red"), soft_wrap=True)
 
 
