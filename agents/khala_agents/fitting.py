@@ -187,14 +187,18 @@ _OF_OBSERVATION: Final[tuple[Cut, ...]] = (
     _section("Messages", "orders can be given without them"),
 )
 _FAR_UNITS: Final = "the farthest units"
-_SEEN: Final = frozenset({_FAR_UNITS, *(cut.name for cut in _OF_OBSERVATION[2:])})
+_PICTURES: Final = "pictures"
+_SEEN: Final = frozenset({_FAR_UNITS, _PICTURES, *(cut.name for cut in _OF_OBSERVATION[2:])})
 """Parts that an agent must not believe to be empty."""
 
 CUTS: Final[tuple[Cut, ...]] = (
     Cut("earlier steps", "the observation says what became of the last orders", _without_oldest_step),
-    Cut("steps in short", "the observation says what became of the last orders", lambda it: replace(it, steps="")),
-    Cut("summary of the game", "it is of the past", lambda it: replace(it, summary="")),
-    Cut("worked example", "the system message says the form in words", lambda it: replace(it, example=())),
+    Cut(
+        "steps in short", "the observation says what became of the last orders", lambda draft: replace(draft, steps="")
+    ),
+    Cut("summary of the game", "it is of the past", lambda draft: replace(draft, summary="")),
+    Cut("worked example", "the system message says the form in words", lambda draft: replace(draft, example=())),
+    Cut(_PICTURES, "most of what they show is in the text", lambda draft: replace(draft, images=())),
     *_OF_OBSERVATION,
     _manual("Standing orders", "orders can be given one by one"),
     _manual("Memory", "orders can be given without notes"),

@@ -27,7 +27,6 @@ from khala_agents.llm.client import (
     TryTimeout,
     Unauthorized,
     Unreachable,
-    estimated_image_tokens,
 )
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule, with_retries
@@ -281,10 +280,6 @@ class _Tries:
         self._origin = Origin(observation.agent, observation.episode, observation.step, purpose)
         self._pictures = pictures
         self._shape = shape
-        self._images = Usage(
-            images=len(draft.images),
-            image_tokens=estimated_image_tokens(draft.messages[-1:], policy.vision) if policy.vision else 0,
-        )
         self._made = 0
         self._shortened = 0
         self._clock = asyncio.get_running_loop().time
@@ -360,10 +355,13 @@ class _Tries:
     @property
     def _beside(self) -> Usage:
         """What a request has beside its tokens: pictures, and what was left out of its prompt."""
-        left_out = self._draft.left_out
-        if not left_out:
-            return self._images
-        return self._images + Usage(shortened_requests=1, left_out=dict.fromkeys(left_out, 1))
+        draft, vision = self._draft, self._policy.vision
+        return Usage(
+            images=len(draft.images),
+            image_tokens=sum(vision.image_tokens(image) for image in draft.images) if vision else 0,
+            shortened_requests=1 if draft.left_out else 0,
+            left_out=dict.fromkeys(draft.left_out, 1),
+        )
 
     def _with_beside(self, usage: Usage) -> Usage:
         return usage if usage.images or usage.shortened_requests else usage + self._beside  # a recorded one has them

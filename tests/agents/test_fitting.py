@@ -14,11 +14,12 @@ from khala_agents.fitting import CUTS, Cut, DraftPrompt, PromptTooLong
 from khala_agents.llm.client import Completion, RequestRefused
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule
+from khala_agents.llm.vision import OPENAI, Vision
 from khala_agents.llm.window import ContextWindow
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import WholeSteps
 from khala_agents.policy import Context
-from khala_protocol.messages import ChatMessage, ModelCall, Usage
+from khala_protocol.messages import ChatMessage, ImageRef, ModelCall, Usage
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,6 +81,16 @@ def test_of_earlier_steps_the_oldest_go_first_and_no_answer_stays_without_its_qu
     ]  # fmt: skip
 
 
+def test_pictures_go_before_what_stands_in_the_text() -> None:
+    image = ImageRef(
+        name="screen", title="Screen", media_type="image/png", sha256="0" * 64, bytes=9, width=512, height=512
+    )
+    vision = Vision().counted_by(OPENAI)
+    draft = DraftPrompt(SYSTEM, observation=OBSERVATION, images=(image,))
+    fitted = draft.fit(draft.tokens(vision) - 1, vision)
+    assert (fitted.images, fitted.left_out, fitted.observation) == ((), ("pictures",), OBSERVATION)
+
+
 def test_what_an_agent_would_believe_to_be_empty_is_named() -> None:
     draft = DraftPrompt(SYSTEM, observation=OBSERVATION)
     fitted = draft.fit(draft.tokens() - 330)
@@ -120,8 +131,8 @@ def test_a_prompt_that_cannot_fit_is_not_sent_and_says_what_to_do() -> None:
 def test_every_heading_of_the_table_is_one_of_an_observation() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in GOLDEN.glob("*.txt"))
     headings = {line.strip().rstrip(":") for line in re.findall(r"^(?:\S| +Allied).*$", text, re.MULTILINE)}
-    own = {"earlier steps", "steps in short", "summary of the game", "worked example", "descriptions of actions"}
-    own.add("the farthest units")
+    own = {"earlier steps", "steps in short", "summary of the game", "worked example", "pictures"}
+    own |= {"descriptions of actions", "the farthest units"}
     assert {cut.name for cut in CUTS if not cut.name.endswith("(instructions)")} - own <= headings
 
 
