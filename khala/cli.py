@@ -70,6 +70,13 @@ Examples:\n
     khala run simple64_eceb_terran --opponent "guest:python my_bot/run.py"\n
     khala run --resume runs/2s3z-20260101-120000-ab12
 """
+TRY_EPILOG = """
+Examples:\n
+    khala try openai/gpt-5\n
+    khala try ollama/qwen3:8b --task smac_3m\n
+    khala try my_model.yaml --answer json\n
+    khala try llamacpp --base-url http://127.0.0.1:8081/v1 --json
+"""
 ADVISE_EPILOG = """
 Examples:\n
     khala advise first\n
@@ -173,6 +180,34 @@ def advise(
     run_advise(adviser, connect=connect or (), tls=tls, insecure=insecure, as_json=as_json)
 
 
+def try_model(
+    model: Annotated[
+        str, typer.Argument(help="A model file by name or path, or a provider and its model: openai/gpt-5.")
+    ] = "scripted",
+    *,
+    task: Annotated[str, typer.Option(help="Task whose first observations are sent.", metavar="TASK")] = "2s3z_pair",
+    base_url: Annotated[str | None, typer.Option(help="Another endpoint of the same kind.")] = None,
+    answer: Annotated[
+        str | None,
+        typer.Option(
+            help="Ask in this form only.", show_default="once in each form", metavar="text|json|tools|grammar"
+        ),
+    ] = None,
+    timeout: Annotated[float, typer.Option(min=1, help="Seconds to wait for an answer.")] = 600.0,
+    game: Game = "simulator",
+    as_json: Json = False,
+) -> None:
+    """Ask a model once, and show what it said, what the host read of it, and what it took.
+
+    It gets the prompt of an agent at the beginning of a task, once for each form of answers. Prints the tokens by its
+    own count, the seconds, the price, its context and which forms it takes. Ends with 1 if none of its orders in the
+    form of its file was carried out.
+    """
+    from khala.commands.trial import WantedTrial, run_trial  # noqa: PLC0415  # see there
+
+    run_trial(WantedTrial(model, task, base_url, answer, timeout, game), as_json=as_json)
+
+
 def doctor(
     *,
     tls: Tls = None,
@@ -238,6 +273,7 @@ for command, epilog in (
     (doctor, None),
 ):
     app.command(epilog=epilog)(command)
+app.command("try", epilog=TRY_EPILOG)(try_model)
 app.add_typer(dataset, name="dataset")
 app.add_typer(experiment, name="experiment")
 app.add_typer(keys, name="keys")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -29,6 +29,7 @@ from khala_agents.llm.replay import ReplayClient
 from khala_agents.llm.responses import Responses
 from khala_agents.llm.retry import RetryRule
 from khala_agents.llm.vision import Vision
+from khala_agents.llm.window import ContextWindow, RecordedWindow, told_context
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.policy import Policy, as_policy
 from khala_agents.scripted.players import PLAYERS, ScriptedPlayer, Silent
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_agents.config import SentValue
-    from khala_agents.llm.client import LLMClient
     from khala_agents.llm.limits import Gates
     from khala_protocol.messages import MemoryRule, ModelCall
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def client_for(config: ModelConfig) -> LLMClient:
+def client_for(config: ModelConfig) -> Anthropic | OpenAICompatible:
     """Return a client for one agent.
 
     Raises:
@@ -116,6 +116,7 @@ class Workshop:
         self._overrides = {name: value for name, value in (overrides or {}).items() if value is not None}
         self._gates = gates
         self._models: dict[str, tuple[ModelConfig, RequestLimits]] = {}
+        self._windows: dict[str, ContextWindow] = {}
         self._breakers: dict[str, Breaker] = {}
 
     def policy(self, spec: WorkerSpec) -> Policy:
@@ -128,9 +129,14 @@ class Workshop:
             return load_policy(spec.policy)
         assert spec.model is not None
         config, limits = self._model(spec.model)
+        client = client_for(config)
+        if spec.model not in self._windows:
+            told = partial(told_context, config.profile, config.model, client.read)
+            self._windows[spec.model] = ContextWindow(config.context, limits.scale, told)
         kind = BatchPolicy if config.batch else LLMPolicy
         model = kind(
-            client_for(config),
+            client,
+            window=self._windows[spec.model],
             memory=spec.memory,
             retry=config.retry,
             limits=limits,
@@ -196,7 +202,12 @@ def replay_policies(exchanges: Iterable[ModelCall], *, memory: MemoryRule | None
     at_once = RetryRule(tries=1000, base_s=0, cap_s=0, jitter_s=0)
     return {
         agent: LLMPolicy(
-            ReplayClient(made), memory=memory, retry=at_once, vision=_vision_of(made), answer=_answer_of(made)
+            ReplayClient(made),
+            memory=memory,
+            retry=at_once,
+            vision=_vision_of(made),
+            answer=_answer_of(made),
+            window=RecordedWindow(made),
         )
         for agent, made in by_agent.items()
     }

@@ -72,7 +72,9 @@ def agent(
     ] = False,
     model: Annotated[
         str | None,
-        typer.Option(help="Model to ask: a shipped one (scripted, openai, ollama, …) or a YAML file.", metavar="NAME"),
+        typer.Option(
+            help="Model to ask: a shipped file (scripted, openai, …), openai/gpt-5, or a YAML file.", metavar="MODEL"
+        ),
     ] = None,
     policy: Annotated[
         str | None,
@@ -120,6 +122,13 @@ def agent(
             metavar="N",
         ),
     ] = 0,
+    answer: Annotated[
+        str | None,
+        typer.Option(
+            help="Form that the endpoint holds answers to, instead of the model file's.",
+            metavar="text|json|tools|grammar",
+        ),
+    ] = None,
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
@@ -147,7 +156,7 @@ def agent(
         commands.BusPlace(connect or [], tls, insecure=insecure),
         budget_usd=budget_usd,
         ledger=ledger,
-        overrides={"base_url": base_url, "model": model_name},
+        overrides={"base_url": base_url, "model": model_name, "answer": answer},
         as_json=as_json,
     )
 

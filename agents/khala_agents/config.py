@@ -117,6 +117,9 @@ class ModelConfig(Frozen):
     is the same in all steps."""
     max_tokens: int | None = Field(default=None, ge=1)
     """Limit of generated tokens."""
+    context: int | None = Field(default=None, ge=256)
+    """Tokens of prompt and answer together that the model, as its server has loaded it, can hold: longer prompts are
+    shortened. None: as the endpoint says, which many do only when they refuse a prompt."""
     temperature: float | None = Field(default=None, ge=0)
     seed: int | None = None
     stop: tuple[Annotated[str, Field(min_length=1)], ...] = ()
@@ -213,6 +216,11 @@ class ModelConfig(Frozen):
             raise ValueError("a batch has all requests at once: remove limits")
         if self.stop and not row.stop:
             raise ValueError(f"{self.profile} takes no stop: remove it")
+        if self.context is not None and self.max_tokens is not None and self.max_tokens >= self.context:
+            raise ValueError(
+                f"an answer of {self.max_tokens} tokens leaves no room for a prompt in a context of {self.context}: "
+                "lower max_tokens, or give the model a larger context"
+            )
         return self
 
     @property
@@ -237,6 +245,11 @@ class ModelConfig(Frozen):
         files = (f"{name}_FILE" for name in self.secrets)
         return (*self.secrets, *files, *filter(None, [self.base_url_env]))
 
+    def with_model(self, model: str) -> ModelConfig:
+        """Return the same endpoint with another model, whose price its file does not know."""
+        prices = self.prices if self.profile == "scripted" or model == self.model else Prices()
+        return self.model_copy(update={"model": model, "prices": prices})
+
     @property
     def vision(self) -> Vision | None:
         """How the model sees, with a rule to count pictures by; None if it does not see."""
@@ -251,7 +264,8 @@ class WorkerSpec(Frozen):
     """How one agent decides: with a model or with a policy."""
 
     model: str | None = None
-    """Name of a shipped model file, or path of a model file, relative to the file that names it."""
+    """Name of a shipped model file, that name with a model (`openai/gpt-5`), or path of a model file, relative to the
+    file that names it."""
     policy: str | None = None
     """`silent`, the name of a scripted player, or `module:name` of a function or a policy."""
     fallback: str | None = None
@@ -311,7 +325,9 @@ def model_files() -> dict[str, Path]:
 
 
 def load_model(name: str, *, relative_to: Path | None = None) -> ModelConfig:
-    """Return the model file of this name, or at this path.
+    """Return the model file of this name, or at this path, or `openai/gpt-5`: a shipped file with another model.
+
+    The prices of a file are those of its own model; another one has its list price.
 
     Raises:
         ConfigError: there is no such file, or it is wrong; the text says what and where.
@@ -319,11 +335,17 @@ def load_model(name: str, *, relative_to: Path | None = None) -> ModelConfig:
     if name.endswith((".yaml", ".yml")):
         return load((relative_to or Path()) / name, ModelConfig)
     files = model_files()
-    if name not in files:
-        close = difflib.get_close_matches(name, files, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(files)}"
-        raise ConfigError(f"there is no model file '{name}': {hint}; a path to a .yaml file works too")
-    return load(files[name], ModelConfig)
+    provider, slash, model = name.partition("/")
+    if provider not in files:
+        close = difflib.get_close_matches(provider, files, n=1)
+        hint = f"did you mean {close[0]}{slash}{model}?" if close else f"there are {', '.join(files)}"
+        raise ConfigError(
+            f"there is no model file '{provider}': {hint}; write openai, openai/gpt-5, or the path of a .yaml file"
+        )
+    if slash and not model:
+        raise ConfigError(f"'{name}' names no model: write {provider}, or the model as well, such as openai/gpt-5")
+    file = load(files[provider], ModelConfig)
+    return file.with_model(model) if model else file
 
 
 def load_agents(path: Path) -> AgentsFile:

@@ -85,7 +85,7 @@ class Fallback(Policy):
             status="fallback",
             detail=f"{failure.detail or failure.status}: {self._name}",
             reason=failure.reason,
-            hopeless=failure.hopeless,
+            hopeless=failure.hopeless and failure.detail != "connection",  # an endpoint may come up later
         )
 
     async def reflect(self, context: Context) -> None:

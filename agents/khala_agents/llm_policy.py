@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.answers.form import AnswerRule
 from khala_agents.answers.render import shape_for
+from khala_agents.fitting import PromptTooLong
 from khala_agents.llm.breaker import Breaker
 from khala_agents.llm.client import (
     Completion,
@@ -25,15 +26,15 @@ from khala_agents.llm.client import (
     RequestRefused,
     TryTimeout,
     Unauthorized,
-    estimated_image_tokens,
-    estimated_tokens,
+    Unreachable,
 )
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule, with_retries
+from khala_agents.llm.window import ContextWindow
 from khala_agents.memory import NoMemory, PromptMemory, memory_of
 from khala_agents.pictures import PATIENCE_S
 from khala_agents.policy import Decision, Policy
-from khala_agents.prompt import Prompt, with_verdict
+from khala_agents.prompt import Prompt
 from khala_agents.secret import excerpt
 from khala_agents.summary import GameSummary
 from khala_protocol.messages import MemoryRule, ModelCall, Usage
@@ -42,18 +43,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from khala_agents.answers.form import AnswerShape
+    from khala_agents.fitting import DraftPrompt
     from khala_agents.llm.client import Scalar
     from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision
     from khala_agents.policy import Context, Said
-    from khala_protocol.messages import Briefing, ChatMessage, Observation, Pace, Purpose
+    from khala_protocol.messages import Briefing, Observation, Pace, Purpose
 
 log = logging.getLogger(__name__)
 
 UNKNOWN = Usage(requests=1, unknown_requests=1)
 UNBILLED = Usage(requests=1)
 
-
+MOST_SHORTENED = 4
+"""Refusals of one prompt as too long, after each of which it is made shorter."""
 _LEAST_TRY_S = 45.0
 _PATIENCE_S = 600.0
 
@@ -75,6 +78,7 @@ class LLMPolicy(Policy):
         pace: how fast the model is, for the clock `token`; None: the task says.
         answer: the form of its answers.
         rethink: how often it is asked again in a step, if nothing of its answer is possible.
+        window: its context; shared with the agents of the process that ask the same model.
         rng: jitter of the waits between tries.
     """
 
@@ -91,6 +95,7 @@ class LLMPolicy(Policy):
         pace: Pace | None = None,
         answer: AnswerRule | None = None,
         rethink: int = 0,
+        window: ContextWindow | None = None,
         rng: random.Random | None = None,
     ) -> None:
         self.client = client
@@ -101,9 +106,11 @@ class LLMPolicy(Policy):
         self.pace = pace
         self.answer = answer or AnswerRule()
         self.rethink = rethink
+        self.window = window or ContextWindow(scale=self.limits.scale)
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
         self._answered = False
+        self._asked_again = False
         self._rule = memory if isinstance(memory, MemoryRule) else None
         self._own_memory = None if isinstance(memory, MemoryRule) else memory
         self._memory: PromptMemory = self._own_memory or NoMemory()
@@ -120,6 +127,7 @@ class LLMPolicy(Policy):
         """Check that the endpoint accepts the key; leave no connection open, because nothing may close it later."""
         try:
             await self.client.check()
+            await self.window.ask()
         finally:
             await self.client.close()
 
@@ -128,6 +136,7 @@ class LLMPolicy(Policy):
         self._prompt_for(briefing)
         self._remember_for(briefing)
         await self.client.refresh()
+        await self.window.ask()
 
     async def decide(self, context: Context) -> Said:
         """Return the model's words, or why there are none.
@@ -143,17 +152,18 @@ class LLMPolicy(Policy):
             self._settle()
             self._summary.begin_decision(observation)
         recalled = self._memory.recall(observation)
-        above = [text for text in (self._summary.above, recalled.text) if text]
-        messages = prompt.messages(
-            "\n".join([*above, observation.text]),
-            recalled.messages,
+        draft = prompt.draft(
+            observation.text,
+            recalled=recalled.messages,
+            summary=self._summary.above,
+            steps=recalled.text,
             images=tuple(image for image in wanted if image.sha256 in pictures),
             missing=[image for image in wanted if image.sha256 not in pictures],
         )
         if observation.verdict is not None:
-            messages = with_verdict(messages, context.refused, observation.verdict.text)
+            draft = dataclasses.replace(draft, refused=context.refused, verdict=observation.verdict.text)
         shape = shape_for(self.answer, context.briefing, observation.view)
-        completion = await self._complete(_Tries(self, context, messages, pictures, prompt.stable, shape))
+        completion = await self._complete(_Tries(self, context, draft, pictures, shape))
         if completion.verdict != "ok":
             return Decision("", completion.verdict, reason=completion.reason)
         self._note(observation, completion.text)
@@ -177,7 +187,10 @@ class LLMPolicy(Policy):
         self._unsettled = None
 
     async def reflect(self, context: Context) -> None:
-        """Ask for a new summary of the game, if one is due."""
+        """Ask for a new summary of the game, if one is due, and once for the context of the model."""
+        if self._answered and not self._asked_again:  # some servers load a model only when it is asked first
+            self._asked_again = True
+            await self.window.ask()
         if not self._summary.is_due:
             return
         summary = self._summary
@@ -186,27 +199,32 @@ class LLMPolicy(Policy):
             summary.note(exchange)
             context.trace(exchange)
 
-        prompt = self._prompt_for(context.briefing)
-        messages = prompt.messages(summary.ask(context.observation))
-        asking = _Tries(self, dataclasses.replace(context, trace=trace), messages, {}, prompt.stable, purpose="summary")
+        draft = self._prompt_for(context.briefing).draft(summary.ask(context.observation))
+        asking = _Tries(self, dataclasses.replace(context, trace=trace), draft, {}, purpose="summary")
         try:
             await self._complete(asking)
         except LLMError as error:
             log.info("agent %s: no summary of the game: %s", context.observation.agent, error)
 
     async def _complete(self, tries: _Tries) -> Completion:
-        """Return the model's answer.
+        """Return the model's answer; a prompt that is refused as too long is made shorter and sent again.
 
         Raises:
             LLMError: the last try failed; its error.
         """
-        try:
-            completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
-        except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
-            error.hopeless = isinstance(error, Unauthorized) or not self._answered
-            raise
-        self._answered = True
-        return completion
+        while True:
+            try:
+                completion = await with_retries(tries.once, self._retry, deadline=tries.deadline, rng=self._rng)
+            except RequestRefused as error:  # a prompt may grow too long later; what is refused at first stays refused
+                if tries.shorten(error):
+                    continue
+                error.hopeless = isinstance(error, Unauthorized) or not self._answered
+                raise
+            except Unreachable as error:  # nothing listens there: not once in all tries, and never before
+                error.hopeless = not (self._answered or error.may_be_billed)
+                raise
+            self._answered = True
+            return completion
 
     async def close(self) -> None:
         """Close the client."""
@@ -274,9 +292,8 @@ class _Tries:
         self,
         policy: LLMPolicy,
         context: Context,
-        prompt: tuple[ChatMessage, ...],
+        draft: DraftPrompt,
         pictures: Mapping[str, bytes],
-        stable: int,
         shape: AnswerShape | None = None,
         *,
         purpose: Purpose = "decision",
@@ -286,24 +303,42 @@ class _Tries:
         self._purpose: Purpose = purpose
         self._policy = policy
         self._context = context
-        self._prompt = prompt
+        self._whole = draft
+        self._draft = draft
+        self._room: int | None = None
         self._origin = Origin(observation.agent, observation.episode, observation.step, purpose)
         self._pictures = pictures
-        self._stable = stable
         self._shape = shape
-        self._tokens = estimated_tokens(prompt, policy.vision) + (shape.estimated_tokens if shape else 0)
-        self._images = Usage(
-            images=sum(len(message.images) for message in prompt),
-            image_tokens=estimated_image_tokens(prompt, policy.vision) if policy.vision else 0,
-        )
         self._made = policy.newest.tries if self._goes_on else 0
+        self._shortened = 0
         self._clock = asyncio.get_running_loop().time
+
+    def shorten(self, refusal: RequestRefused) -> bool:
+        """Learn from a refusal; return whether the prompt was too long, so that the next try sends less of it."""
+        if isinstance(refusal, PromptTooLong) or self._shortened == MOST_SHORTENED:
+            return False
+        self._shortened += 1
+        return self._policy.window.learn(str(refusal), self._tokens, self._policy.client.answer_tokens)
+
+    @property
+    def _tokens(self) -> int:
+        """The estimated tokens of the prompt, with the form of its answer."""
+        return self._draft.tokens(self._policy.vision) + (self._shape.estimated_tokens if self._shape else 0)
+
+    def _fit(self) -> None:
+        """Make the prompt fit the context of the model."""
+        policy = self._policy
+        self._room = policy.window.room(policy.client.answer_tokens, self._origin, self._made + 1)
+        if self._room is not None:
+            beside = self._shape.estimated_tokens if self._shape else 0
+            self._draft = self._whole.fit(max(self._room - beside, 0), policy.vision)
 
     async def once(self) -> Completion:
         """Make one try, as soon as the limits allow it and unless the endpoint is away."""
         policy = self._policy
         policy.breaker.check()
         answer_tokens = policy.client.answer_tokens
+        self._fit()
         async with policy.limits.admit(
             tokens=self._tokens, answer_tokens=answer_tokens, deadline=self._context.deadline
         ) as ticket:
@@ -311,11 +346,11 @@ class _Tries:
             self._count()
             began = self._clock()
             request = self._request(began)
-            outcome = _Outcome("cancelled", usage=UNKNOWN + self._images)
+            outcome = _Outcome("cancelled", usage=UNKNOWN + self._beside)
             try:
                 completion = await self._complete(request)
                 outcome = _Outcome(
-                    completion.verdict, completion, completion.reason, self._with_images(completion.usage)
+                    completion.verdict, completion, completion.reason, self._with_beside(completion.usage)
                 )
                 ticket.settle(outcome.usage)
             except LLMError as error:
@@ -362,20 +397,31 @@ class _Tries:
         breaker.note(None)
         return completion
 
-    def _with_images(self, usage: Usage) -> Usage:
-        return usage if usage.images else usage + self._images  # a recorded one has them counted already
+    @property
+    def _beside(self) -> Usage:
+        """What a request has beside its tokens: pictures, and what was left out of its prompt."""
+        draft, vision = self._draft, self._policy.vision
+        return Usage(
+            images=len(draft.images),
+            image_tokens=sum(vision.image_tokens(image) for image in draft.images) if vision else 0,
+            shortened_requests=1 if draft.left_out else 0,
+            left_out=dict.fromkeys(draft.left_out, 1),
+        )
+
+    def _with_beside(self, usage: Usage) -> Usage:
+        return usage if usage.images or usage.shortened_requests else usage + self._beside  # a recorded one has them
 
     def _request(self, now: float) -> Request:
         timeout_s = self._policy.try_timeout_s or _time_for_a_try(self._context.observation.answer_within_s)
         if self._context.deadline is not None:
             timeout_s = min(timeout_s, max(self._context.deadline - now, 0.0))
         return Request(
-            self._prompt,
+            self._draft.messages,
             timeout_s=timeout_s,
             origin=self._origin,
             attempt=self._made,
             pictures=self._pictures,
-            stable=self._stable,
+            stable=self._draft.stable,
             shape=self._shape,
         )
 
@@ -397,7 +443,9 @@ class _Tries:
             attempt=self._made,
             model=self._policy.client.model,
             endpoint=self._policy.client.endpoint,
-            prompt=self._prompt,
+            prompt=self._draft.messages,
+            left_out=self._draft.left_out,
+            room_tokens=self._room if self._draft.left_out else None,
             params=self._params(),
             answered_by=completion.model if completion else "",
             completion=completion.text if completion else None,

@@ -43,7 +43,7 @@ class Decision:
         status: `ok` if the agent decided; what kept it from deciding if not.
         detail: why it did not decide, in a few words that are the same each time: decisions are counted by them.
         reason: the same in the words of whoever failed, such as an endpoint.
-        hopeless: whether it will never decide, because its endpoint refuses its key or its model.
+        hopeless: whether it will never decide, because its endpoint refuses its key or its model, or is not there.
         cut: whether its model reached its limit of tokens within the text.
         attempts, usage: its cost; the worker counts requests that a policy traces (`Context.trace`).
     """

@@ -9,6 +9,7 @@ message stand the summary of the game, which changes rarely, and the last steps.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from khala_agents.answers.wording import (
@@ -18,6 +19,7 @@ from khala_agents.answers.wording import (
     how_to_answer_with_tools,
     in_json,
 )
+from khala_agents.fitting import DraftPrompt
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
@@ -55,54 +57,47 @@ class Prompt:
             ChatMessage(role="user", content=seen),
             ChatMessage(role="assistant", content=in_json(said, briefing.actions) if form == "json" else said),
         )
-        system = ChatMessage(role="system", content=system_text(briefing, form))
-        self._head = (system,) if form == "tools" else (system, *example)
+        self._draft = DraftPrompt(system_text(briefing, form), () if form == "tools" else example)
 
     @property
     def stable(self) -> int:
         """Number of messages at the front that are the same in all of them."""
-        return len(self._head)
+        return self._draft.stable
 
     @property
-    def example(self) -> Sequence[ChatMessage]:
+    def example(self) -> tuple[ChatMessage, ...]:
         """The worked example, an observation and an answer to it; empty with `tools`."""
-        return self._head[1:]
+        return self._draft.example
 
-    def messages(
+    def messages(self, observation_text: str, recalled: Sequence[ChatMessage] = ()) -> tuple[ChatMessage, ...]:
+        """Return the system message, the example, what the memory recalls, and the observation."""
+        return self.draft(observation_text, recalled=tuple(recalled)).messages
+
+    def draft(
         self,
         observation_text: str,
-        recalled: Sequence[ChatMessage] = (),
+        *,
+        recalled: tuple[ChatMessage, ...] = (),
+        summary: str = "",
+        steps: str = "",
         images: tuple[ImageRef, ...] = (),
         missing: Sequence[ImageRef] = (),
-    ) -> tuple[ChatMessage, ...]:
-        """Return the system message, the example, what the memory recalls, and the observation behind its pictures.
+    ) -> DraftPrompt:
+        """Return a prompt that can be made shorter.
 
         Args:
             observation_text: as the host wrote it.
             recalled: messages of earlier steps.
+            summary: of the game.
+            steps: the last ones in short.
             images: pictures to show, each with its title before it.
             missing: pictures that did not arrive; the prompt says so.
         """
         lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
-        seen = ChatMessage(
-            role="user", content=f"{lost}\n{observation_text}" if lost else observation_text, images=images
-        )
-        return (*self._head, *recalled, seen)
-
-
-def with_verdict(messages: tuple[ChatMessage, ...], refused: str, verdict: str) -> tuple[ChatMessage, ...]:
-    """Return a prompt after which the agent answered so, and the host says why nothing of it is possible.
-
-    Args:
-        messages: of the observation.
-        refused: the agent's answer; "" if it was empty or is not known, and then the verdict follows the observation.
-        verdict: the host's words.
-    """
-    if refused.strip():
-        answer = ChatMessage(role="assistant", content=refused)
-        return (*messages, answer, ChatMessage(role="user", content=verdict))
-    *head, last = messages
-    return (*head, last.model_copy(update={"content": f"{last.content}\n\n{verdict}"}))
+        return replace(
+            self._draft, observation=observation_text, recalled=recalled, summary=summary, steps=steps,
+            images=images, missing=lost,
+        )  # fmt: skip
 
 
 def _line(text: str) -> str:

@@ -82,6 +82,7 @@ DOORS: Final[dict[str, tuple[str, ...]]] = {
         "khala knowledge write",
         "khala llm",
         "khala router",
+        "khala try",
     ),
 }
 """By module, in the order in which they are played."""

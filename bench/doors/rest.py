@@ -30,6 +30,7 @@ from khala.calibrate import commands as calibrating
 from khala.commands.advise import Adviser, Advising, lines_about
 from khala.knowledge import cli as knowledge
 from khala.knowledge import files as facts
+from khala_agents.scripted.canned import Canned, Given, completion, refusal
 from khala_agents.scripted.endpoint import Endpoint
 from khala_bridge.calibrate.record import Calibration, Measured, Values
 from khala_orchestrator.commands import access_rules
@@ -726,6 +727,27 @@ async def _read_foreign_keys(directory: Path) -> str:
             await mallory.close()
 
 
+# --- khala try ------------------------------------------------------------------------------------------
+
+KEY: Final = "sk-test-0123456789abcdef-do-not-tell"
+
+
+def _try(answer: Given, codes: tuple[int, ...], *wanted: str) -> Play:
+    """Return a row that tries a model whose endpoint answers so, with a key that nobody may see."""
+
+    async def play(directory: Path) -> str:
+        async with Canned(answer) as endpoint:
+            (directory / "m.yaml").write_text(
+                f"profile: compatible\nmodel: m\nbase_url: {endpoint.base_url}\napi_key_env: TRIED_KEY\n"
+                "retry: {tries: 1}\n"
+            )
+            file = str(directory / "m.yaml")
+            code, said = await _said("try", file, "--answer", "text", "--timeout", "5", TRIED_KEY=KEY)
+        return "the key is shown" if KEY in said else _fault(code, said, codes, *wanted)
+
+    return play
+
+
 # --- the rows -------------------------------------------------------------------------------------------
 
 
@@ -755,6 +777,10 @@ def _rows() -> Iterator[Row]:
     yield Row("khala knowledge write", "a link where a file is to be", _linked_facts)
     for what, damage in FACTS.items():
         yield Row("khala knowledge write", f"--check of {what}", _damaged_facts(damage), "fault")
+    orders = f"Analysis: {EVIL}\nActions:\nTeam Stalker-1:\n<Move_Screen([12, 6])>"
+    yield Row("khala try", "escape sequences in a reply", _try(completion(orders), (0,), "carried out"))
+    yield Row("khala try", "escape sequences and the key in an error", _try(refusal(400, EVIL + KEY), (1,), "http 400"))
+    yield Row("khala try", "an endpoint that answers anything with a list", _try(Given([1]), (1,), "failed"), "quirk")
     yield Row("khala llm", "150 requests with broken bytes, and odd values", _mutated_requests, "fault")
     yield Row("khala llm", "prompts that take patterns long to read", _long_prompts)
     yield Row("khala llm", "a body of 64 MB in 64 kB", _send_zipped)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from docs.pages.markdown import code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts
 from khala_agents.config import AgentsFile, ModelConfig, load_model, model_files
+from khala_agents.fitting import CUTS
 from khala_agents.llm.profiles import PROFILES, Profile
 from khala_bridge.state import teams
 from khala_bridge.task import config
@@ -60,6 +61,10 @@ def model_files_page() -> str:
         *_sections(ModelConfig, "###"),
         "### Example",
         *_file(model_files()["openai"], "yaml model"),
+        "## What is left out of a prompt that is too long",
+        "A prompt that would not fit the model's context, with `max_tokens` for the answer, is made shorter in this "
+        "order until it fits. The rest of a prompt always stays.",
+        table(("part", "why it can go"), [(cut.name, cut.reason) for cut in CUTS]),
         "## Agents files",
         "`khala agent --agents FILE` plays agents that decide in different ways in one process.",
         *_sections(AgentsFile, "###"),

@@ -98,7 +98,10 @@ Assemble = Annotated[
 ]
 Out = Annotated[Path, typer.Option(help="Directory in which the run gets its own directory.", metavar="DIR")]
 Model = Annotated[
-    str, typer.Option(help="Model to ask: scripted, openai, deepseek, …, or a YAML file.", metavar="NAME")
+    str,
+    typer.Option(
+        help="Model to ask: scripted, openai, openai/gpt-5, ollama/qwen3:8b, …, or a YAML file.", metavar="MODEL"
+    ),
 ]
 ModelName = Annotated[
     str | None,
@@ -124,6 +127,14 @@ Rethink = Annotated[
         max=MAX_RETHINKS,
         help="How often a model is asked again in a step if nothing of its answer is possible.",
         metavar="N",
+    ),
+]
+Answer = Annotated[
+    str | None,
+    typer.Option(
+        help="Form that the endpoint holds answers to; `khala try` says which of them it takes.",
+        show_default="as the model file says",
+        metavar="text|json|tools|grammar",
     ),
 ]
 Mind = Annotated[
@@ -175,6 +186,7 @@ class MindOptions:
     policy: PolicyName = None
     fallback: Fallback = None
     rethink: Rethink = 0
+    answer: Answer = None
     blue: Mind = None
     red: Mind = None
     side_model: SideModel = None

@@ -33,8 +33,9 @@ class Prompter:
             self._prompt = Prompt(briefing)
             self._memory = memory_of(briefing.memory)
         recalled = self._memory.recall(observation)
-        text = "\n".join(filter(None, (recalled.text, observation.text)))
-        return self._prompt.messages(text, recalled.messages, images=observation.images)
+        return self._prompt.draft(
+            observation.text, recalled=recalled.messages, steps=recalled.text, images=observation.images
+        ).messages
 
     @property
     def example(self) -> Sequence[ChatMessage]:

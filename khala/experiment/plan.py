@@ -213,6 +213,7 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
         latency_s=settings.latency_s or 0.0,
         fallback=settings.fallback,
         rethink=settings.rethink or 0,
+        answer=settings.answer,
     )
     if settings.model is not None:
         common = replace(common.with_name(settings.model), base_url=settings.base_url)
@@ -223,17 +224,20 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
 
 def _identity(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
-    said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url", "rethink")}
-    said |= {"rethink": mind.rethink} if mind.rethink else {}  # which no match had before there was any
+    said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
+    for name in ("rethink", "answer"):  # matches that were planned before there were these keep their keys
+        if not said[name]:
+            del said[name]
     named = [mind, *(replace(mind, agents={}).with_name(text) for text in mind.agents.values())]
     return said | {"files": [_model_file(mind.model) for mind in named if mind.policy is None]}
 
 
 def _model_file(name: str) -> Mapping[str, Any]:
     """Return what a model file says of the answers; how it is reached and limited is no part of that."""
-    fields = {"profile", "model", "system_role", "answer", "max_tokens", "temperature", "seed", "stop"}
-    fields |= {"reasoning_effort", "extra", "images", "pace", "try_timeout_s"}
-    return load_model(name).model_dump(mode="json", include=fields)
+    fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
+    later = {"answer", "context", "system_role", "stop", "reasoning_effort"}  # matches planned before keep their keys
+    file = load_model(name)
+    return file.model_dump(mode="json", include=fields | (later & file.model_fields_set))
 
 
 def _title(cell: Mapping[str, str]) -> str:

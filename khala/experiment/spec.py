@@ -20,6 +20,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, JsonValue, field_validator, model_validator
 
+from khala_agents.answers.form import AnswerForm  # noqa: TC001  # pydantic evaluates it
 from khala_bridge.task.maps import Difficulty, Race  # noqa: TC001  # pydantic evaluates them
 from khala_protocol.clock_rule import ClockRule  # noqa: TC001  # pydantic evaluates it
 from khala_protocol.errors import WrongKey
@@ -67,6 +68,8 @@ class Settings(Frozen):
     sides: dict[str, str] | None = None
     """Models of the sides of a duel, by name."""
     base_url: str | None = None
+    answer: AnswerForm | None = None
+    """Form of the models' answers: `text`, `json`, `tools` or `grammar`."""
     fallback: str | None = None
     rethink: int | None = Field(default=None, ge=0, le=MAX_RETHINKS)
     """How often models are asked again in a step, if nothing of their answer is possible."""

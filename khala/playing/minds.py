@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from khala.playing import environment
+from khala_agents.answers.form import AnswerForm  # noqa: TC001  # pydantic evaluates it, too
 from khala_agents.batch_policy import reason_against_batches
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec, load_model, model_files
@@ -52,6 +53,8 @@ class Minds:
     """Policy that decides where the model has no reply."""
     rethink: int = 0
     """How often the model is asked again in a step, if nothing of its answer is possible."""
+    answer: AnswerForm | None = None
+    """Form of the model's answers, instead of the one in its file."""
     agents: Mapping[str, str] = field(default_factory=dict)
     """Agents that decide in another way, by name, as `named` takes it."""
 
@@ -138,8 +141,11 @@ class Minds:
         else:
             spec = WorkerSpec(model=self.model, fallback=self.fallback, rethink=self.rethink)
         address = base_url if self.needs_endpoint else self.base_url
-        workshop = Workshop(budget=budget, overrides={"model": self.model_name, "base_url": address}, gates=gates)
+        workshop = Workshop(budget=budget, overrides=self._overrides(address), gates=gates)
         return {name: workshop.policy(spec) for name in names}
+
+    def _overrides(self, address: str | None) -> dict[str, str | float | None]:
+        return {"model": self.model_name, "base_url": address, "answer": self.answer}
 
     @property
     def environ(self) -> dict[str, str]:
@@ -150,15 +156,15 @@ class Minds:
     @property
     def needs_endpoint(self) -> bool:
         """Whether the scripted endpoint is needed."""
-        return self.policy is None and self.base_url is None and self.model == SCRIPTED
+        return self.policy is None and self.base_url is None and self.model.partition("/")[0] == SCRIPTED
 
     def options(self, base_url: str | None) -> list[str]:
         """Return the options of `khala agent` that say this; `base_url` is the scripted endpoint's."""
         if self.policy:
             return ["--policy", self.policy]
         address = base_url if self.needs_endpoint else self.base_url
-        more = {"--base-url": address, "--model-name": self.model_name, "--fallback": self.fallback}
-        more |= {"--rethink": str(self.rethink)} if self.rethink else {}
+        more = {"--base-url": address, "--model-name": self.model_name, "--answer": self.answer}
+        more |= {"--fallback": self.fallback, "--rethink": str(self.rethink) if self.rethink else None}
         given = [part for option, value in more.items() if value for part in (option, value)]
         return ["--model", self.model, *given]
 

@@ -6,6 +6,8 @@ here are the only ones: whatever is printed on them, no character of it does any
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
@@ -22,7 +24,7 @@ from khala_protocol.messages import LOOPS_PER_S, Frozen, Report, Result, Run, Us
 from khala_protocol.visible import visible, visible_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
     from types import TracebackType
 
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
+HEARTBEAT_S = 30.0
+"""Off a terminal, a line is printed after so many seconds, with the next report."""
 SIDE = {"blue": "bold blue", "red": "bold red"}
 """Sides of other names are all of one colour."""
 
@@ -64,10 +68,21 @@ def stdout_console() -> Console:
 
 
 class Progress:
-    """Shows a match while it runs. A context manager; call it with each message of the host."""
+    """Shows a match while it runs. A context manager; call it with each message of the host.
 
-    def __init__(self, screen: Console, max_steps: int | None = None, logs: Path | None = None) -> None:
-        """Take a screen, the steps of an episode, and the directory of the agents' logs."""
+    On a terminal it is a live picture; elsewhere, such as in a log, a line for the first step and every `HEARTBEAT_S`.
+    """
+
+    def __init__(
+        self,
+        screen: Console,
+        max_steps: int | None = None,
+        logs: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Take a screen, the steps of an episode, the directory of the agents' logs, and a clock in seconds."""
+        self._clock = clock
+        self._said_at = -math.inf  # the first report is a line as well
         self._screen = screen
         self._logs = logs
         self._failures: set[str] = set()
@@ -103,8 +118,21 @@ class Progress:
                 self._screen.print(table(message, named=two_sides(self._run)))
         if self._screen.is_terminal and self._reports:
             self._live.update(self._picture())
-        elif isinstance(message, Report) and message.step % 20 == 0 and message.side == next(iter(self._reports)):
-            self._screen.print(f"step {message.step}, {clock(message.game_loop)}")
+        elif isinstance(message, Report) and self._clock() - self._said_at >= HEARTBEAT_S:
+            self._said_at = self._clock()
+            self._screen.print(self._heartbeat(message), soft_wrap=True)
+
+    def _heartbeat(self, report: Report) -> str:
+        """Return where the match is, on one line."""
+        steps = f" of {self._max_steps}" if self._max_steps else ""
+        counts = sum(self._counts.values(), Counter())
+        orders = f"{counts['accepted']} orders carried out, {counts['rejected']} refused"
+        own = f"{counts['ok']} decisions" + (f" ({others} not the agents' own)" if (others := _others(counts)) else "")
+        episode = f"episode {report.episode}, " if report.episode else ""
+        return (
+            f"{episode}step {report.step}{steps}, game {clock(report.game_loop)}: {own}, {orders}; tokens: "
+            + _tokens(self._usage.values())
+        )
 
     def _add(self, report: Report) -> None:
         self._reports[report.side] = report
@@ -276,6 +304,15 @@ def _visible(value: Any) -> Any:
 
 def _tokens(usages: Iterable[Usage]) -> str:
     total = sum(usages, start=Usage())
+    if total.shortened_requests:
+        parts = ", ".join(f"{count} {part}" for part, count in total.left_out.items())
+        return (
+            f"{_sum_in_words(total)}; {total.shortened_requests} prompt(s) did not fit the context, left out: {parts}"
+        )
+    return _sum_in_words(total)
+
+
+def _sum_in_words(total: Usage) -> str:
     text = f"{total.prompt_tokens:,} in"
     if total.images:
         text += f" (about {total.image_tokens:,} of them for {total.images} pictures)"
@@ -283,6 +320,11 @@ def _tokens(usages: Iterable[Usage]) -> str:
     if total.unknown_requests:
         text += f", {total.unknown_requests} of unknown size"
     return text + (", no price known" if total.cost_usd is None else f", {total.cost_usd:.4f} USD")
+
+
+def _others(counts: Counter[str]) -> int:
+    """Return the number of decisions that agents did not make themselves."""
+    return sum(count for status, count in counts.items() if status not in {"ok", "accepted", "rejected"})
 
 
 def _decisions(result: Result, fates: Counter[str]) -> str:

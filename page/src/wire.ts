@@ -205,6 +205,10 @@ export interface ModelCall {
   latency_s: number;
   /** Time spent before the request in the queue of the shared limits. */
   waited_s: number;
+  /** Parts of the prompt that were left out so that it fits the model's context. */
+  left_out: string[];
+  /** Estimated tokens to which the prompt was fitted; None if it is whole. */
+  room_tokens: number | null;
   usage: Usage;
 }
 
@@ -498,6 +502,10 @@ export interface Usage {
   unknown_requests: number;
   /** The most that these may have cost; None if no price is known for the model. */
   unknown_usd: number | null;
+  /** Requests whose prompt was shortened to fit the model's context. */
+  shortened_requests: number;
+  /** By part of a prompt: from how many of these requests it was left out. */
+  left_out: Record<string, number>;
   /** Number of pictures that were sent along. */
   images: number;
   /** The part of `prompt_tokens` for pictures, as the model file's rule estimates it. */

@@ -69,6 +69,24 @@ def test_a_shipped_model_file_makes_a_client(name: str, monkeypatch: pytest.Monk
     assert (client.model, client.endpoint) == (config.model, config.base_url)
 
 
+def test_no_shipped_file_of_a_real_model_limits_what_max_wait_gives() -> None:
+    limited = {name for name in model_files() if load_model(name).try_timeout_s is not None}
+    assert limited == {"scripted"}
+
+
+def test_a_provider_and_its_model_name_a_model_file_with_another_model() -> None:
+    openai, other = load_model("openai"), load_model("openai/gpt-5")
+    assert (other.model, other.base_url) == ("gpt-5", openai.base_url)
+    assert load_model("vllm/org/llama:8b").model == "org/llama:8b"
+    assert not other.prices.known  # it has its own price on the list, or none
+    assert load_model("scripted/skilled").prices.known
+
+
+def test_an_answer_that_fills_the_context_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="leaves no room for a prompt in a context of 1000"):
+        ModelConfig(profile="vllm", model="m", base_url="http://x/v1", max_tokens=1000, context=1000)
+
+
 def test_every_shipped_model_file_is_tried() -> None:
     assert sorted(model_files()) == SHIPPED
 
@@ -395,7 +413,8 @@ def test_a_policy_that_cannot_be_had_is_one_clear_sentence(module: Path, name: s
 
 
 BAD_SPECS = [
-    ("opnai", None, {}, "there is no model file 'opnai': did you mean openai?; a path to a .yaml file works too"),
+    ("opnai", None, {}, ("there is no model file 'opnai': did you mean openai?; write openai, "
+     "openai/gpt-5, or the path of a .yaml file")),
     ("no.yaml", None, {}, "no.yaml: there is no such file"),
     ("vllm", 1.0, {}, ("a budget needs the price of Qwen/Qwen2.5-7B-Instruct at 127.0.0.1:8000, and no price is known: "
      "write `prices: {prompt: …, completion: …}` into its model file, in US dollars per million tokens; 0 for a model "

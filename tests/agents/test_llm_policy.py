@@ -103,6 +103,14 @@ async def test_a_try_may_take_half_of_what_the_step_gives(
     assert [request.timeout_s for _, request in model.requests] == [try_s]
 
 
+async def test_a_model_that_thinks_for_a_minute_answers_where_the_step_waits_for_it(
+    listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
+) -> None:
+    policy, exchanges = traced(listed_model(60.0, "good"))
+    assert await policy.decide(briefing(), observation(within_s=300.0)) == "good"
+    assert [exchange.status for exchange in exchanges] == ["ok"]
+
+
 async def test_no_try_is_begun_that_cannot_end_before_the_deadline(
     listed_model: Callable[..., Any], briefing: Callable[..., Briefing], observation: Callable[..., Observation]
 ) -> None:
@@ -170,9 +178,12 @@ async def test_an_answer_without_words_is_a_decision_that_nobody_made_with_the_r
     ("before", "error", "hopeless"),
     [
         ((), RequestRefused("no such model", status="http 404"), True),
-        (("go",), RequestRefused("the prompt is too long", status="http 400"), False),
+        (("go",), RequestRefused("a word is not allowed", status="http 400"), False),
         (("go",), Unauthorized("revoked", status="http 401"), True),
         ((), EndpointUnavailable("busy", status="http 503"), False),
+        ((), Unreachable("refused", sent=False), True),
+        ((), Unreachable("torn"), False),
+        (("go",), Unreachable("refused", sent=False), False),
     ],
 )
 async def test_a_refusal_that_no_later_request_can_escape_is_hopeless(

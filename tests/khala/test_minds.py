@@ -12,7 +12,8 @@ from khala.commands.host import reasons_not_valid, until_interrupted, without_or
 from khala.playing.local import _shares_of, spent_before
 from khala.playing.minds import Minds, minds_of, named_sides
 from khala.playing.spending import spent_usd
-from khala_agents.llm.money import MoneyLedger
+from khala_agents.llm.money import MoneyLedger, SharedBudget
+from khala_agents.llm_policy import LLMPolicy
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_orchestrator.roster import Seat
 from khala_protocol.codec import encode
@@ -44,6 +45,19 @@ def test_a_side_is_given_a_model_its_name_or_a_policy(text: str, model: str, nam
     assert (mind.model, mind.model_name, mind.policy) == (model, name, policy)
     assert mind.base_url is None  # it is that of --model
     assert mind.fallback == "silent"
+
+
+def test_a_form_of_answers_and_a_provider_with_its_model_reach_the_agents() -> None:
+    minds = Minds(model="scripted/focus-fire", answer="json")
+    assert minds.needs_endpoint
+    assert minds.options("http://x/v1") == [
+        "--model", "scripted/focus-fire", "--base-url", "http://x/v1", "--answer", "json",
+    ]  # fmt: skip
+    (policy,) = minds.policies(["A"], "http://x/v1", SharedBudget(None)).values()
+    assert isinstance(policy, LLMPolicy)
+    assert (policy.client.model, policy.answer.form) == ("focus-fire", "json")
+    with pytest.raises(ConfigError, match="scripted takes no grammar"):
+        Minds(answer="grammar").check()
 
 
 def test_a_policy_of_all_is_not_the_one_of_a_side_with_a_model() -> None:

@@ -72,7 +72,7 @@ def test_the_first_failure_of_each_kind_is_shown_at_once_with_the_log() -> None:
     failed = agent("Stalkers", status="failed", detail="http 500", reason="the \x1b[31mendpoint is on fire")
     for step in range(1, 4):
         progress(report(step, failed, agent("Zealots", status="empty")))
-    lines = out.getvalue().splitlines()
+    lines = [line for line in out.getvalue().splitlines() if "did not decide:" in line]
     assert lines == [
         "step 1: Stalkers: failed, it did not decide: the \\x1b[31mendpoint is on fire; its log is in runs/first",
         "step 1: Zealots: empty, it did not decide: empty; its log is in runs/first",
@@ -184,20 +184,28 @@ def test_game_time_is_minutes_and_seconds(subtests: pytest.Subtests) -> None:
 # --- while it runs ----------------------------------------------------------------------------------------
 
 
-def test_without_a_terminal_every_twentieth_step_is_a_line(make_run: MakeRun) -> None:
-    screen = Console(file=io.StringIO(), width=80, force_terminal=False)
-    with Progress(screen, max_steps=50) as show:
+def test_without_a_terminal_a_line_says_every_half_minute_where_the_match_is(make_run: MakeRun) -> None:
+    screen = Console(file=io.StringIO(), width=200, force_terminal=False)
+    now = [0.0]
+    with Progress(screen, max_steps=50, clock=lambda: now[0]) as show:
         show(make_run())
         for step in range(42):
-            show(report(step, agent("Stalkers")))
+            now[0] += 4.0
+            show(report(step, agent("Stalkers", usage=Usage(requests=1, prompt_tokens=1000, completion_tokens=10))))
         show(make_result())
     lines = screen.file.getvalue().splitlines()  # type: ignore[attr-defined]
     steps = [line for line in lines if line.startswith("step")]
-    assert steps == ["step 0, 0:00", "step 20, 3:20", "step 40, 6:40"]
-    assert [line for line in lines if line.startswith("╭")] == [
-        "╭──────────────────────────────────── test ────────────────────────────────────╮",
-        "╭────────────────────── win, enemy defeated (episode 0) ───────────────────────╮",
-    ]
+    assert [line.partition(",")[0] for line in steps] == [f"step {n} of 50" for n in (0, 8, 16, 24, 32, 40)]
+    assert "game 1:20: 9 decisions, " in steps[1]
+    assert "tokens: 9,000 in, 90 out, 9 request(s), no price known" in steps[1]
+
+
+def test_a_table_says_how_many_prompts_were_shortened_and_what_was_left_out() -> None:
+    screen = Console(file=io.StringIO(), width=200, force_terminal=False)
+    usage = Usage(requests=3, shortened_requests=2, left_out={"worked example": 2, "Map": 1})
+    screen.print(table(make_result(usage={"A": usage})))
+    said = screen.file.getvalue()  # type: ignore[attr-defined]
+    assert "2 prompt(s) did not fit the context, left out: 2 worked example, 1 Map" in said
 
 
 def test_on_a_terminal_every_agent_has_a_line(printed: Printed, make_run: MakeRun) -> None:

@@ -43,6 +43,12 @@ def base_of(url: str) -> str:
     return urlunsplit((parts.scheme, parts.netloc, path.rstrip("/"), "", ""))
 
 
+def root_of(url: str) -> str:
+    """Return scheme and host of an address."""
+    parts = urlsplit(url)
+    return urlunsplit((parts.scheme, parts.netloc, "", "", ""))
+
+
 def checked_address(base_url: str) -> str:
     """Return `base_url` without a trailing slash, and without the path of a request.
 

@@ -9,6 +9,7 @@ Names of fields with dots are paths: `text.format` is sent as the field `format`
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from abc import ABC, abstractmethod
 from base64 import b64encode
 from dataclasses import replace
@@ -16,7 +17,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Required, TypedDict, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import to_json
+from pydantic_core import from_json, to_json
 
 from khala_agents.llm.batches import BatchApi, Batcher, batcher_for
 from khala_agents.llm.client import Completion, Request, Scalar, TryTimeout, estimated_tokens, model_name
@@ -152,6 +153,13 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
     async def check(self) -> None:
         """Check that the endpoint accepts the key; see `LLMClient.check`."""
         await self._http.check()
+
+    async def read(self, path: str) -> Any:
+        """Return the JSON at an address of the endpoint, see `HttpEndpoint.read`; None if there is none."""
+        body = await self._http.read(path)
+        with contextlib.suppress(ValueError):
+            return from_json(body or b"")
+        return None
 
     async def refresh(self) -> None:
         """Drop old connections and make a new one."""

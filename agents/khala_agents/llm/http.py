@@ -20,7 +20,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
-from khala_agents.llm.address import checked_address
+from khala_agents.llm.address import checked_address, root_of
 from khala_agents.llm.client import (
     Departure,
     LLMError,
@@ -163,6 +163,19 @@ class HttpEndpoint:
             if answer.status in UNAUTHORIZED and isinstance(error := answer.error, Unauthorized):
                 raise error
 
+    async def read(self, path: str) -> bytes | None:
+        """Return what a GET of an address below the base URL has, or of `//path` below the root of its host.
+
+        Not every endpoint has every address: None for any other answer than "200 OK".
+        """
+        import httpx  # noqa: PLC0415  # see above
+
+        with suppress(httpx.HTTPError, httpx.InvalidURL, TimeoutError, LLMError):
+            async with asyncio.timeout(_WARM_TIMEOUT_S):
+                answer = await self._answer("GET", path)
+            return answer.body if answer.status == OK else None
+        return None
+
     async def close(self) -> None:
         """Close the connections; the next request opens new ones."""
         transport, self._transport = self._transport, None
@@ -185,7 +198,8 @@ class HttpEndpoint:
         import httpx  # noqa: PLC0415  # see above
 
         if path not in self._urls:
-            self._urls[path] = httpx.URL(self.address + path + self._query)
+            base = root_of(self.address) if path.startswith("//") else self.address
+            self._urls[path] = httpx.URL(base + path.replace("//", "/", 1) + self._query)
         extensions = {} if delivery is None else {Departure.EXTENSION: delivery}
         headers = self._headers | {"Content-Type": kind}
         request = httpx.Request(method, self._urls[path], headers=headers, content=body, extensions=extensions)

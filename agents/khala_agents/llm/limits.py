@@ -22,6 +22,7 @@ from pydantic import Field
 
 from khala_agents.llm.client import LimitExceeded, LimitType
 from khala_agents.llm.money import SharedBudget
+from khala_agents.llm.window import TokenScale
 from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
@@ -32,12 +33,6 @@ if TYPE_CHECKING:
 
 LONGEST_ANSWER = 4_000
 """Tokens that an answer may have under a budget where the model file has no `max_tokens`: they can be paid."""
-
-MOST_PER_ESTIMATED = 2.0
-"""So many times as many tokens as estimated a prompt has at most, until an endpoint has counted one: digits, of which
-our prompts have many, are a token each in some vocabularies. Seen: 1.1 to 1.4."""
-MARGIN = 1.15
-"""From then on it is what was counted, and so much more."""
 
 
 class LimitRules(Frozen):
@@ -197,6 +192,10 @@ class RequestLimits:
         prices: of its model.
         budget: what may be spent; shared with the limits of other endpoints.
         gate: in place of one by the rules.
+
+    Attributes:
+        budget: what may be spent.
+        scale: tokens of the model for each that was estimated.
     """
 
     def __init__(
@@ -210,8 +209,7 @@ class RequestLimits:
         self.budget = budget or SharedBudget(None)
         self._prices = prices
         self._gate = gate or Turns(rules)
-        self._counted = 0.0
-        """The most tokens that the endpoint has counted where one was estimated."""
+        self.scale = TokenScale()
 
     @asynccontextmanager
     async def admit(self, *, tokens: int, answer_tokens: int | None, deadline: float | None) -> AsyncIterator[Ticket]:
@@ -232,7 +230,8 @@ class RequestLimits:
         arrived = clock()
         if most_usd := self._most_usd(tokens, answer_tokens):
             self.budget.check()
-        place = await self._gate.enter(tokens, None if deadline is None else deadline - arrived)
+        expected = round(tokens * self.scale.factor)
+        place = await self._gate.enter(expected, None if deadline is None else deadline - arrived)
         ticket = Ticket(clock() - arrived, most_usd)
         try:
             async with self.budget.holding(ticket.most_usd or 0.0, deadline) as bill:
@@ -241,19 +240,14 @@ class RequestLimits:
                 finally:
                     if ticket.usage is not None and not ticket.usage.unknown_requests:
                         bill.settle(ticket.usage.cost_usd or 0.0)
-                        self._learn(ticket.usage, tokens)
+                        self.scale.learn_from(ticket.usage, tokens)
         finally:
-            self._gate.leave(place, _more_tokens(ticket.usage, tokens))
+            self._gate.leave(place, _more_tokens(ticket.usage, expected))
 
     def _most_usd(self, tokens: int, answer_tokens: int | None) -> float | None:
         """Return the price of the longest prompt of about `tokens` and of the longest answer; None if not known."""
-        most = tokens * (MARGIN * self._counted if self._counted else MOST_PER_ESTIMATED)
         longest = LONGEST_ANSWER if answer_tokens is None else answer_tokens
-        return self._prices.most_usd(prompt=most, completion=longest) if self._prices else None
-
-    def _learn(self, usage: Usage, estimated: int) -> None:
-        if estimated and usage.prompt_tokens:
-            self._counted = max(self._counted, usage.prompt_tokens / estimated)
+        return self._prices.most_usd(prompt=self.scale.most(tokens), completion=longest) if self._prices else None
 
 
 def _more_tokens(usage: Usage | None, estimated: int) -> int:

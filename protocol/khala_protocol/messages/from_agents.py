@@ -143,4 +143,8 @@ class ModelCall(Wire):
     latency_s: float
     waited_s: float = 0.0
     """Time spent before the request in the queue of the shared limits."""
+    left_out: tuple[str, ...] = ()
+    """Parts of the prompt that were left out so that it fits the model's context."""
+    room_tokens: int | None = None
+    """Estimated tokens to which the prompt was fitted; None if it is whole."""
     usage: Usage = Usage()

@@ -25,6 +25,10 @@ class Usage(Frozen):
     """Requests that were cancelled or failed, whose tokens are unknown."""
     unknown_usd: float | None = Field(default=None, ge=0, le=MOST)
     """The most that these may have cost; None if no price is known for the model."""
+    shortened_requests: Count = 0
+    """Requests whose prompt was shortened to fit the model's context."""
+    left_out: dict[str, int] = {}
+    """By part of a prompt: from how many of these requests it was left out."""
     images: Count = 0
     """Number of pictures that were sent along."""
     image_tokens: Count = 0
@@ -41,9 +45,17 @@ class Usage(Frozen):
             cost_usd=_sum_usd(self.cost_usd, other.cost_usd),
             unknown_requests=min(self.unknown_requests + other.unknown_requests, MOST),
             unknown_usd=_sum_usd(self.unknown_usd, other.unknown_usd),
+            shortened_requests=min(self.shortened_requests + other.shortened_requests, MOST),
+            left_out=_sum_counts(self.left_out, other.left_out),
             images=min(self.images + other.images, MOST),
             image_tokens=min(self.image_tokens + other.image_tokens, MOST),
         )
+
+
+def _sum_counts(first: dict[str, int], second: dict[str, int]) -> dict[str, int]:
+    if not (first and second):
+        return first or second
+    return {name: min(first.get(name, 0) + second.get(name, 0), MOST) for name in {**first, **second}}
 
 
 def _sum_usd(*sums: float | None) -> float | None:

@@ -58,6 +58,17 @@ def test_a_match_is_known_by_what_it_plays_and_by_nothing_else() -> None:
     assert set(keys(factors={"task": ["2s3z_pair"], "player": PLAYERS[:1]})) < set(same)
 
 
+def test_a_form_of_answers_is_a_setting_of_models_and_makes_another_match() -> None:
+    models = [{"name": form, "model": "scripted/skilled", "answer": form} for form in ("text", "json")]
+    plain = [{"name": "plain", "model": "scripted/skilled"}]
+    matches = plan(experiment(factors={"task": ["2s3z_pair"], "model": [*models, *plain]}, seeds=[7]))
+    assert [match.minds["blue"].answer for match in matches] == ["text", "json", None]
+    assert len({match.key for match in matches}) == 3
+    grammar = experiment(fixed={"answer": "grammar"}, factors={"model": ["scripted/skilled"], "task": ["3s5z"]})
+    with pytest.raises(ConfigError, match="scripted takes no grammar"):
+        check_playable(plan(grammar), None)
+
+
 def test_two_names_of_the_same_settings_are_one_match() -> None:
     twice = [{"name": "a", "model": "silent"}, {"name": "b", "model": "silent"}]
     assert len(plan(experiment(factors={"task": ["2s3z_pair"], "player": twice}, seeds=1))) == 1
