@@ -42,6 +42,7 @@ def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
         "energy_start": plain(unit.energy_start),
         "armor": plain(unit.armor),
         "speed": per_second(unit.speed_n),
+        "creep": plain(unit.creep_factor) if unit.speed_n and unit.creep_factor != 1 else 0,
         "sight": plain(unit.sight),
         "detects": plain(unit.detect),
         "radius": plain(unit.radius),
@@ -115,9 +116,17 @@ def _weapons(unit: UnitType, catalog: Catalog) -> Iterator[dict[str, Any]]:
     usable = [weapon for weapon in unit.weapons if weapon.works and not weapon.disabled]
     shown = [weapon for weapon in usable if not weapon.hidden]
     for weapon in shown:
-        yield _shown(weapon)
+        yield _shown(weapon) | {"min_range": 0 if _is_filled(weapon, usable) else plain(weapon.min_range)}
     for weapon in () if shown else usable:
         yield from _hidden(unit, weapon, catalog)
+
+
+def _is_filled(weapon: Weapon, usable: list[Weapon]) -> bool:
+    """Return whether a hidden weapon hits what is too near for this one: a Queen's talons, a Roach's claws."""
+    return any(
+        other.hidden and other.targets == weapon.targets and not other.min_range and other.range >= weapon.min_range - 0.1
+        for other in usable
+    )
 
 
 def _shown(weapon: Weapon) -> dict[str, Any]:

@@ -81,6 +81,8 @@ class UnitFacts(Frozen):
     armor: float = 0
     speed: float = 0
     """World units per second."""
+    creep: float = 1
+    """Times its speed, on creep."""
     sight: float = 0
     detects: float = 0
     """Radius in which it sees cloaked and burrowed units; 0 for none."""
