@@ -44,12 +44,16 @@ _BODY: Final = {
     "health": rf"health {_NUMBER}", "shield": rf"shield {_NUMBER}", "energy": rf"energy up to {_NUMBER}",
     "armor": rf"armor {_NUMBER}", "speed": rf"speed {_NUMBER}", "speed on creep": rf"\({_NUMBER} on creep",
 }  # fmt: skip
+_UNARMED: Final = (("SwarmHost", 4, 0), ("Raven", 0, 4), ("WarpPrism", 0, -4), ("Overlord", -4, 0))
+"""Enemies at which abilities are used, and their places beside the caster: biological, mechanical, psionic ones."""
 _SHOTS: Final = 8
 _STEP_LOOPS: Final = 2
 _MOST_LOOPS: Final = 2400
 _RESEARCH_LOOPS: Final = 200
-_CREEP_LOOPS: Final = 30
+_CREEP_LOOPS: Final = 150
 _BARRIER_LOOPS: Final = 130
+_CHANCE_S: Final = 2 / LOOPS_PER_SECOND
+"""The most that chance adds to a period."""
 _INSIDE: Final = 0.08
 _OUTSIDE: Final = 0.35
 """World units within and beyond a range at which a unit fires, and first walks."""
@@ -129,7 +133,9 @@ def improve(lab: Lab) -> frozenset[str]:
 def arms_of(lines: Sequence[str]) -> Iterator[Arm]:
     """Yield the weapons that lines speak of."""
     for line in lines:
-        if not (found := re.match(rf"hits ([a-z ]+), range {_NUMBER}(.*?), damage {_NUMBER}(.*) every {_NUMBER} s", line)):
+        if not (
+            found := re.match(rf"hits ([a-z ]+), range {_NUMBER}(.*?), damage {_NUMBER}(.*) every {_NUMBER} s", line)
+        ):
             continue
         plane, reach, rest, damage, more, period = found.groups()
         nearest = re.search(rf"nearer than {_NUMBER}", rest)
@@ -166,7 +172,7 @@ def compare(lab: Lab, kinds: Sequence[str], researched: frozenset[str] = frozens
 
 
 def _body(lab: Lab, kind: str, said: dict[str, float]) -> Iterator[Compared]:
-    x, y = lab.ground.places(30, 20)[0]
+    x, y = _spot(lab, kind)
     tag, marine = lab.make(Put(kind, (x, y)), Put("Marine", (x + fact(kind).radius + 2, y), ENEMY))
     if tag:
         unit = lab.units[tag]
@@ -199,15 +205,13 @@ def _speeds(lab: Lab, kind: str, said: dict[str, float]) -> Iterator[Compared]:
     yield Compared(kind, "speed", said["speed"], _fastest(lab, kind), 0.02)
     lab.clear()
     if not fact(kind).flying and fact(kind).race == "zerg":
-        x, y = lab.ground.places(30, 20)[0]
-        lab.make(Put("Hatchery", (int(x) + 0.5, int(y) + 4.5)))
-        lab.step(_CREEP_LOOPS)
-        yield Compared(kind, "speed on creep", said["speed on creep"] or said["speed"], _fastest(lab, kind), 0.03)
+        found = _fastest(lab, kind, creep=True)
+        yield Compared(kind, "speed on creep", said["speed on creep"] or said["speed"], found, 0.03)
         lab.clear()
 
 
-def _fastest(lab: Lab, kind: str) -> float:
-    x, y = lab.ground.places(30, 20)[0]
+def _fastest(lab: Lab, kind: str, *, creep: bool = False) -> float:
+    x, y = _spot(lab, kind, creep=creep)
     (tag,) = lab.make(Put(kind, (x - 6, y - 1)))
     lab.order(MOVE, tag, point=(x + 8, y - 1))
     best = 0.0
@@ -216,6 +220,17 @@ def _fastest(lab: Lab, kind: str) -> float:
         lab.step(2)
         best = max(best, math.dist(before, lab.at(tag)) * LOOPS_PER_SECOND / 2)
     return best
+
+
+def _spot(lab: Lab, kind: str, *, creep: bool = False) -> Point:
+    """Return the middle of an empty place; with creep, which stays, for what needs it."""
+    places = lab.ground.places(30, 20)
+    if not (creep or fact(kind).needs_creep):
+        return places[0]
+    x, y = places[-1]
+    lab.make(Put("Hatchery", (int(x) - 2.5, int(y) + 5.5)))
+    lab.step(_CREEP_LOOPS)
+    return x, y
 
 
 # --- weapons ------------------------------------------------------------------------------------------------------
@@ -232,8 +247,10 @@ def _weapon(lab: Lab, kind: str, arm: Arm) -> Iterator[Compared]:
         yield Compared(kind, f"damage to {plane}", arm.against(victim), median(losses or [math.nan]), 0.3)
         if not i:
             period = (begun[-1] - begun[0]) / (len(begun) - 1) / LOOPS_PER_SECOND if len(begun) > 1 else math.nan
-            yield Compared(kind, "period", arm.period, period, 0.05)
-            yield Compared(kind, "per second", arm.per_second, arm.damage * arm.hits / arm.period, 0.02 * arm.per_second)
+            yield Compared(kind, "period", arm.period, period, min(_CHANCE_S, 0.15 * arm.period + 0.03))
+            yield Compared(
+                kind, "per second", arm.per_second, arm.damage * arm.hits / arm.period, 0.02 * arm.per_second
+            )
     for offset, inside in ((-_INSIDE, True), (_OUTSIDE, False)):
         yield Compared(kind, "range", inside, _fires_from(lab, kind, plain, arm.range + offset), 0)
     near = max(arm.nearest - 0.4, 0.05)
@@ -242,7 +259,7 @@ def _weapon(lab: Lab, kind: str, arm: Arm) -> Iterator[Compared]:
 
 def _facing(lab: Lab, kind: str, victim: str, gap: float) -> tuple[int, int]:
     """Make a unit, and a target with `gap` between their edges."""
-    x, y = lab.ground.places(30, 20)[0]
+    x, y = _spot(lab, kind)
     (attacker,) = lab.make(Put(kind, (int(x) - 7.5, int(y) + 0.5)))
     ax, ay = lab.at(attacker)
     at: Point = (ax + fact(kind).radius + fact(victim).radius + gap, ay)
@@ -257,7 +274,7 @@ def _shots(lab: Lab, kind: str, victim: str, gap: float, period: float) -> tuple
     losses: list[float] = []
     begun: list[int] = []
     for _ in range(int((_SHOTS + 2) * period * LOOPS_PER_SECOND) + 40):
-        before = lab.life(target)
+        before = lab.units[target].health_max
         lab.step()
         lost = before - lab.life(target)
         if lost > 0.4:
@@ -308,13 +325,15 @@ def _casts(lab: Lab, kind: str, told: dict[str, str]) -> Iterator[Compared]:
         if tag and _use(lab, number, tag):
             had = lab.units[tag].energy
             lab.step(_STEP_LOOPS)
-            spent = _until(lab, lambda: _spent(lab, tag, had, bank), 200)
+            spent = _until(lab, lambda: _spent(lab, tag, number if ready else 0, had, bank), 300)
             begun = lab.loop
             if spent is None:
                 yield Compared(kind, f"{words.title if words else number}: use", 1, math.nan, 0)
             elif energy and tag in lab.units:
                 yield Compared(kind, "energy", float(energy[1]), had - lab.units[tag].energy, 3)
-            if enemies := [other for other, unit in lab.units.items() if unit.owner == ENEMY and other not in lab.first]:
+            if enemies := [
+                other for other, unit in lab.units.items() if unit.owner == ENEMY and other not in lab.first
+            ]:
                 lab.kill(*enemies)
             if cost:
                 now = lab.observation.observation.player_common.minerals
@@ -326,7 +345,10 @@ def _casts(lab: Lab, kind: str, told: dict[str, str]) -> Iterator[Compared]:
         lab.clear()
 
 
-def _spent(lab: Lab, tag: int, energy: float, minerals: int) -> bool:
+def _spent(lab: Lab, tag: int, number: int, energy: float, minerals: int) -> bool:
+    """Return whether a unit has used what it was ordered to; `number` is that of an ability with a cooldown, or 0."""
+    if tag in lab.units and number:
+        return number not in lab.abilities(tag)
     unit = lab.units.get(tag)
     bank = lab.observation.observation.player_common.minerals
     return unit is None or unit.energy < energy - 5 or bank < minerals or not unit.orders
@@ -349,7 +371,7 @@ def _use(lab: Lab, number: int, tag: int) -> bool:
         return False
     if lab.order(number, tag):
         return True
-    victims = lab.make(Put("Ravager", (x + 4, y), ENEMY), Put("Ghost", (x, y + 4), ENEMY), Put("Thor", (x, y - 4), ENEMY))
+    victims = lab.make(*(Put(victim, (x + dx, y + dy), ENEMY) for victim, dx, dy in _UNARMED))
     return lab.order(number, tag, point=(x + 2, y + 2)) or any(lab.order(number, tag, target=v) for v in victims)
 
 

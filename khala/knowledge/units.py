@@ -6,7 +6,7 @@ stands in for it, and the weapons that the game hides from clients (`_weapons`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from khala.knowledge.abilities import needs_of
 from khala.knowledge.measures import per_second, plain, seconds, sparse
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import Hit, ProductionRecord, UnitType, Weapon
+
+
+_MELEE_RANGE: Final = 0.1
+"""A gap between two weapons of one unit that is no gap in play."""
 
 
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
@@ -123,10 +127,8 @@ def _weapons(unit: UnitType, catalog: Catalog) -> Iterator[dict[str, Any]]:
 
 def _is_filled(weapon: Weapon, usable: list[Weapon]) -> bool:
     """Return whether a hidden weapon hits what is too near for this one: a Queen's talons, a Roach's claws."""
-    return any(
-        other.hidden and other.targets == weapon.targets and not other.min_range and other.range >= weapon.min_range - 0.1
-        for other in usable
-    )
+    near = [other for other in usable if other.hidden and other.targets == weapon.targets and not other.min_range]
+    return any(other.range >= weapon.min_range - _MELEE_RANGE for other in near)
 
 
 def _shown(weapon: Weapon) -> dict[str, Any]:

@@ -25,9 +25,7 @@ HITS: Final = {"any": "ground and air", "ground": "ground", "air": "air"}
 
 
 @functools.lru_cache(4096)
-def short(
-    name: str, among: frozenset[str] | None = None, researched: frozenset[str] = frozenset()
-) -> tuple[str, ...]:
+def short(name: str, among: frozenset[str] | None = None, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
     """Return a type as lines: `Stalker: Mobile ranged walker …`, its body, its weapons, its counters.
 
     `among` are the types that matter now, those in sight: only these are named as counters, in an order of their own.

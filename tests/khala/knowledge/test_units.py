@@ -139,7 +139,8 @@ def _told(weapon: WeaponFacts) -> tuple[Any, ...]:
 
 def _shown(row: WeaponRow, usable: list[WeaponRow]) -> tuple[Any, ...]:
     filled = any(other.hidden and other.targets == row.targets and not other.min_range for other in usable)
-    return (row.targets, row.range, 0 if filled else row.min_range, row.shown_damage, row.shown_attacks, dict(row.shown_bonus))
+    nearest = 0 if filled else row.min_range
+    return (row.targets, row.range, nearest, row.shown_damage, row.shown_attacks, dict(row.shown_bonus))
 
 
 def test_weapons_are_those_that_the_api_tells(version: str, tables: Catalog, table_names: Callable[[str], str]) -> None:

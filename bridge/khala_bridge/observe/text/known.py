@@ -23,7 +23,10 @@ def unit_knowledge(page: Page) -> Iterable[str]:
 
 @functools.lru_cache(1024)
 def _written(types: _Types, researched: frozenset[str]) -> tuple[str, ...]:
-    """Return the lines about some types; the own side has its upgrades. Cached, since types rarely change between steps."""
+    """Return the lines about some types; the own side has its upgrades.
+
+    Cached, since types rarely change between steps.
+    """
     friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
     lines = ["Unit knowledge"] if any(types) else []
     for name in _all(types):
