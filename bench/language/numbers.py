@@ -49,11 +49,14 @@ _UNARMED: Final = (("SwarmHost", 4, 0), ("Raven", 0, 4), ("WarpPrism", 0, -4), (
 _SHOTS: Final = 8
 _STEP_LOOPS: Final = 2
 _MOST_LOOPS: Final = 2400
+_CAST_LOOPS: Final = 300
 _RESEARCH_LOOPS: Final = 200
 _CREEP_LOOPS: Final = 150
 _BARRIER_LOOPS: Final = 130
 _CHANCE_S: Final = 2 / LOOPS_PER_SECOND
 """The most that chance adds to a period."""
+_BACK_S: Final = 0.3
+"""Half of the most that the way back adds."""
 _INSIDE: Final = 0.08
 _OUTSIDE: Final = 0.35
 """World units within and beyond a range at which a unit fires, and first walks."""
@@ -87,6 +90,8 @@ class Arm(NamedTuple):
     hits: int
     period: float
     per_second: float
+    returns: bool
+    """Whether the next shot waits until what flew is back."""
 
     def against(self, victim: str) -> float:
         """Return the damage of one shot at a type, by the text and the type's armor."""
@@ -150,6 +155,7 @@ def arms_of(lines: Sequence[str]) -> Iterator[Arm]:
             int(times[1]) if times else 1,
             float(period),
             float(rate[1]) if rate else math.nan,
+            "tentacle is back" in line,
         )
 
 
@@ -225,6 +231,8 @@ def _fastest(lab: Lab, kind: str, *, creep: bool = False) -> float:
 def _spot(lab: Lab, kind: str, *, creep: bool = False) -> Point:
     """Return the middle of an empty place; with creep, which stays, for what needs it."""
     places = lab.ground.places(30, 20)
+    if fact(kind).makes_creep:
+        return places[-1]
     if not (creep or fact(kind).needs_creep):
         return places[0]
     x, y = places[-1]
@@ -247,7 +255,8 @@ def _weapon(lab: Lab, kind: str, arm: Arm) -> Iterator[Compared]:
         yield Compared(kind, f"damage to {plane}", arm.against(victim), median(losses or [math.nan]), 0.3)
         if not i:
             period = (begun[-1] - begun[0]) / (len(begun) - 1) / LOOPS_PER_SECOND if len(begun) > 1 else math.nan
-            yield Compared(kind, "period", arm.period, period, min(_CHANCE_S, 0.15 * arm.period + 0.03))
+            wait = _BACK_S if arm.returns else 0.0
+            yield Compared(kind, "period", arm.period + wait, period, wait + min(_CHANCE_S, 0.15 * arm.period + 0.03))
             yield Compared(
                 kind, "per second", arm.per_second, arm.damage * arm.hits / arm.period, 0.02 * arm.per_second
             )
@@ -318,40 +327,54 @@ def _casts(lab: Lab, kind: str, told: dict[str, str]) -> Iterator[Compared]:
         energy = re.search(rf"[Ff]or {_NUMBER} energy", sentence)
         ready = re.search(rf"[Rr]eady again after {_NUMBER} s", sentence)
         cost = re.search(rf"for {_NUMBER} minerals", sentence)
-        if ability is None or not (energy or ready or cost):
+        if not (energy or ready or cost):
             continue
         tag = _caster(lab, kind)
-        bank = lab.observation.observation.player_common.minerals
-        if tag and _use(lab, number, tag):
-            had = lab.units[tag].energy
-            lab.step(_STEP_LOOPS)
-            spent = _until(lab, lambda: _spent(lab, tag, number if ready else 0, had, bank), 300)
-            begun = lab.loop
-            if spent is None:
-                yield Compared(kind, f"{words.title if words else number}: use", 1, math.nan, 0)
-            elif energy and tag in lab.units:
-                yield Compared(kind, "energy", float(energy[1]), had - lab.units[tag].energy, 3)
-            if enemies := [
-                other for other, unit in lab.units.items() if unit.owner == ENEMY and other not in lab.first
-            ]:
-                lab.kill(*enemies)
-            if cost:
-                now = lab.observation.observation.player_common.minerals
-                yield Compared(kind, "minerals", float(cost[1]), bank - now, 0)
-            if ready:
-                again = _until(lab, lambda: number in lab.abilities(tag), _MOST_LOOPS)
-                waited = math.nan if again is None else (lab.loop - begun) / LOOPS_PER_SECOND
-                yield Compared(kind, f"cooldown of {number}", float(ready[1]), waited, 0.5)
+        bank = _bank(lab)
+        if _use(lab, number, tag):
+            yield from _cast(lab, kind, tag, number, bank=bank, energy=energy, ready=ready, cost=cost)
         lab.clear()
 
 
-def _spent(lab: Lab, tag: int, number: int, energy: float, minerals: int) -> bool:
+def _cast(
+    lab: Lab,
+    kind: str,
+    tag: int,
+    number: int,
+    *,
+    bank: int,
+    energy: re.Match[str] | None,
+    ready: re.Match[str] | None,
+    cost: re.Match[str] | None,
+) -> Iterator[Compared]:
+    """Wait until a unit has used what it was ordered to use, and until it can be ordered again."""
+    had = lab.units[tag].energy
+    lab.step(_STEP_LOOPS)
+    if cost:
+        yield Compared(kind, "minerals", float(cost[1]), bank - _bank(lab), 0)
+    elif _until(lab, lambda: _spent(lab, tag, number if ready else 0, had), _CAST_LOOPS) is None:
+        yield Compared(kind, f"use of {number}", 1, math.nan, 0)
+    elif energy and tag in lab.units:
+        yield Compared(kind, "energy", float(energy[1]), had - lab.units[tag].energy, 3)
+    begun = lab.loop
+    if enemies := [other for other, unit in lab.units.items() if unit.owner == ENEMY and other not in lab.first]:
+        lab.kill(*enemies)
+    if ready:
+        again = _until(lab, lambda: number in lab.abilities(tag), _MOST_LOOPS)
+        waited = math.nan if again is None else (lab.loop - begun) / LOOPS_PER_SECOND
+        yield Compared(kind, f"cooldown of {number}", float(ready[1]), waited, 0.5)
+
+
+def _bank(lab: Lab) -> int:
+    return int(lab.observation.observation.player_common.minerals)
+
+
+def _spent(lab: Lab, tag: int, number: int, energy: float) -> bool:
     """Return whether a unit has used what it was ordered to; `number` is that of an ability with a cooldown, or 0."""
     if tag in lab.units and number:
         return number not in lab.abilities(tag)
     unit = lab.units.get(tag)
-    bank = lab.observation.observation.player_common.minerals
-    return unit is None or unit.energy < energy - 5 or bank < minerals or not unit.orders
+    return unit is None or unit.energy < energy - 5 or not unit.orders
 
 
 def _caster(lab: Lab, kind: str) -> int:
@@ -367,7 +390,7 @@ def _caster(lab: Lab, kind: str) -> int:
 
 def _use(lab: Lab, number: int, tag: int) -> bool:
     x, y = lab.at(tag)
-    if number not in lab.abilities(tag):
+    if not tag or number not in lab.abilities(tag):
         return False
     if lab.order(number, tag):
         return True

@@ -160,6 +160,7 @@ def _frame(weapon: Weapon) -> dict[str, Any]:
         "min_range": plain(weapon.min_range),
         "period_s": seconds(weapon.period_loops),
         "splash": plain(max(rings, default=0.0)),
+        "returns": any(hit.returns for hit in weapon.hits),
     }
 
 

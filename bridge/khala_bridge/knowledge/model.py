@@ -34,6 +34,8 @@ class WeaponFacts(Frozen):
     """Extra damage against an attribute."""
     splash: float = 0
     """Radius around a hit in which other units are hurt too; 0 for none."""
+    returns: bool = False
+    """Whether the next shot waits until what flew to the target is back."""
 
     @property
     def per_second(self) -> float:

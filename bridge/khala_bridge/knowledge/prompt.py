@@ -68,11 +68,12 @@ def weapon(own: WeaponFacts) -> str:
     times = f" x {own.attacks}" if own.attacks > 1 else ""
     bonus = "".join(f" (+{n(more)} against {what})" for what, more in own.bonus.items())
     nearest = f" but not nearer than {n(own.min_range)}" if own.min_range else ""
+    then = " once the tentacle is back, at most" if own.returns else ","
     better = "".join(f" ({_tenths(own.per_second_against(what))} against {what})" for what in own.bonus)
     splash = f", splash within {n(own.splash)}" if own.splash else ""
     return (
         f"hits {HITS[own.targets]}, range {n(own.range)}{nearest}, damage {n(own.damage)}{bonus}{times} "
-        f"every {n(own.period_s)} s, {_tenths(own.per_second)} damage per second{better}{splash}"
+        f"every {n(own.period_s)} s{then} {_tenths(own.per_second)} damage per second{better}{splash}"
     )
 
 
