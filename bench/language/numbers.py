@@ -351,6 +351,7 @@ def _cast(
     had = lab.units[tag].energy
     lab.step(_STEP_LOOPS)
     if cost:
+        _until(lab, lambda: _bank(lab) < bank, _CAST_LOOPS)
         yield Compared(kind, "minerals", float(cost[1]), bank - _bank(lab), 0)
     elif _until(lab, lambda: _spent(lab, tag, number if ready else 0, had), _CAST_LOOPS) is None:
         yield Compared(kind, f"use of {number}", 1, math.nan, 0)

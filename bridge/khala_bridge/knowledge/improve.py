@@ -21,7 +21,7 @@ _AGAINST: Final = "damage_against_"
 
 
 @functools.lru_cache(4096)
-def improved(name: str, researched: frozenset[str]) -> UnitFacts | None:
+def improve(name: str, researched: frozenset[str]) -> UnitFacts | None:
     """Return a type as it is with these upgrades; None if the type is unknown."""
     kind = knowledge().get(name)
     if kind is None or not researched:

@@ -10,7 +10,7 @@ import functools
 from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Final
 
-from khala_bridge.knowledge.improve import improved
+from khala_bridge.knowledge.improve import improve
 from khala_bridge.knowledge.load import knowledge
 from khala_bridge.knowledge.words import number as n
 
@@ -32,7 +32,7 @@ def short(name: str, among: frozenset[str] | None = None, researched: frozenset[
     Without it some units of each race are named. `researched` are the upgrades of its owner, in all numbers. There are
     no lines about an unknown type.
     """
-    kind = improved(name, researched)
+    kind = improve(name, researched)
     if kind is None:
         return ()
     about = f"{name}: {kind.about}" if kind.about else name
@@ -42,7 +42,7 @@ def short(name: str, among: frozenset[str] | None = None, researched: frozenset[
 @functools.lru_cache(4096)
 def advice(name: str, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
     """Return lines about the use of an own type, and its abilities apart from moving and attacking: `Blink: …`."""
-    kind = improved(name, researched)
+    kind = improve(name, researched)
     if kind is None:
         return ()
     uses = [f"Use: {kind.uses}"] if kind.uses else []
