@@ -418,7 +418,7 @@ def measure(kinds: Sequence[str], *, better: bool) -> list[Compared]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the numbers compared by kind, and each difference; return 1 if there is any."""
-    parser = make_parser(__doc__)
+    parser = make_parser(__doc__, json=False)
     parser.add_argument("--kinds", nargs="+", default=list(melee_types()), help="unit types")
     args = parser.parse_args(argv)
     wrong = 0
