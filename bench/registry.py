@@ -100,6 +100,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("environments.train", "docs/how-to/train.md"),
         Benchmark("language.offers", "Honest offers"),
         Benchmark("language.messages", "True messages"),
+        Benchmark("language.numbers", "tests/bridge/test_knowledge_numbers.py"),
         Benchmark("matches.scenarios", "Every scenario, played by scripted players"),
         Benchmark("matches.ladder", "The ladder of the scripted player"),
         Benchmark("matches.duels", "Duels, with sides swapped"),

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from khala_agents.config import SentValue
+    from khala_agents.llm.asking import HttpClient
     from khala_agents.llm.limits import Gates
     from khala_protocol.messages import MemoryRule, ModelCall
 
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def client_for(config: ModelConfig) -> Anthropic | OpenAICompatible:
+def client_for(config: ModelConfig) -> HttpClient[Any]:
     """Return a client for one agent.
 
     Raises:

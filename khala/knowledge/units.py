@@ -6,7 +6,7 @@ stands in for it, and the weapons that the game hides from clients (`_weapons`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from khala.knowledge.abilities import needs_of
 from khala.knowledge.measures import per_second, plain, seconds, sparse
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import Hit, ProductionRecord, UnitType, Weapon
+
+
+_MELEE_RANGE: Final = 0.1
+"""A gap between two weapons of one unit that is no gap in play."""
 
 
 def unit_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
@@ -42,6 +46,7 @@ def _unit(unit: UnitType, catalog: Catalog) -> dict[str, Any]:
         "energy_start": plain(unit.energy_start),
         "armor": plain(unit.armor),
         "speed": per_second(unit.speed_n),
+        "creep": plain(unit.creep_factor) if unit.speed_n and unit.creep_factor != 1 else 0,
         "sight": plain(unit.sight),
         "detects": plain(unit.detect),
         "radius": plain(unit.radius),
@@ -115,9 +120,15 @@ def _weapons(unit: UnitType, catalog: Catalog) -> Iterator[dict[str, Any]]:
     usable = [weapon for weapon in unit.weapons if weapon.works and not weapon.disabled]
     shown = [weapon for weapon in usable if not weapon.hidden]
     for weapon in shown:
-        yield _shown(weapon)
+        yield _shown(weapon) | {"min_range": 0 if _is_filled(weapon, usable) else plain(weapon.min_range)}
     for weapon in () if shown else usable:
         yield from _hidden(unit, weapon, catalog)
+
+
+def _is_filled(weapon: Weapon, usable: list[Weapon]) -> bool:
+    """Return whether a hidden weapon hits what is too near for this one: a Queen's talons, a Roach's claws."""
+    near = [other for other in usable if other.hidden and other.targets == weapon.targets and not other.min_range]
+    return any(other.range >= weapon.min_range - _MELEE_RANGE for other in near)
 
 
 def _shown(weapon: Weapon) -> dict[str, Any]:
@@ -149,6 +160,7 @@ def _frame(weapon: Weapon) -> dict[str, Any]:
         "min_range": plain(weapon.min_range),
         "period_s": seconds(weapon.period_loops),
         "splash": plain(max(rings, default=0.0)),
+        "returns": any(hit.returns for hit in weapon.hits),
     }
 
 

@@ -162,14 +162,13 @@ def _beaten_by() -> dict[str, tuple[str, ...]]:
 def _describe_unit(kind: UnitFacts, beaten_by: tuple[str, ...], version: str) -> UnitFacts:
     words = unit_words()[kind.name]
     filler = _filler(version)
-    traits = {title: filler.fill(said, kind) for title, said in words.traits.items()}
     told = {
         "allows": _allowed_by(version).get(kind.name, ()),
         "about": filler.fill(words.about, kind),
         "uses": filler.fill(words.uses, kind),
         "counters": words.beats,
         "countered_by": beaten_by,
-        "abilities": {**traits, **dict(_titles(kind, version))},
+        "abilities": describe_abilities(kind, version=version),
     }
     return kind.model_copy(update=told)
 
@@ -187,11 +186,21 @@ def _allowed_by(version: str) -> dict[str, tuple[str, ...]]:
     return {name: tuple(allowed) for name, allowed in found.items()}
 
 
-def _titles(kind: UnitFacts, version: str) -> Iterator[tuple[str, str]]:
+def describe_abilities(
+    kind: UnitFacts, researched: frozenset[str] = frozenset(), *, version: str = VERSION
+) -> dict[str, str]:
+    """Return what a type can do as titles and sentences, which name no upgrade as needed that is `researched`."""
+    traits = unit_words()[kind.name].traits
+    told = {title: _filler(version).fill(said, kind) for title, said in traits.items()}
+    return told | dict(_titles(kind, researched, version))
+
+
+def _titles(kind: UnitFacts, researched: frozenset[str], version: str) -> Iterator[tuple[str, str]]:
     """Yield the abilities of a type that have a title, with the words about them."""
     for number in kind.ability_ids:
         if (ability := abilities(version).get(number)) and (words := words_of(ability)) and words.title:
-            yield words.title, ability.about
+            needed = tuple(name for name in ability.requires if name not in researched)
+            yield words.title, _describe_ability(ability.model_copy(update={"requires": needed}), version).about
 
 
 @functools.cache

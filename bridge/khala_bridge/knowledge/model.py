@@ -34,6 +34,8 @@ class WeaponFacts(Frozen):
     """Extra damage against an attribute."""
     splash: float = 0
     """Radius around a hit in which other units are hurt too; 0 for none."""
+    returns: bool = False
+    """Whether the next shot waits until what flew to the target is back."""
 
     @property
     def per_second(self) -> float:
@@ -81,6 +83,8 @@ class UnitFacts(Frozen):
     armor: float = 0
     speed: float = 0
     """World units per second."""
+    creep: float = 1
+    """Times its speed, on creep."""
     sight: float = 0
     detects: float = 0
     """Radius in which it sees cloaked and burrowed units; 0 for none."""

@@ -10,6 +10,7 @@ import functools
 from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Final
 
+from khala_bridge.knowledge.improve import improve
 from khala_bridge.knowledge.load import knowledge
 from khala_bridge.knowledge.words import number as n
 
@@ -24,23 +25,24 @@ HITS: Final = {"any": "ground and air", "ground": "ground", "air": "air"}
 
 
 @functools.lru_cache(4096)
-def short(name: str, among: frozenset[str] | None = None) -> tuple[str, ...]:
+def short(name: str, among: frozenset[str] | None = None, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
     """Return a type as lines: `Stalker: Mobile ranged walker …`, its body, its weapons, its counters.
 
     `among` are the types that matter now, those in sight: only these are named as counters, in an order of their own.
-    Without it some units of each race are named. There are no lines about an unknown type.
+    Without it some units of each race are named. `researched` are the upgrades of its owner, in all numbers. There are
+    no lines about an unknown type.
     """
-    kind = knowledge().get(name)
+    kind = improve(name, researched)
     if kind is None:
         return ()
     about = f"{name}: {kind.about}" if kind.about else name
     return (about, body(kind), *map(weapon, kind.weapons), *_matchups(kind, among))
 
 
-@functools.cache
-def advice(name: str) -> tuple[str, ...]:
+@functools.lru_cache(4096)
+def advice(name: str, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
     """Return lines about the use of an own type, and its abilities apart from moving and attacking: `Blink: …`."""
-    kind = knowledge().get(name)
+    kind = improve(name, researched)
     if kind is None:
         return ()
     uses = [f"Use: {kind.uses}"] if kind.uses else []
@@ -53,7 +55,8 @@ def body(kind: UnitFacts) -> str:
     parts = [f"{', '.join((*kind.attributes, plane))}; health {n(kind.health)}"]
     numbers = (("shield", kind.shield), ("armor", kind.armor), ("energy up to", kind.energy))
     parts += [f"{what} {n(value)}" for what, value in numbers if value]
-    parts.append(f"speed {n(kind.speed)}" if kind.speed else "does not move")
+    on_creep = f" ({n(kind.speed * kind.creep)} on creep)" if kind.creep != 1 else ""
+    parts.append(f"speed {n(kind.speed)}{on_creep}" if kind.speed else "does not move")
     if kind.detects:
         parts.append(f"detects within {n(kind.detects)}")
     parts += [word for word, is_so in (("cloaked", kind.cloaked), ("burrowed", kind.burrowed)) if is_so]
@@ -65,11 +68,12 @@ def weapon(own: WeaponFacts) -> str:
     times = f" x {own.attacks}" if own.attacks > 1 else ""
     bonus = "".join(f" (+{n(more)} against {what})" for what, more in own.bonus.items())
     nearest = f" but not nearer than {n(own.min_range)}" if own.min_range else ""
+    then = " once the tentacle is back, at most" if own.returns else ","
     better = "".join(f" ({_tenths(own.per_second_against(what))} against {what})" for what in own.bonus)
     splash = f", splash within {n(own.splash)}" if own.splash else ""
     return (
         f"hits {HITS[own.targets]}, range {n(own.range)}{nearest}, damage {n(own.damage)}{bonus}{times} "
-        f"every {n(own.period_s)} s, {_tenths(own.per_second)} damage per second{better}{splash}"
+        f"every {n(own.period_s)} s{then} {_tenths(own.per_second)} damage per second{better}{splash}"
     )
 
 

@@ -18,20 +18,23 @@ if TYPE_CHECKING:
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
     """Show lines about every type in sight; uses and abilities only of the agent's own types."""
-    return _written(_types(page))
+    return _written(_types(page), frozenset(page.view.upgrades))
 
 
 @functools.lru_cache(1024)
-def _written(types: _Types) -> tuple[str, ...]:
-    """Return the lines about some types; cached, since types rarely change between steps."""
+def _written(types: _Types, researched: frozenset[str]) -> tuple[str, ...]:
+    """Return the lines about some types; the own side has its upgrades.
+
+    Cached, since types rarely change between steps.
+    """
     friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
     lines = ["Unit knowledge"] if any(types) else []
     for name in _all(types):
-        heading, *more = short(name, _opponents(name, friends, foes))
+        heading, *more = short(name, _opponents(name, friends, foes), researched if name in friends else frozenset())
         lines.append(f"{INDENT}{heading}")
         lines += [f"{INDENT2}{line}" for line in more]
         if name in types.mine:
-            lines += [f"{INDENT2}{line}" for line in advice(name)]
+            lines += [f"{INDENT2}{line}" for line in advice(name, researched)]
     return tuple(lines)
 
 
