@@ -25,7 +25,20 @@ RECORDED = [field.name for field in fields(MatchOptions) if field.name != "assem
 UNSAID: dict[str, Any] = dict.fromkeys(RECORDED)
 TAKEN = {
     *("resume", "out", "as_json", "game", "assemble_s", "connect", "listen", "tls", "insecure", "trust"),
-    *("model", "model_name", "base_url", "policy", "fallback", "blue", "red", "side_model", "budget_usd", "latency_s"),
+    *(
+        "model",
+        "model_name",
+        "base_url",
+        "policy",
+        "fallback",
+        "rethink",
+        "answer",
+        "blue",
+        "red",
+        "side_model",
+        "budget_usd",
+        "latency_s",
+    ),
 }
 
 
