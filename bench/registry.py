@@ -75,6 +75,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("simulator.simulator_memory", "The simulator", "table"),
         Benchmark("language.recognition", "Accuracy of the parser", "table"),
         Benchmark("language.forms", "Forms of answers"),
+        Benchmark("language.prompts", "Lengths of prompts"),
         Benchmark("turns.image", "Observations and actions", "table"),
         Benchmark("turns.http_client", "agents/khala_agents/llm/transport.py", "table"),
         Benchmark("survival.orphans", "Survival", "table"),
