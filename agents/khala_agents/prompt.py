@@ -20,6 +20,7 @@ from khala_agents.answers.wording import (
     in_json,
 )
 from khala_agents.fitting import DraftPrompt
+from khala_agents.repeats import Repeats
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
@@ -58,6 +59,7 @@ class Prompt:
             ChatMessage(role="assistant", content=in_json(said, briefing.actions) if form == "json" else said),
         )
         self._draft = DraftPrompt(system_text(briefing, form), () if form == "tools" else example)
+        self._repeats = Repeats(briefing, form_apart=form in ("json", "tools"))
 
     @property
     def stable(self) -> int:
@@ -83,7 +85,7 @@ class Prompt:
         images: tuple[ImageRef, ...] = (),
         missing: Sequence[ImageRef] = (),
     ) -> DraftPrompt:
-        """Return a prompt that can be made shorter.
+        """Return a prompt that can be made shorter; its observations do not repeat what the system message says.
 
         Args:
             observation_text: as the host wrote it.
@@ -95,9 +97,19 @@ class Prompt:
         """
         lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
         return replace(
-            self._draft, observation=observation_text, recalled=recalled, summary=summary, steps=steps,
-            images=images, missing=lost,
-        )  # fmt: skip
+            self._draft,
+            observation=self._repeats.without(observation_text),
+            recalled=tuple(map(self._shown_again, recalled)),
+            summary=summary,
+            steps=steps,
+            images=images,
+            missing=lost,
+        )
+
+    def _shown_again(self, message: ChatMessage) -> ChatMessage:
+        if message.role != "user":
+            return message
+        return message.model_copy(update={"content": self._repeats.without(message.content)})
 
 
 def _line(text: str) -> str:
@@ -112,6 +124,7 @@ def system_text(briefing: Briefing, form: AnswerForm = "text") -> str:
         ("Who you are", _identity(briefing)),
         ("Your task", briefing.task),
         ("Your teams", _teams(briefing.teams)),
+        ("Your units", _knowledge(briefing.knowledge)),
         ("Rules", _rules(briefing)),
         ("Actions", manual.list_actions(briefing.actions)),
         ("Arguments", _arguments(briefing.actions, briefing.frames)),
@@ -131,6 +144,10 @@ def _teams(teams: Iterable[TeamSpec]) -> str:
     return "\n".join(
         f"- {team.name}: {', '.join(team.unit_types)}" + (f". {team.task}" if team.task else "") for team in teams
     )
+
+
+def _knowledge(types: Iterable[str]) -> str:
+    return "\n".join("- " + "\n  ".join(said.splitlines()) for said in types)
 
 
 def _rules(briefing: Briefing) -> str:

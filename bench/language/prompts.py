@@ -81,7 +81,7 @@ def measure(name: str, seeds: Sequence[int], steps: int | None, player: str) -> 
             path = Path(directory) / "recording.mcap"
             config = MatchConfig(task=task, run="prompts", record=path, seed=seed)
             results = asyncio.run(play(config, {task.side: Minds(policy=player)}, game="simulator"))
-            won += sum(result.outcome == "victory" for result in results)
+            won += sum(result.outcome == "win" for result in results)
             _read(Recording.open(path), name, found)
     return list(found.values()), won
 

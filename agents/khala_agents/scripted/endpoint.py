@@ -26,6 +26,7 @@ from aiohttp import web
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import to_json
 
+from khala_agents.repeats import say_again
 from khala_agents.scripted.faults import InjectedFaults
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.bus.config import is_loopback
@@ -199,11 +200,13 @@ class _Asked(BaseModel):
 
     @property
     def observation(self) -> str:
-        """The last message, if it is the user's; before a verdict, the one of the user before it."""
+        """The last message, if it is the user's, with the task; before a verdict, the one of the user before it."""
         if not self.messages or self.messages[-1].role != "user":
             return ""
         said = [message.text for message in self.messages if message.role == "user"]
-        return said[-2] if len(said) > 1 and said[-1].startswith(VERDICT) else said[-1]
+        seen = said[-2] if len(said) > 1 and said[-1].startswith(VERDICT) else said[-1]
+        system = "\n\n".join(message.text for message in self.messages if message.role in ("system", "developer"))
+        return say_again(system, seen) if system else seen
 
 
 def _completion(asked: _Asked, text: str, digest: str) -> bytes:

@@ -143,7 +143,7 @@ def _pools(action: TextAction, team: TextTeam, situation: Situation) -> list[lis
     if not targets:
         hostile = action.name in situation.hostile or any(word in action.name for word in HOSTILE)
         around = team.enemies if hostile else [*team.allies, *team.own]
-        targets = [unit.tag for unit in around]
+        targets = [unit.tag for unit in around if unit.tag]
     if not action.name.startswith("Select_"):
         return [targets] * count
     named = 2 if action.name.startswith("Select_Two_") else 1  # the first arguments name the units that act

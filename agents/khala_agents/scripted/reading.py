@@ -9,26 +9,30 @@ this module.
 from __future__ import annotations
 
 import functools
+import math
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _SIGNED = r"(-?\d+(?:\.\d+)?)"
 _POINT = rf"\[{_SIGNED}, ?{_SIGNED}\]"
 _SECTION = re.compile(r"\n(?=\S)")
 _TEAM = re.compile(r"Team (\S+)")
-_UNITS = re.compile(r"^    (Your|Allied|Enemy) (?:units|structures)\b[^\n]*:\n((?:        .*\n?)*)", re.MULTILINE)
+_UNITS = re.compile(r"^    (Your|Allied|Enemy) units\b[^\n]*:\n((?:        .*\n?)*)", re.MULTILINE)
+_AGAIN = re.compile(rf"(0x[0-9a-f]+) {_POINT} {_NUMBER}", re.ASCII)
+_GROUP = re.compile(rf"(\d{{1,4}}) (\w+) (?:at|around) ({_POINT}(?:, {_POINT})*)", re.ASCII)
 _SCREEN = re.compile(rf"    Screen on the map: x {_SIGNED} to {_SIGNED}, y {_SIGNED} to {_SIGNED}", re.ASCII)
 _PLACE = re.compile(rf"    Minimap position: {_POINT}", re.ASCII)
 _VALID = re.compile(r"^    Team (\S+): (.*(?:\n     +<.*)*)", re.MULTILINE)
 _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
 _WRITE_TO = re.compile(r"^    You can write to: (.*)", re.MULTILINE)
-_TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d)", re.MULTILINE | re.ASCII)
+_EFFECT_ON = re.compile(r"(\w+) on (\d{1,4})", re.ASCII)
+_TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d(?:\.\d)?)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
 _HIT = re.compile(r"^        own \w+ was hit: (.*)", re.MULTILINE)
 _HEX = re.compile(r"0x[0-9a-f]+", re.ASCII)
@@ -77,6 +81,7 @@ class TextUnit(NamedTuple):
     """A unit on a team's screen, as its line describes it."""
 
     tag: str
+    """"" if it is told with others of its type."""
     type: str
     x: float
     y: float
@@ -255,7 +260,7 @@ def read(text: str) -> Situation:
     for section in _SECTION.split(text):
         title, _, body = section.partition("\n")
         if found := _TEAM.fullmatch(title):
-            _read_team(_team(situation, found[1]), body)
+            _read_team(situation, _team(situation, found[1]), body)
         elif title in _READERS:
             _READERS[title](situation, body)
         _read_lines(situation, body)
@@ -273,7 +278,7 @@ def _team(situation: Situation, name: str) -> TextTeam:
 
 def _read_game(situation: Situation, body: str) -> None:
     if found := _TIME.search(body):
-        situation.time_s = 60.0 * int(found[1]) + int(found[2])
+        situation.time_s = 60.0 * int(found[1]) + float(found[2])
     amounts = {name.casefold(): int(amount) for name, amount in _AMOUNT.findall(body)}
     situation.minerals, situation.vespene = amounts.get("minerals", 0), amounts.get("vespene", 0)
     if found := _PROMISED.search(body):
@@ -312,10 +317,16 @@ def _read_task(situation: Situation, body: str) -> None:
     situation.task = " ".join(general)
 
 
-def _read_team(team: TextTeam, body: str) -> None:
+def _read_team(situation: Situation, team: TextTeam, body: str) -> None:
     groups = {"Your": team.own, "Allied": team.allies, "Enemy": team.enemies}
     for whose, lines in _UNITS.findall(body):
-        groups[whose] += [unit for line in lines.splitlines() if (unit := _unit(line.strip()))]
+        for line in lines.splitlines():
+            if unit := _unit(line.strip()):
+                groups[whose].append(unit)
+            elif whose == "Enemy":
+                team.enemies += _told_again(situation, line)
+            elif whose == "Allied":
+                team.allies += _group(line)
     if bounds := _SCREEN.search(body):
         x0, x1, y0, y1 = (float(number) for number in bounds.groups())
         team.bounds = (x0, x1, y0, y1)
@@ -323,6 +334,25 @@ def _read_team(team: TextTeam, body: str) -> None:
     team.resources = [(float(x), float(y)) for _, x, y in _RESOURCE.findall(body)]
     if place := _PLACE.search(body):
         team.minimap = float(place[1]), float(place[2])
+
+
+def _told_again(situation: Situation, line: str) -> Iterator[TextUnit]:
+    """Yield enemies that a block above has described, with their places on this team's screen."""
+    above = {unit.tag: unit for team in situation.teams.values() for unit in team.enemies}
+    for tag, x, y, distance in _AGAIN.findall(line):
+        if tag in above:
+            yield above[tag]._replace(x=float(x), y=float(y), distance=float(distance))
+
+
+def _group(line: str) -> Iterator[TextUnit]:
+    """Yield the units of a type that are told together: without tags, and all in the middle if no places are given."""
+    if found := _GROUP.match(line.strip()):
+        at = points(found[3])
+        under = {effect: int(count) for effect, count in _EFFECT_ON.findall(line)}
+        for number in range(int(found[1])):
+            x, y = at[min(number, len(at) - 1)]
+            effects = tuple(effect for effect, count in under.items() if number < count)
+            yield TextUnit("", found[2], x, y, hit_points=1.0, full=1.0, distance=math.inf, effects=effects)
 
 
 @functools.lru_cache(4096)

@@ -7,6 +7,7 @@ import platform
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue_sha256
+from khala_bridge.observe.text import knowledge_of
 from khala_bridge.observe.text.example import example
 from khala_orchestrator.match.provenance import code_sha256, hardware
 from khala_protocol.messages import Briefing, Contact, Run
@@ -32,6 +33,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         agent_kind=agent.kind,
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),
+        knowledge=knowledge_of(agent),
         actions=agent.specs(),
         correspondents=tuple(Contact(name=other.name, role=other.role) for other in others),
         channels=task.channels if others else (),

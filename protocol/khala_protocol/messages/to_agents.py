@@ -137,6 +137,9 @@ class Briefing(Wire):
     agent_kind: AgentKind = "combat_group"
     task: str = ""
     teams: tuple[TeamSpec, ...] = ()
+    knowledge: tuple[str, ...] = ()
+    """What is known of each type of its units, before any upgrade: its name and what it is, and a line for each of its
+    body, weapons, use and abilities."""
     actions: tuple[ActionSpec, ...] = ()
     """Every action that any of its teams may ever use."""
     correspondents: tuple[Contact, ...] = ()

@@ -32,6 +32,7 @@ __all__ = [
     "find_sections",
     "general",
     "kept",
+    "knowledge_of",
     "known",
     "leading",
     "render",
@@ -62,6 +63,13 @@ SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
     "builder": ("game", "teams", "counts", "events", "places", *_ACTING, *_ENDING),
 }
 """Names of the sections of a page by the kind of the agent, in their order."""
+
+
+def knowledge_of(agent: AgentConfig) -> tuple[str, ...]:
+    """Return what is known of each type of an agent's units; () if its pages have nothing of the kind."""
+    if known.unit_knowledge not in (found.write for found in sections_of(agent)):
+        return ()
+    return known.own_types(name for team in agent.teams for name in team.unit_types)
 
 
 def sections_of(agent: AgentConfig) -> tuple[Section, ...]:

@@ -19,7 +19,7 @@ def game(page: Page) -> Iterator[str]:
     """Show the time, and the resources if the agent spends them."""
     view, used = page.view, page.view.resources
     yield "Game"
-    yield f"{INDENT}Time: {minutes(view.time_s)}"
+    yield f"{INDENT}Time: {minutes(view.time_s)}.{int(10 * view.time_s) % 10}"
     if used.minerals or used.vespene or page.observation.agent.kind != "combat_group":
         yield f"{INDENT}Minerals: {used.minerals}, vespene: {used.vespene}{_promise(used)}"
         yield f"{INDENT}Supply: {n(used.supply_used)} of {n(used.supply_cap)} used"
@@ -54,10 +54,7 @@ def answer(page: Page) -> Iterator[str]:
     yield "Answer"
     if page.teams:
         limit = page.task.max_actions_of(page.observation.agent)
-        fights = page.observation.agent.kind == "combat_group"
-        advice = "; use abilities before moving or attacking." if fights else "."
-        yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team{advice}"
-        yield f'{INDENT}Write a heading "Team <name>:" above the actions of each team.'
+        yield f"{INDENT}At most {limit} action{'s' if limit > 1 else ''} per team."
         parts.append('"Actions:"')
     else:
         yield f"{INDENT}You have no team to order now" + (

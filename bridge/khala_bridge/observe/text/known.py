@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import advice, is_structure, knowledge, short
+from khala_bridge.knowledge import advice, is_armed, is_structure, is_worker, knowledge, short
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2
 
@@ -17,8 +17,16 @@ if TYPE_CHECKING:
 
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
-    """Show lines about every type in sight; uses and abilities only of the agent's own types."""
+    """Show lines about every type in sight, and of the army that it leads; uses and abilities only of own types."""
     return _written(_types(page), frozenset(page.view.upgrades))
+
+
+def own_types(names: Iterable[str]) -> tuple[str, ...]:
+    """Return what is known of each of an agent's own types before any upgrade, for its briefing.
+
+    Pages have the same lines, and those about counters; prompts do not repeat them.
+    """
+    return tuple("\n".join((*short(name, frozenset()), *advice(name))) for name in _known(names))
 
 
 @functools.lru_cache(1024)
@@ -67,6 +75,8 @@ def _types(page: Page) -> _Types:
     """Return the types that are in sight or known to the side."""
     view = page.view
     mine = [unit.type for team in page.teams for unit in team.units]
+    if view.counts and any(team.minimap is None for team in page.teams):  # it leads the army of the whole side
+        mine += [count.type for count in view.counts.units if is_armed(count.type) and not is_worker(count.type)]
     allies = [unit.type for team in page.teams for unit in team.allies]
     enemies = [unit.type for team in page.teams for unit in team.enemies]
     allies += [name for team in view.others for name in team.units]

@@ -23,7 +23,6 @@ def last_actions(page: Page) -> Iterator[str]:
     if page.observation.heard.accepted:
         yield "Your last actions"
         yield from (f"{INDENT}accepted: {call}" for call in page.observation.heard.accepted)
-        yield f"{INDENT}Check whether the accepted ones are done, go on by themselves, or need another order."
 
 
 @section("rejections")

@@ -2,60 +2,73 @@
 
 Unit lines are fields between bars, so that programs can read them as well (the scripted players do):
 
-    Zealot | tag 0x100140001 | screen [17.5, 12] | distance 5.4 | health 100/100 | shield 12/50 | total 75%
+    Zealot | tag 0x100140001 | screen [17.5, 12] | distance 5.4 | health 100/100 | shield 12/50
+
+A unit is told one by one if an order may name it or its state matters: own units and enemies, the `MOST` that matter
+first of many, and friends at whom an action can aim. All others are told by type and place. What a page has said of an
+enemy or of an event, it does not say again under another team.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import is_structure, is_worker
+from khala_bridge.knowledge import is_structure
 from khala_bridge.observe.text.page import section, shorter
-from khala_bridge.observe.text.words import INDENT, INDENT2, n, percent, point, whole
+from khala_bridge.observe.text.words import INDENT, INDENT2, n, percent, point, tenth, whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import Event, OrderView, TeamView, UnitDetails, UnitView
+    from khala_protocol.messages import ActionSpec, Event, OrderView, TeamView, UnitDetails, UnitView
 
+MOST = 12
+"""Units of a list that are told one by one: of the team's own the weakest, of enemies the nearest."""
+MOST_PLACES = 8
+"""Units of a type whose places are told; the middle is told of more."""
 NEAR = 9.0
 """World units from the middle of a team within which a shorter page lists enemies one by one; beyond the range of all
 weapons but siege weapons."""
-FEW, FEWEST = 8, 3
+FEW, FEWEST = 6, 3
 """Number of enemies that still shorter pages list one by one, the nearest ones."""
 
 
 @section("teams", parts=("resources",))
 def teams(page: Page) -> list[str]:
     """Show one block per team: its place, the units there, and events."""
-    return _blocks(page, _all_units, _tagged_events)
+    return _blocks(page, lambda team: _nearest(team, MOST), _tagged_events)
 
 
-@shorter("teams", rank=10, says="allied units, and enemies far from a team, are grouped by type")
+@shorter("teams", rank=10, says="enemies far from a team are grouped by type")
 def near_units(page: Page) -> list[str]:
-    """Show the blocks with allies and far enemies only by type."""
-    return _blocks(page, lambda page, team: _near(page, team, _distance_within(team, NEAR)), _tagged_events)
+    """Show the blocks with far enemies only by type."""
+    return _blocks(page, lambda team: _distance_within(team, NEAR), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
 def few_units(page: Page) -> list[str]:
     """Show the blocks with a few enemies, and events without tags."""
-    return _blocks(page, lambda page, team: _groups(page, team, _nearest(team, FEW)), _counted_events)
+    return _blocks(page, lambda team: _nearest(team, FEW), _counted_events)
 
 
 @shorter("teams", rank=110, says="only the nearest enemies are told one by one, other units by type, no events")
 def fewest_units(page: Page) -> list[str]:
     """Show the blocks with a handful of enemies, and no events."""
-    return _blocks(page, lambda page, team: _groups(page, team, _nearest(team, FEWEST)), _no_events)
+    return _blocks(page, lambda team: _nearest(team, FEWEST), _no_events)
 
 
 def _blocks(
-    page: Page, units: Callable[[Page, TeamView], list[str]], events: Callable[[Page, Sequence[Event]], list[str]]
+    page: Page,
+    enemies: Callable[[TeamView], list[UnitView]],
+    events: Callable[[Page, Sequence[Event]], list[str]],
 ) -> list[str]:
     size = page.task.frames.screen
     lines: list[str] = []  # lists, since a dozen agents have some thousand lines in each step
+    told: set[str] = set()
+    news = _news(page)
     for team in page.teams:
         lines += ["", f"Team {team.name}"] if lines else [f"Team {team.name}"]
         if team.minimap is None:
@@ -65,9 +78,15 @@ def _blocks(
         if team.bounds != (0.0, 0.0, size, size):
             x0, y0, x1, y1 = map(n, team.bounds)
             lines.append(f"{INDENT}Screen on the map: x {x0} to {x1}, y {y0} to {y1}")
-        lines += units(page, team)
+        near = enemies(team)
+        lines += _under_heading("Your units:", _own_lines(page, team))
+        lines += _allies(page, team)
+        lines += _under_heading("Enemy units:", _lines(page, [unit for unit in near if unit.tag not in told]))
+        lines += _under_heading(_AGAIN, _places_again([unit for unit in near if unit.tag in told]))
+        lines += _under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, near)))
         lines += _under_heading("Resources on the screen:", _resource_lines(team.resources))
-        lines += _under_heading("Since the last observation:", events(page, team.events))
+        lines += _under_heading("Since the last observation:", events(page, news[team.name]))
+        told |= {unit.tag for unit in near}
     return lines
 
 
@@ -79,38 +98,20 @@ def _under_heading(heading: str, lines: list[str]) -> list[str]:
 # --- units ----------------------------------------------------------------------------------------------------
 
 
-def _all_units(page: Page, team: TeamView) -> list[str]:
+def _allies(page: Page, team: TeamView) -> list[str]:
+    """Return friends at whom the team can aim one by one, and the others by type; builders get all structures."""
     if page.observation.agent.kind == "builder":
-        return _near(page, team, team.enemies)
-    workers = [unit for unit in team.allies if is_worker(unit.type)]
+        named = [unit for unit in team.allies if is_structure(unit.type)]
+    else:
+        named = list(team.allies[:MOST]) if any(map(_aims_at_friends, team.actions)) else []
     return [
-        *_under_heading("Your units:", _own_lines(page, team)),
-        *_under_heading("Allied units:", _lines(page, _without(team.allies, workers) if workers else team.allies)),
-        *_under_heading("Allied workers:", _group_lines(workers)),
-        *_under_heading("Enemy units:", _lines(page, team.enemies)),
+        *_under_heading("Allied units:", _lines(page, named)),
+        *_under_heading("Allied units by type:", _group_lines(_without(team.allies, named))),
     ]
 
 
-def _near(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
-    """Return own units and some enemies one by one, others by type; builders also get structures one by one."""
-    standing = [unit for unit in team.allies if is_structure(unit.type) and page.observation.agent.kind == "builder"]
-    return [
-        *_under_heading("Your units:", _own_lines(page, team)),
-        *_under_heading("Allied structures:", _lines(page, standing)),
-        *_under_heading("Allied units by type:", _group_lines(_without(team.allies, standing))),
-        *_under_heading("Enemy units:", _lines(page, told)),
-        *_under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
-    ]
-
-
-def _groups(page: Page, team: TeamView, told: Sequence[UnitView]) -> list[str]:
-    """Return own units and some enemies one by one; others by type."""
-    return [
-        *_under_heading("Your units:", _own_lines(page, team)),
-        *_under_heading("Allied units by type:", _group_lines(team.allies)),
-        *_under_heading("Enemy units:", _lines(page, told)),
-        *_under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, told))),
-    ]
+def _aims_at_friends(action: ActionSpec) -> bool:
+    return action.args.count("tag") > action.actors and action.target != "enemy"
 
 
 def _without(units: Sequence[UnitView], told: Sequence[UnitView]) -> list[UnitView]:
@@ -119,18 +120,33 @@ def _without(units: Sequence[UnitView], told: Sequence[UnitView]) -> list[UnitVi
 
 
 def _distance_within(team: TeamView, distance: float) -> list[UnitView]:
-    return [unit for unit in team.enemies if unit.distance is not None and unit.distance <= distance]
+    return [unit for unit in _nearest(team, MOST) if unit.distance is not None and unit.distance <= distance]
 
 
 def _nearest(team: TeamView, count: int) -> list[UnitView]:
     """Return the nearest enemies, in the order of the full list."""
     nearest = sorted(team.enemies, key=lambda unit: (unit.distance or 0.0, unit.tag))[:count]
-    tags = {unit.tag for unit in nearest}
-    return [unit for unit in team.enemies if unit.tag in tags]
+    return _among(team.enemies, nearest)
+
+
+def _weakest(team: TeamView, count: int) -> list[UnitView]:
+    """Return the own units with the smallest share of their health and shield, in the order of the full list."""
+    return _among(team.units, sorted(team.units, key=lambda unit: (_share([unit]), unit.tag))[:count])
+
+
+def _among(units: Sequence[UnitView], chosen: Sequence[UnitView]) -> list[UnitView]:
+    tags = {unit.tag for unit in chosen}
+    return [unit for unit in units if unit.tag in tags]
+
+
+def _share(units: Sequence[UnitView]) -> float:
+    """Return how much of their health and shield units have together, 0 to 1."""
+    full = sum(unit.health_max + unit.shield_max for unit in units)
+    return sum(unit.health + unit.shield for unit in units) / full if full else 1.0
 
 
 def _group_lines(units: Sequence[UnitView]) -> list[str]:
-    """Return the number of units of each type, and about where they are."""
+    """Return the number of units of each type, where they are, and how much is left of them."""
     by_type: dict[str, list[UnitView]] = {}
     for unit in units:
         by_type.setdefault(unit.type, []).append(unit)
@@ -138,22 +154,42 @@ def _group_lines(units: Sequence[UnitView]) -> list[str]:
 
 
 def _group_line(name: str, group: Sequence[UnitView]) -> str:
-    x, y = (round(sum(unit.screen[axis] for unit in group) / len(group), 1) for axis in (0, 1))
-    line = f"{INDENT2}{len(group)} {name} around screen {point((x, y))}"
+    if len(group) <= MOST_PLACES:
+        where = f"at {', '.join(point(unit.screen) for unit in group)}"
+    else:
+        x, y = (round(sum(unit.screen[axis] for unit in group) / len(group), 1) for axis in (0, 1))
+        where = f"around {point((x, y))}"
     distances = [unit.distance for unit in group if unit.distance is not None]
-    return line + (f", the nearest {n(min(distances))} away" if distances else "")
+    away = f" | the nearest {tenth(min(distances))} away" if distances else ""
+    left = f" | {percent(_share(group))} left" if _share(group) < 1 else ""
+    buffs = Counter(buff for unit in group for buff in unit.buffs)
+    under = f" | effects {', '.join(f'{buff} on {count}' for buff, count in buffs.items())}" if buffs else ""
+    return f"{INDENT2}{len(group)} {name} {where}{away}{left}{under}"
 
 
 def _own_lines(page: Page, team: TeamView) -> list[str]:
+    """Return the team's units, with the skills that they can use now, and their places where no screen shows them."""
     size = page.task.frames.screen
-    lines = _lines(page, team.units)
-    for index, unit in enumerate(team.units):
+    units = _weakest(team, MOST) if len(team.units) > MOST else team.units
+    lines = _lines(page, units)
+    for index, unit in enumerate(units):
         if unit.details is not None:
             lines[index] += _skills(unit.details)
         if not (0 <= unit.screen[0] < size and 0 <= unit.screen[1] < size):
             place = point(unit.screen)
             lines[index] = lines[index].replace(place, f"{place} (off screen)", 1)
-    return lines
+    return lines + _group_lines(_without(team.units, units))
+
+
+_AGAIN = "Enemy units told above, by place on this screen and distance:"
+
+
+def _places_again(units: Sequence[UnitView]) -> list[str]:
+    """Return a line for each type of enemies whose condition another team's block has."""
+    by_type: dict[str, list[str]] = {}
+    for unit in units:
+        by_type.setdefault(unit.type, []).append(f"{unit.tag} {point(unit.screen)} {tenth(unit.distance or 0.0)}")
+    return [f"{INDENT2}{name}: {', '.join(told)}" for name, told in by_type.items()]
 
 
 def _lines(page: Page, units: Sequence[UnitView]) -> list[str]:
@@ -166,7 +202,7 @@ def _lines(page: Page, units: Sequence[UnitView]) -> list[str]:
             condition = conditions[tag] = _condition(unit)
         x, y = unit.screen
         distance = unit.distance
-        far = "" if distance is None else f" | distance {n(distance)}"
+        far = "" if distance is None else f" | distance {tenth(distance)}"
         lines.append(f"{INDENT2}{unit.type} | tag {tag} | screen [{n(x)}, {n(y)}]{far}{condition}")
     return lines
 
@@ -176,14 +212,12 @@ def _condition(unit: UnitView) -> str:
     fields = [f"health {whole(unit.health)}/{whole(unit.health_max)}"]
     if unit.shield_max:
         fields.append(f"shield {whole(unit.shield)}/{whole(unit.shield_max)}")
-    if full := unit.health_max + unit.shield_max:
-        fields.append(f"total {whole(100 * (unit.health + unit.shield) / full)}%")
     if unit.energy_max:
         fields.append(f"energy {whole(unit.energy)}/{whole(unit.energy_max)}")
     if unit.build_progress < 1:
         fields.append(f"built {percent(unit.build_progress)}")
-    if (cooldown_s := unit.weapon_cooldown_s) is not None:
-        fields.append(f"weapon in {n(cooldown_s)} s" if cooldown_s else "weapon ready")
+    if unit.weapon_cooldown_s:
+        fields.append(f"weapon in {n(unit.weapon_cooldown_s)} s")
     if unit.orders:
         fields.append(f"order {orders(unit.orders)}")
     fields += [word for word, is_so in (("cloaked", unit.cloaked), ("hallucination", unit.hallucination)) if is_so]
@@ -260,12 +294,32 @@ def _by_kind(events: Sequence[Event]) -> list[tuple[str, list[Event]]]:
     return [(f"{key[1]} {key[2]} {_VERBS[key[0]]}", groups[key]) for key in order]
 
 
+def _news(page: Page) -> dict[str, list[Event]]:
+    """Return what is to be told under each team: of its own units all, of others what no team before it has told."""
+    own = {unit.tag for team in page.teams for unit in team.units}
+    told: set[tuple[str, str]] = set()
+    news: dict[str, list[Event]] = {}
+    for team in page.teams:
+        events = [
+            event
+            for event in team.events
+            if event.alliance == "own" or (event.tag not in own and (event.what, event.tag) not in told)
+        ]
+        told |= {(event.what, event.tag) for event in events}
+        news[team.name] = events
+    return news
+
+
 def _tagged_events(page: Page, events: Sequence[Event]) -> list[str]:
-    """Return one line for all units of a type with the same event."""
+    """Return one line for all units of a type with the same event; own units by their tags, others counted."""
     words = page.conditions
     lines = []
     for what, members in _by_kind(events):
         sign = _SIGNS.get(members[0].what)
+        if members[0].alliance != "own":
+            amount = sum(event.amount or 0.0 for event in members)
+            lines.append(f"{INDENT2}{what}: {len(members)}" + (f",{sign}{whole(amount)} in all" if sign else ""))
+            continue
         if sign is None:
             said = [event.tag for event in members]
         else:

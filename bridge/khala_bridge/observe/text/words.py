@@ -20,6 +20,11 @@ def n(value: float) -> str:
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 
+def tenth(value: float) -> str:
+    """Return a number to a tenth: 12, 12.5."""
+    return f"{value:.1f}".removesuffix(".0")
+
+
 def whole(value: float) -> str:
     """Return a whole number that is 0 only for 0: a living unit has at least 1."""
     return str(max(1, round(value)) if value > 0 else 0)
