@@ -142,8 +142,12 @@ def _identity(briefing: Briefing) -> str:
 
 def _teams(teams: Iterable[TeamSpec]) -> str:
     return "\n".join(
-        f"- {team.name}: {', '.join(team.unit_types)}" + (f". {team.task}" if team.task else "") for team in teams
+        f"- {team.name}: {', '.join(team.unit_types) or _OF_SIDE}" + (f". {team.task}" if team.task else "")
+        for team in teams
     )
+
+
+_OF_SIDE = "no units of its own; units of your whole side carry out its actions"
 
 
 def _knowledge(types: Iterable[str]) -> str:
@@ -153,12 +157,12 @@ def _knowledge(types: Iterable[str]) -> str:
 def _rules(briefing: Briefing) -> str:
     number = briefing.max_actions
     rules = [
-        "You command your own teams only; others are commanded by other agents.",
-        "Rely on what the latest observation says. Units that it does not list are out of sight or dead.",
+        "You command your own teams only.",
+        "Units that the latest observation does not list are out of sight or dead.",
         *_RULES[briefing.agent_kind],
         f"A team carries out at most {number} of your actions a step, one after the other; more are refused.",
         *([_ALONE] if any(action.name.startswith("Select_Unit_") for action in briefing.actions) else []),
-        "An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.",
+        "Your next observation says which actions were refused, and why.",
         _clock(briefing.clock),
     ]
     return "\n".join(f"- {rule}" for rule in rules)
@@ -213,7 +217,7 @@ def _clock(clock: Clock) -> str:
 def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
     used = {argument for action in actions for argument in action.args}
     meanings = {
-        "tag": "the tag of a unit exactly as the observation gives it, hexadecimal with 0x in front",
+        "tag": "the tag of a unit as the observation gives it, with 0x in front",
         "screen": f"a point [x, y] near the team that acts, x and y from 0 to {frames.screen:g} "
         f"with the team's screen centre at {frames.screen / 2:g}; x grows to the right, y grows downwards",
         "minimap": f"a point [x, y] of the whole map, x and y from 0 to {frames.minimap:g}; "
@@ -225,11 +229,15 @@ def _arguments(actions: Iterable[ActionSpec], frames: Frames) -> str:
 def _communication(correspondents: Sequence[Contact], channels: Sequence[str], *, in_text: bool) -> str:
     if not correspondents and not channels:
         return ""
-    lines = [f"- {who.name}" + (f": {who.role}" if who.role else "") for who in correspondents]
+    lines = [f"- {who.name}" + (f": {_first_sentence(who.role)}" if who.role else "") for who in correspondents]
     lines += [f"- {channel}: a channel, heard by all who listen to it" for channel in channels]
     if in_text:
         lines += [manual.MESSAGE, manual.LISTEN] if channels else [manual.MESSAGE]
     return "\n".join(lines)
+
+
+def _first_sentence(text: str) -> str:
+    return " ".join(text.split()).partition(". ")[0].removesuffix(".")
 
 
 def _memory(rule: MemoryRule, *, in_text: bool) -> str:
@@ -273,8 +281,8 @@ def _example(briefing: Briefing) -> tuple[str, str]:
 
 
 _NOT_THIS_GAME = (
-    "This is an example of an observation and an answer, not a situation of this game, and it is shorter than the "
-    "observations to come. Its tags and points mean nothing later on."
+    "This is an example of an observation and an answer, not a situation of this game. Its tags and points mean "
+    "nothing later on."
 )
 
 

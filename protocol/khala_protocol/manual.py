@@ -5,6 +5,7 @@ Prompts are made of them, and a reply that repeats them does not mean it (`khala
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -19,22 +20,42 @@ FORGET: Final = "There is room for {notes} notes; then the oldest one goes.\n<Fo
 VERDICT: Final = "Nothing of this answer can be carried out:"
 """First line of a verdict, on the answer before it."""
 STANDING: Final = """\
-<Standing({call}, until 4:30)> under the heading of a team has the host give this action again and again.
-It is given to idle units of the team; for a team without units, once a step whenever it is possible.
-It ends at 4:30 of the game's clock. Other ends: until 22 Probe (so many, with those in production), until \
-WarpGateResearch (an upgrade), until attacked, until minerals 400. Without an end it goes on until you revoke it.
+<Standing({call}, until 4:30)> under the heading of a team has the host give this action again and again until 4:30 of \
+the game's clock: to idle units of the team, or once a step for a team without units.
+Other ends: until attacked, until minerals 400{made}. Without an end it goes on until you revoke it.
 <Revoke(1)> ends standing order 1. A team has at most {most}; they do not count as actions of a step."""
+MADE: Final = ", until 22 {kind} (with those in production)"
+"""An end for those who train."""
 
 
 def list_actions(actions: Iterable[ActionSpec]) -> str:
-    """Return the actions of an agent, one a line, each with what it does."""
-    return "\n".join(f"- {action.form}: {action.description}".removesuffix(": ") for action in actions)
+    """Return the actions of an agent with what they do.
+
+    Those that do the same share a line, and those that are carried out in the same way a heading, the part of their
+    descriptions before a colon: `Train in a free Gateway:`.
+    """
+    lines: list[str] = []
+    for way, likes in groupby(actions, _way):
+        alike = list(likes)
+        shared = bool(way) and len(alike) > 1
+        lines += [f"{way}:"] if shared else []
+        for said, same in groupby(alike, lambda action: action.description):
+            forms = ", ".join(action.form for action in same)
+            lines.append(f"- {forms}: {said.removeprefix(f'{way}: ') if shared else said}".removesuffix(": "))
+    return "\n".join(lines)
+
+
+def _way(action: ActionSpec) -> str:
+    way, colon, _ = action.description.partition(": ")
+    return way if colon else ""
 
 
 def standing_orders(actions: Iterable[ActionSpec], most: int) -> str:
-    """Return how to give a standing order, with an action of the agent's own as the example."""
-    plain = next((action.name for action in actions if not action.args), None)
-    return STANDING.format(call=f"{plain}()" if plain else "Action(arguments)", most=most)
+    """Return how to give a standing order, with actions of the agent's own as examples."""
+    plain = [action.name for action in actions if not action.args]
+    trained = next((name.removeprefix("Train_") for name in plain if name.startswith("Train_")), "")
+    made = MADE.format(kind=trained) if trained else ""
+    return STANDING.format(call=f"{plain[0]}()" if plain else "Action(arguments)", most=most, made=made)
 
 
 def manual(actions: tuple[ActionSpec, ...]) -> str:

@@ -62,6 +62,7 @@ _RESOURCE = re.compile(rf"(0x[0-9a-f]+) {_POINT} with", re.ASCII)
 _SITE = re.compile(r"^ +(\w+) (0x[0-9a-f]+) at minimap", re.MULTILINE | re.ASCII)
 _FIELD = re.compile(rf"^ +Pylon 0x[0-9a-f]+ at minimap [^,]+,[^,]+, screen {_POINT}", re.MULTILINE | re.ASCII)
 _UNLISTED = re.compile(r"^ {8}[^:\n]+: (.*)", re.MULTILINE)
+_TOGETHER = re.compile(r"(\w+_)\(([^()]*)\)", re.ASCII)
 _FRIENDS = re.compile(r"^    ([\w.-]+)\n((?:        .*\n?)*)", re.MULTILINE | re.ASCII)
 _FRIEND = re.compile(rf"^        \S+: (\d.*) at minimap {_POINT}", re.MULTILINE | re.ASCII)
 _REJECTED = re.compile(r"^    rejected: (.*)", re.MULTILINE)
@@ -416,7 +417,9 @@ def _will(words: str) -> Will:
 
 
 def _read_impossible(situation: Situation, body: str) -> None:
-    situation.impossible = {name for names in _UNLISTED.findall(body) for name in names.split(", ")}
+    for names in _UNLISTED.findall(body):
+        together = re.sub(_TOGETHER, lambda found: ", ".join(found[1] + end for end in found[2].split(", ")), names)
+        situation.impossible.update(together.split(", "))
 
 
 def _read_sites(situation: Situation, body: str) -> None:

@@ -45,22 +45,27 @@ __all__ = [
     "whole_side",
 ]
 
-_ACTING = ("valid_actions", "impossible", "arguments", "standing", "last_actions", "rejections")
+_STEADY = ("unit_knowledge", "arguments", "valid_actions")
+"""What rarely changes stands first: a provider's cache keeps what begins as the prompt before it."""
+_ACTING = ("impossible", "standing", "last_actions", "rejections")
 _ENDING = ("task", "notes", "messages", "communication", "answer")
 
 SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
-    "combat_group": ("game", "teams", "unit_knowledge", *_ACTING, *_ENDING),
+    "combat_group": (*_STEADY, "game", "teams", *_ACTING, *_ENDING),
     "commander": (
-        *("game", "map", "army", "counts", "alerts", "events", "others", "teams", "unit_knowledge"),
+        *_STEADY,
+        *("game", "map", "army", "counts", "alerts", "events", "others", "teams"),
         *_ACTING,
         *_ENDING,
     ),
     "developer": (
+        "arguments",
         *("game", "economy", "counts", "alerts", "events", "structures", "warp", "teams"),
+        "valid_actions",
         *_ACTING,
         *_ENDING,
     ),
-    "builder": ("game", "teams", "counts", "events", "places", *_ACTING, *_ENDING),
+    "builder": ("arguments", "game", "teams", "counts", "events", "places", "valid_actions", *_ACTING, *_ENDING),
 }
 """Names of the sections of a page by the kind of the agent, in their order."""
 

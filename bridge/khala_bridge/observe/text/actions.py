@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from itertools import groupby
 from typing import TYPE_CHECKING
 
+from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2, n, point, under_heading
 
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import ActionCost, TeamView
+    from khala_protocol.messages import ActionCost, TeamView, UnavailableAction
 
 
 MOST_TAGS = 12
@@ -78,13 +80,33 @@ def impossible(page: Page) -> Iterator[str]:
         yield "Not possible now"
     for team in teams:
         yield f"{INDENT}Team {team.name}"
-        yield from (f"{INDENT2}{reason}: {', '.join(names)}" for reason, names in _reasons(team).items())
+        makers = [barred.reason.removeprefix("no ") for barred in team.barred if _lacks_maker(barred)]
+        if makers:
+            yield f"{INDENT2}no {', '.join(dict.fromkeys(makers))}: all that is made there"
+        yield from (f"{INDENT2}{reason}: {_together(names)}" for reason, names in _reasons(team).items())
 
 
 @shorter("impossible", rank=80, says="what is not possible now, and why")
 def nothing_impossible(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
     """Show nothing."""
     yield from ()
+
+
+def _lacks_maker(barred: UnavailableAction) -> bool:
+    """Return whether an action is barred only because nothing stands where its description has it made."""
+    way, colon, _ = catalogue()[barred.action].about.partition(": ")
+    maker = way.partition(" a free ")[2].replace(" ", "")
+    return bool(colon and maker) and barred.reason == f"no {maker}"
+
+
+def _together(names: Sequence[str]) -> str:
+    """Return names with a common beginning together: `Train_(Zealot, Stalker, Adept), Build_Forge`."""
+    words: list[str] = []
+    for verb, likes in groupby(names, lambda name: name.partition("_")[0]):
+        alike = list(likes)
+        ends = ", ".join(name.removeprefix(f"{verb}_") for name in alike)
+        words += [f"{verb}_({ends})"] if len(alike) > 2 else alike  # two are shorter by themselves
+    return ", ".join(words)
 
 
 _TOO_FEW = re.compile(r"(\d+) more (\w+) needed")
@@ -94,6 +116,8 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
     """Return actions by the reason against them; those that are only too dear stand together, with the shortage."""
     reasons: dict[str, list[str]] = {}
     for barred in team.barred:
+        if _lacks_maker(barred):
+            continue
         if too_few := _TOO_FEW.fullmatch(barred.reason):
             reasons.setdefault(f"not enough {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
         else:

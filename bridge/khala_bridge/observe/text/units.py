@@ -70,10 +70,9 @@ def _blocks(
     told: set[str] = set()
     news = _news(page)
     for team in page.teams:
-        lines += ["", f"Team {team.name}"] if lines else [f"Team {team.name}"]
         if team.minimap is None:
-            lines.append(f"{INDENT}Has no units of its own: its actions are carried out by units of your whole side.")
             continue
+        lines += ["", f"Team {team.name}"] if lines else [f"Team {team.name}"]
         lines.append(f"{INDENT}Minimap position: {point(team.minimap)}")
         if team.bounds != (0.0, 0.0, size, size):
             x0, y0, x1, y1 = map(n, team.bounds)
