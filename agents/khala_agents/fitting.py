@@ -134,7 +134,7 @@ def _section(heading: str, reason: str) -> Cut:
 
 def _of_teams(heading: str, reason: str) -> Cut:
     """Return the cut of a list that each team has."""
-    block = re.compile(rf"^( +){heading}:.*\n(?:\1 +.*(?:\n|\Z))*", re.MULTILINE)
+    block = re.compile(rf"^( +){heading}\b[^:\n]*:.*\n(?:\1 +.*(?:\n|\Z))*", re.MULTILINE)
     return Cut(heading, reason, lambda draft: replace(draft, observation=block.sub("", draft.observation)))
 
 
@@ -182,9 +182,8 @@ FEWEST_UNITS: Final = 2
 """Units of a list that stay."""
 
 _OF_OBSERVATION: Final[tuple[Cut, ...]] = (
-    _section("Task", "the system message has it, too"),
-    _section("Communication", "the system message has it, too"),
-    _section("Unit knowledge", "it is the same in all steps, and much of it is known to a model"),
+    _section("Unit knowledge", "much of it is known to a model"),
+    _manual("Your units", "much of it is known to a model"),
     _section("Teams of other agents", "others command them"),
     _section("Map", "it is the same in all steps"),
     _section("Armies", "it counts what stands elsewhere one by one"),
@@ -200,7 +199,7 @@ _OF_OBSERVATION: Final[tuple[Cut, ...]] = (
 )
 _FAR_UNITS: Final = "the farthest units"
 _PICTURES: Final = "pictures"
-_SEEN: Final = frozenset({_FAR_UNITS, _PICTURES, *(cut.name for cut in _OF_OBSERVATION[2:])})
+_SEEN: Final = frozenset({_FAR_UNITS, _PICTURES, *(cut.name for cut in _OF_OBSERVATION)})
 """Parts that an agent must not believe to be empty."""
 
 CUTS: Final[tuple[Cut, ...]] = (

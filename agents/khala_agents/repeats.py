@@ -49,14 +49,15 @@ class Repeats:
     def without(self, observation: str) -> str:
         """Return an observation without its repeats."""
         sections = []
-        for section in _SECTION.split(observation.rstrip("\n")):
+        whole = observation.rstrip("\n")
+        for section in _SECTION.split(whole):
             heading, _, body = section.partition("\n")
             writer = self._writers.get(heading)
             if writer is None:
                 sections.append(section)
             elif lines := list(writer(body)):
                 sections.append("\n".join([heading, *lines]))
-        return "\n\n".join(sections) + "\n"
+        return "\n\n".join(sections) + observation[len(whole) :]
 
     def _task(self, body: str) -> Iterator[str]:
         for line in body.splitlines():

@@ -29,13 +29,13 @@ Defeat all enemy units.
 - Stalker-1: Stalker. Hold the ramp.
 
 # Rules
-- You command your own teams only; others are commanded by other agents.
-- Rely on what the latest observation says. Units that it does not list are out of sight or dead.
+- You command your own teams only.
+- Units that the latest observation does not list are out of sight or dead.
 - Many weapons on one enemy kill it sooner, and a dead enemy no longer shoots: concentrate fire.
 - Fight where you gain more than you lose; pull out units that are about to die for nothing.
 - Abilities that help now come before moving and attacking.
 - A team carries out at most 2 of your actions a step, one after the other; more are refused.
-- An action that was refused is listed in your next observation with the reason. Do not repeat the mistake.
+- Your next observation says which actions were refused, and why.
 - The game stands still while you think; 0.36 s of game time pass between two observations. Answer within 10 s, \
 or your teams go on as before.
 
@@ -45,12 +45,12 @@ or your teams go on as before.
 - <Stop()>
 
 # Arguments
-- tag: the tag of a unit exactly as the observation gives it, hexadecimal with 0x in front
+- tag: the tag of a unit as the observation gives it, with 0x in front
 - screen: a point [x, y] near the team that acts, x and y from 0 to 24 with the team's screen centre at 12; \
 x grows to the right, y grows downwards
 
 # Communication
-- Zealots: They fight hand to hand.
+- Zealots: They fight hand to hand
 - Channel-1: a channel, heard by all who listen to it
 <MessageTo(name, '''text''')> sends a text to one of them; it arrives with their next observation.
 <ListenTo(channel)> lets you hear a channel from the next observation on.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -129,7 +130,10 @@ def test_the_host_writes_what_players_can_read(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     teams = read(text).teams.values()
     units = [unit for team in teams for unit in (*team.own, *team.allies, *team.enemies)]
-    assert len(units) == text.count(" | tag 0x")
+    again = re.findall(r"0x\w+ \[[^\]]*\] [\d.]+", text)
+    grouped = "".join(re.findall(r"Allied units by type:\n((?: {8}.*\n)*)", text))
+    assert sum(bool(unit.tag) for unit in units) == text.count(" | tag 0x") + len(again)
+    assert sum(not unit.tag for unit in units) == sum(map(int, re.findall(r"^ {8}(\d+)", grouped, re.MULTILINE)))
     assert all(unit.hit_points > 0 for unit in units)
     assert all(unit.distance < 100 for team in teams for unit in team.enemies)
     assert all(team.actions for team in teams)

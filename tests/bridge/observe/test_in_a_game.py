@@ -89,7 +89,7 @@ def test_every_kind_of_agent_reads_a_page(game: Any) -> None:
     for observation in observations:
         for agent in observation.agents.values():
             headings = re.findall(r"^\S.*$", agent.text, re.MULTILINE)
-            assert headings[0] == "Game"
+            assert "Game" in headings
             assert headings[-1] == "Answer"
             assert "Valid actions" in headings
 

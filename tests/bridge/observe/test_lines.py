@@ -10,10 +10,11 @@ from s2clientprotocol import raw_pb2
 
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.observe import Feedback, Observer
+from khala_bridge.observe.text.units import MOST, MOST_PLACES
 from khala_bridge.observe.text.words import n, one_line, percent, point, whole
 from khala_protocol.messages import Received
 
-HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80 | total 100% | weapon ready"
+HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80"
 
 
 @pytest.fixture
@@ -102,7 +103,7 @@ def test_a_unit_line_says(change: Any, fields: dict[str, Any], more: str, stalke
     ("fields", "part"),
     [
         ({"health": 0.3}, "health 1/80"),
-        ({"health": 61.5, "shield": 0}, "health 62/80 | shield 0/80 | total 38%"),
+        ({"health": 61.5, "shield": 0}, "health 62/80 | shield 0/80"),
         ({"energy": 50.4, "energy_max": 200}, "energy 50/200"),
         ({"weapon_cooldown": 14.0}, "weapon in 0.62 s"),
     ],
@@ -146,14 +147,43 @@ def test_what_is_being_built_does_not_recover_but_can_be_hit(unit: Any, snapshot
         pylon = unit(2, "Pylon", 18, 16, health=health, build_progress=0.5)
         texts.append(observer.observe(snapshot([head, pylon])).agents["CombatGroupSmac"].text)
     assert "Since the last observation" not in texts[1]
-    assert "        ally Pylon was hit: 0x2 -30\n" in texts[2]
+    assert "        ally Pylon was hit: 1, -30 in all\n" in texts[2]
 
 
-def test_workers_of_the_own_side_are_told_by_number(unit: Any, snapshot: Any, task: Any) -> None:
+def test_others_of_the_own_side_are_told_by_type_place_and_what_is_left_of_them(
+    unit: Any, snapshot: Any, task: Any
+) -> None:
     units = [unit(1, "Stalker", 16, 16), unit(2, "Probe", 12, 16), unit(3, "Probe", 13, 18), unit(4, "Zealot", 14, 16)]
+    units[-1].shield = 25
+    units[-1].buff_ids.append(5)
+    units += [unit(10 + place, "Marine", 16 + place, 17) for place in range(MOST_PLACES + 1)]
     text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text
-    assert re.findall(r"    Allied (.*):\n        (.*?)[ |]", text) == [("units", "Zealot"), ("workers", "2")]
-    assert "        2 Probe around screen [8.5, 11]\n" in text
+    assert (
+        "    Allied units by type:\n"
+        "        9 Marine around [16, 11]\n"
+        "        2 Probe at [8, 12], [9, 10]\n"
+        "        1 Zealot at [10, 12] | 83% left | effects GravitonBeam on 1\n"
+    ) in text
+
+
+def test_of_many_own_units_the_weakest_are_told_one_by_one(unit: Any, snapshot: Any, task: Any) -> None:
+    units = [unit(number, "Stalker", 16, 16, health=80 - number) for number in range(1, MOST + 4)]
+    text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text
+    assert [int(tag, 16) for tag in re.findall(r"Stalker \| tag (\w+)", text)] == list(range(4, MOST + 4))
+    assert "        3 Stalker at [12, 12], [12, 12], [12, 12] | 99% left\n" in text
+
+
+def test_the_nearest_enemies_are_told_one_by_one_and_under_the_next_team_their_places(
+    unit: Any, snapshot: Any, task: Any
+) -> None:
+    own = [unit(1, "Zealot", 16, 16), unit(2, "Stalker", 18, 16)]
+    foes = [unit(10 + place, "Zergling", 19 + place / 2, 16, alliance="enemy") for place in range(MOST + 2)]
+    text = Observer(task("2s3z")).observe(snapshot([*own, *foes])).agents["CombatGroupSmac"].text
+    first, second = text.split("\n\nTeam Stalker-1\n")
+    assert len(re.findall(r"Zergling \| tag \w+ \| screen \[.*\] \| distance [\d.]+ \| health 35/35", first)) == MOST
+    assert "        2 Zergling at [21, 12], [21.5, 12] | the nearest 8.1 away\n" in first
+    assert "by place on this screen and distance:\n        Zergling: 0xa [13, 12] 0.1, 0xb [13.5, 12] 0.6," in second
+    assert "health 35/35" not in second.partition("\n\n")[0]
 
 
 def test_a_team_without_any_unit_leaves_an_agent_with_words_only(base_task: Any, look: Any) -> None:
@@ -175,4 +205,4 @@ def test_what_is_only_too_dear_stands_together(base_task: Any, look: Any, unit: 
     nexus = unit(2, "Nexus", 30, 16, is_powered=True)
     poor = {"minerals": 40, "food_used": 10, "food_cap": 30}
     text = Observer(base_task).observe(look([gateway, nexus], abilities={}, player=poor)).agents["Developer"].text
-    assert "        not enough minerals: Train_Probe (10 missing)\n" in text
+    assert "        minerals missing: Train_Probe 10\n" in text

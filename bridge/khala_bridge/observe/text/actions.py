@@ -119,7 +119,7 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
         if _lacks_maker(barred):
             continue
         if too_few := _TOO_FEW.fullmatch(barred.reason):
-            reasons.setdefault(f"not enough {too_few[2]}", []).append(f"{barred.action} ({too_few[1]} missing)")
+            reasons.setdefault(f"{too_few[2]} missing", []).append(f"{barred.action} {too_few[1]}")
         else:
             reasons.setdefault(barred.reason, []).append(barred.action)
     return reasons
