@@ -145,6 +145,7 @@ class Workshop:
             vision=config.vision,
             pace=config.pace,
             answer=config.answer,
+            detail=config.detail,
             rethink=spec.rethink,
             breaker=self._breakers.setdefault(config.base_url, Breaker(config.base_url, config.breaker)),
         )

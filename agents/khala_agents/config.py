@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Self
 from pydantic import Field, JsonValue, field_validator, model_validator
 
 from khala_agents.answers.form import AnswerForm, AnswerRule
+from khala_agents.fitting import Detail  # noqa: TC001  # pydantic evaluates it
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.effort import Effort  # noqa: TC001  # pydantic evaluates it
@@ -120,6 +121,9 @@ class ModelConfig(Frozen):
     context: int | None = Field(default=None, ge=256)
     """Tokens of prompt and answer together that the model, as its server has loaded it, can hold: longer prompts are
     shortened. None: as the endpoint says, which many do only when they refuse a prompt."""
+    detail: Detail = "full"
+    """How much its prompts say: `short` ones have at most about 2 000 tokens and `tiny` ones 1 000, at four characters
+    a token, whatever is to be left out for that; a small model reads `tiny` ones best."""
     temperature: float | None = Field(default=None, ge=0)
     seed: int | None = None
     stop: tuple[Annotated[str, Field(min_length=1)], ...] = ()

@@ -11,16 +11,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from khala_agents.llm.client import RequestRefused, estimated_tokens
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from khala_agents.llm.vision import Vision
     from khala_protocol.messages import ImageRef
+
+
+Detail = Literal["full", "short", "tiny"]
+DETAILS: Final[Mapping[Detail, int | None]] = {"full": None, "short": 2_000, "tiny": 1_000}
+"""Estimated tokens of whole prompts, by how much detail a model is shown."""
 
 
 class PromptTooLong(RequestRefused):
@@ -66,7 +71,7 @@ class DraftPrompt:
     def messages(self) -> tuple[ChatMessage, ...]:
         """The prompt."""
         unseen = [name for name in self.left_out if name in _SEEN]
-        note = f"\nLeft out here, to fit your context: {', '.join(unseen)}.\n" if unseen else ""
+        note = f"\nLeft out here, to keep this short: {', '.join(unseen)}.\n" if unseen else ""
         said = "\n".join([*filter(None, (self.summary, self.steps)), self.observation]) + note
         system = ChatMessage(role="system", content=self.system)
         content = f"{self.missing}\n{said}" if self.missing else said
@@ -87,6 +92,17 @@ class DraftPrompt:
         Raises:
             PromptTooLong: it has more tokens when all cuts are made.
         """
+        draft = self.shorten(room, vision)
+        if room is not None and draft.tokens(vision) > room:
+            raise PromptTooLong(
+                f"the prompt has about {draft.tokens(vision)} tokens when all that can be is left out, and there is "
+                f"room for {room}: give the model a larger context at its server, or lower max_tokens in its file",
+                status="context",
+            )
+        return draft
+
+    def shorten(self, room: int | None, vision: Vision | None = None) -> DraftPrompt:
+        """Return the prompt with as much left out as `fit` does, or all that can be."""
         draft = self
         if room is None or draft.tokens(vision) <= room:
             return draft
@@ -95,11 +111,7 @@ class DraftPrompt:
                 draft = replace(shorter, left_out=tuple(dict.fromkeys((*shorter.left_out, cut.name))))
                 if draft.tokens(vision) <= room:
                     return draft
-        raise PromptTooLong(
-            f"the prompt has about {draft.tokens(vision)} tokens when all that can be is left out, and there is room "
-            f"for {room}: give the model a larger context at its server, or lower max_tokens in its file",
-            status="context",
-        )
+        return draft
 
     def tokens(self, vision: Vision | None = None) -> int:
         """Return the estimated tokens."""
@@ -214,6 +226,7 @@ CUTS: Final[tuple[Cut, ...]] = (
     _manual("Standing orders", "orders can be given one by one"),
     _manual("Memory", "orders can be given without notes"),
     _manual("Communication", "orders can be given without messages"),
+    _of_teams("What they cost", "what cannot be paid is not among the valid actions"),
     _section("Answer", "the system message has it, too"),
     Cut("descriptions of actions", "their names and arguments stay", _without_descriptions),
     _manual("Rules", "a refusal names the rule that was broken"),

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from khala_agents.answers.form import AnswerShape
-    from khala_agents.fitting import DraftPrompt
+    from khala_agents.fitting import Detail, DraftPrompt
     from khala_agents.llm.client import Scalar
     from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision
@@ -78,6 +78,7 @@ class LLMPolicy(Policy):
         pace: how fast the model is, for the clock `token`; None: the task says.
         answer: the form of its answers.
         rethink: how often it is asked again in a step, if nothing of its answer is possible.
+        detail: how much its prompts say.
         window: its context; shared with the agents of the process that ask the same model.
         rng: jitter of the waits between tries.
     """
@@ -95,6 +96,7 @@ class LLMPolicy(Policy):
         pace: Pace | None = None,
         answer: AnswerRule | None = None,
         rethink: int = 0,
+        detail: Detail = "full",
         window: ContextWindow | None = None,
         rng: random.Random | None = None,
     ) -> None:
@@ -106,6 +108,7 @@ class LLMPolicy(Policy):
         self.pace = pace
         self.answer = answer or AnswerRule()
         self.rethink = rethink
+        self.detail: Detail = detail
         self.window = window or ContextWindow(scale=self.limits.scale)
         self._before: tuple[tuple[Observation, str], ...] = ()
         self._warned_blind = False
@@ -250,7 +253,7 @@ class LLMPolicy(Policy):
 
     def _prompt_for(self, briefing: Briefing) -> Prompt:
         if self._prompt is None or (self._prompt[0] is not briefing and self._prompt[0] != briefing):
-            self._prompt = (briefing, Prompt(briefing, self.answer.form))
+            self._prompt = (briefing, Prompt(briefing, self.answer.form, self.detail))
             self._remember_for(briefing)
         return self._prompt[1]
 

@@ -19,7 +19,7 @@ from khala_agents.answers.wording import (
     how_to_answer_with_tools,
     in_json,
 )
-from khala_agents.fitting import DraftPrompt
+from khala_agents.fitting import DETAILS, DraftPrompt
 from khala_agents.repeats import Repeats
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from khala_agents.answers.form import AnswerForm
+    from khala_agents.fitting import Detail
     from khala_protocol.messages import (
         ActionSpec,
         AgentKind,
@@ -50,15 +51,17 @@ class Prompt:
     Args:
         briefing: of the agent.
         form: of its answers. With `tools` there is no example: an answer in words would teach the wrong form.
+        detail: how much prompts say.
     """
 
-    def __init__(self, briefing: Briefing, form: AnswerForm = "text") -> None:
+    def __init__(self, briefing: Briefing, form: AnswerForm = "text", detail: Detail = "full") -> None:
         seen, said = _example(briefing)
         example = (
             ChatMessage(role="user", content=seen),
             ChatMessage(role="assistant", content=in_json(said, briefing.actions) if form == "json" else said),
         )
         self._draft = DraftPrompt(system_text(briefing, form), () if form == "tools" else example)
+        self._room = DETAILS[detail]
         self._repeats = Repeats(briefing, form_apart=form in ("json", "tools"))
 
     @property
@@ -96,7 +99,7 @@ class Prompt:
             missing: pictures that did not arrive; the prompt says so.
         """
         lost = "".join(f"Not shown, for it did not arrive: {_line(image.title or image.name)}\n" for image in missing)
-        return replace(
+        whole = replace(
             self._draft,
             observation=self._repeats.without(observation_text),
             recalled=tuple(map(self._shown_again, recalled)),
@@ -105,6 +108,7 @@ class Prompt:
             images=images,
             missing=lost,
         )
+        return whole.shorten(self._room)
 
     def _shown_again(self, message: ChatMessage) -> ChatMessage:
         if message.role != "user":

@@ -1,4 +1,4 @@
-"""Measure how long the prompts of battles and games are, what of them a cache keeps, and whether `skilled` wins by them.
+"""Measure the lengths of prompts, what of them a cache keeps, and whether `skilled` wins by them.
 
     python -m bench prompts                                  battles, tasks of the paper, full games
     python -m bench prompts --tasks smac_10m_vs_11m --seeds 1 2 3
@@ -40,7 +40,10 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import ChatMessage
 
-TASKS: Final = ("2s3z_pair", "2s3z", "smac_10m_vs_11m", "smac_27m_vs_30m", "pvz_task4_level1", "pvz_task5_level1", "simple64_eceb")
+TASKS: Final = (
+    *("2s3z_pair", "2s3z", "3s5z", "smac_27m_vs_30m", "pvz_task1_level1", "pvz_task4_level1", "pvz_task5_level1"),
+    "simple64_eceb",
+)
 CROWDS: Final = (10, 30, 100)
 CHARACTERS_PER_TOKEN: Final = 4
 MAX_WAIT_S: Final = 600
@@ -97,7 +100,7 @@ def _read(recording: Recording, task: str, found: dict[str, Figures]) -> None:
         figures.tokens.append(tokens(text))
         figures.head = tokens(written(Prompt(told).messages("")[:-1]))
         if last := before.get(seen.agent):
-            figures.kept.append(len(os.path.commonprefix((text, last))) / len(text))
+            figures.kept.append(len(os.path.commonprefix((text, last))) / len(text))  # noqa: RUF071  # of characters
         before[seen.agent] = text
         for section in seen.text.split("\n\n"):
             figures.sections[section.partition("\n")[0].split(" ")[0]] += tokens(section)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from khala.dataset.row import Row
+    from khala_agents.fitting import Detail
 
 NAME = "README.md"
 _SIZES = {
@@ -87,6 +88,8 @@ class Recipe:
     """Discount of the reward-to-go."""
     images: bool = True
     example: ExampleRule = "weighted"
+    detail: Detail | None = None
+    """How much prompts say; None for what they said when they were sent."""
     dedupe: bool = False
     """Whether a row whose prompt and reply came before is left out."""
     tokenizer: str | None = None
@@ -206,6 +209,8 @@ def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     shares = ", ".join(f"{name} {share:g}" for name, share in zip(split.names, split.shares, strict=True))
     yield f"* Filters: {', '.join(choice.only) or 'none'}. Agents: {agents}."
     yield f"* Splits by {split.by}: {shares}. Its hash says into which a {split.by} falls; see Repeats."
+    if recipe.detail:
+        yield f"* Prompts are made with `detail: {recipe.detail}`, whatever they were when they were sent."
     yield f"* Worked example in the prompts: {_EXAMPLE_WORDS[recipe.example]}."
     left_out = ", ".join(f"{reason}: {count}" for reason, count in sorted(contents.left_out.items()) if count)
     yield f"* Decisions left out: {left_out or 'none'}."

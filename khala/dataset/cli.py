@@ -8,6 +8,7 @@ import typer
 
 from khala.dataset.choose import ExampleRule, Only, RowChoice, Split, SplitBy
 from khala.dataset.files import RowForm
+from khala_agents.fitting import Detail
 from khala_protocol.commandline import say
 
 if TYPE_CHECKING:
@@ -73,6 +74,14 @@ def export(
             "it out. Agents play with it, so a model should be trained with it."
         ),
     ] = "weighted",
+    detail: Annotated[
+        Detail | None,
+        typer.Option(
+            help="Make all prompts with so much detail, as `detail` in a model file does: short ones have about 2 000 "
+            "tokens at most, tiny ones 1 000.",
+            show_default="as they were sent",
+        ),
+    ] = None,
     dedupe: Annotated[
         bool, typer.Option("--dedupe", help="Leave out rows whose prompt and reply came before, word for word.")
     ] = False,
@@ -108,6 +117,7 @@ def export(
         gamma=gamma,
         images=images,
         example=example,
+        detail=detail,
         dedupe=dedupe,
         tokenizer=tokenizer,
     )

@@ -101,7 +101,7 @@ def _fingerprint(directory: Path) -> str:
 def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[Row]:
     """Yield the rows of a recording that pass the filters; count the other decisions."""
     assert recording.run is not None
-    rows = Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images)
+    rows = Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images, detail=recipe.detail)
     for row in rows:
         if why := recipe.choice.why_not(row):
             contents.left_out[why] += 1

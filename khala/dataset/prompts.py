@@ -15,13 +15,19 @@ from khala_agents.prompt import Prompt
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from khala_agents.fitting import Detail
     from khala_protocol.messages import Briefing, ChatMessage, Observation
 
 
 class Prompter:
-    """The prompts of one agent, decision by decision."""
+    """The prompts of one agent, decision by decision.
 
-    def __init__(self) -> None:
+    Args:
+        detail: how much they say.
+    """
+
+    def __init__(self, detail: Detail = "full") -> None:
+        self._detail: Detail = detail
         self._briefing: Briefing | None = None
         self._prompt: Prompt | None = None
         self._memory: PromptMemory = NoMemory()
@@ -30,7 +36,7 @@ class Prompter:
         """Return the prompt for an observation, with its pictures."""
         if self._prompt is None or briefing != self._briefing:
             self._briefing = briefing
-            self._prompt = Prompt(briefing)
+            self._prompt = Prompt(briefing, detail=self._detail)
             self._memory = memory_of(briefing.memory)
         recalled = self._memory.recall(observation)
         return self._prompt.draft(

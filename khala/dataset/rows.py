@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter, OrderedDict, defaultdict
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +24,7 @@ from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Rep
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from khala_agents.fitting import Detail
     from khala_protocol.messages import AgentReport, ChatMessage, Result, Run
     from khala_protocol.recording import Recorded, Recording
 
@@ -94,17 +96,27 @@ class Rows:
         run: its run card.
         gamma: discount of the reward-to-go.
         images: whether rows have their pictures.
+        detail: how much prompts say; None for what they said when they were sent.
 
     Attributes:
         left_out: the number of decisions without a row, by the reason.
     """
 
-    def __init__(self, recording: Recording, run: Run, *, gamma: float = 0.99, images: bool = True) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        run: Run,
+        *,
+        gamma: float = 0.99,
+        images: bool = True,
+        detail: Detail | None = None,
+    ) -> None:
         self.left_out: Counter[str] = Counter()
         self._recording, self._run, self._images = recording, run, images
         self._rewards = rewards(recording, gamma)
         self._results: dict[tuple[str, int], Result] = {(r.side, r.episode): r for r in recording.results}
-        self._prompters: dict[Seat, Prompter] = defaultdict(Prompter)
+        self._as_sent = detail is None
+        self._prompters: dict[Seat, Prompter] = defaultdict(partial(Prompter, detail or "full"))
         self._briefings: dict[Seat, Briefing] = {}
         self._pictures = _Pictures()
         self._open: dict[DecisionPlace, _Open] = {}
@@ -191,10 +203,14 @@ class Rows:
         while len(self._settled) > MOST_WAITING:
             yield self._row(self._settled.pop(next(iter(self._settled))))
 
+    def _prompt(self, decision: _Open) -> tuple[ChatMessage, ...]:
+        """Return the prompt of a row: the recorded one if there is one, and no detail is asked for."""
+        return decision.call.prompt if decision.call is not None and self._as_sent else decision.prompt
+
     def _row(self, decision: _Open) -> Row:
         seen, reply, report, call = decision.seen, decision.reply, decision.report, decision.call
         assert reply is not None and report is not None
-        prompt = _prompt(decision)
+        prompt = self._prompt(decision)
         result = self._results.get((seen.side, seen.episode))
         shown = [ref for message in prompt for ref in message.images if ref.sha256 in decision.pictures]
         return Row(
@@ -210,7 +226,7 @@ class Rows:
             step=seen.step,
             game_loop=seen.game_loop,
             prompt=prompt,
-            prompt_recorded=call is not None,
+            prompt_recorded=call is not None and self._as_sent,
             example=count_example(prompt, decision.example),
             pictures=tuple(RowPicture(ref, decision.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
@@ -225,8 +241,3 @@ class Rows:
             outcome=result.outcome if result else UNFINISHED,
             valid=result.valid if result else False,
         )
-
-
-def _prompt(decision: _Open) -> tuple[ChatMessage, ...]:
-    """Return the prompt of a row: the recorded one if there is one. No other place chooses it."""
-    return decision.prompt if decision.call is None else decision.call.prompt

@@ -235,7 +235,7 @@ def _identity(mind: Minds) -> dict[str, Any]:
 def _model_file(name: str) -> Mapping[str, Any]:
     """Return what a model file says of the answers; how it is reached and limited is no part of that."""
     fields = {"profile", "model", "max_tokens", "temperature", "seed", "extra", "images", "pace", "try_timeout_s"}
-    later = {"answer", "context", "system_role", "stop", "reasoning_effort"}  # matches planned before keep their keys
+    later = {"answer", "context", "detail", "system_role", "stop", "reasoning_effort"}  # older matches keep their keys
     file = load_model(name)
     return file.model_dump(mode="json", include=fields | (later & file.model_fields_set))
 

@@ -39,9 +39,11 @@ def list_actions(actions: Iterable[ActionSpec]) -> str:
         alike = list(likes)
         shared = bool(way) and len(alike) > 1
         lines += [f"{way}:"] if shared else []
-        for said, same in groupby(alike, lambda action: action.description):
-            forms = ", ".join(action.form for action in same)
-            lines.append(f"- {forms}: {said.removeprefix(f'{way}: ') if shared else said}".removesuffix(": "))
+        for _, same in groupby(alike, lambda action: action.description or action.name):
+            first, *others = same
+            forms = ", ".join(action.form for action in (first, *others))
+            said = first.description.removeprefix(f"{way}: ") if shared else first.description
+            lines.append(f"- {forms}: {said}".removesuffix(": "))
     return "\n".join(lines)
 
 

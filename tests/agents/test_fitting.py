@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.fitting import CUTS, Cut, DraftPrompt, PromptTooLong
+from khala_agents.fitting import CUTS, DETAILS, Cut, DraftPrompt, PromptTooLong
 from khala_agents.llm.client import Completion, RequestRefused
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule
@@ -19,6 +19,7 @@ from khala_agents.llm.window import ContextWindow
 from khala_agents.llm_policy import LLMPolicy
 from khala_agents.memory import WholeSteps
 from khala_agents.policy import Context
+from khala_agents.prompt import Prompt
 from khala_protocol.messages import ChatMessage, ImageRef, ModelCall, Usage
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def test_what_an_agent_would_believe_to_be_empty_is_named() -> None:
     draft = DraftPrompt(SYSTEM, observation=OBSERVATION)
     fitted = draft.fit(draft.tokens() - 250)
     assert "Allied units:" not in fitted.messages[-1].content or "Unit knowledge" in fitted.left_out
-    assert f"Left out here, to fit your context: {', '.join(fitted.left_out)}." in fitted.messages[-1].content
+    assert f"Left out here, to keep this short: {', '.join(fitted.left_out)}." in fitted.messages[-1].content
     assert "Zealot | tag 0x100180001" in fitted.messages[-1].content, "enemies stay"
 
 
@@ -123,6 +124,16 @@ def test_actions_keep_their_names_and_arguments() -> None:
     )
 
 
+@pytest.mark.parametrize("page", ["2s3z", "2s3z_pair", "builder", "combatgroup1", "commander", "developer"])
+def test_each_detail_has_its_tokens(page: str, briefing: Callable[..., Briefing]) -> None:
+    text = (GOLDEN / f"{page}.txt").read_text(encoding="utf-8")
+    drafts = {detail: Prompt(briefing(), detail=detail).draft(text) for detail in DETAILS}
+    assert drafts["full"].left_out == ()
+    for detail, room in DETAILS.items():
+        assert room is None or drafts[detail].tokens() <= room
+    assert drafts["tiny"].tokens() <= drafts["short"].tokens() <= drafts["full"].tokens()
+
+
 def test_a_prompt_that_cannot_fit_is_not_sent_and_says_what_to_do() -> None:
     with pytest.raises(PromptTooLong, match="give the model a larger context at its server, or lower max_tokens"):
         full().fit(50)
@@ -130,7 +141,7 @@ def test_a_prompt_that_cannot_fit_is_not_sent_and_says_what_to_do() -> None:
 
 def test_every_heading_of_the_table_is_one_of_an_observation() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in GOLDEN.glob("*.txt"))
-    headings = {line.strip().rstrip(":") for line in re.findall(r"^(?:\S| +Allied).*$", text, re.MULTILINE)}
+    headings = {line.strip().rstrip(":") for line in re.findall(r"^(?:\S| +Allied| +What they).*$", text, re.MULTILINE)}
     own = {"earlier steps", "steps in short", "summary of the game", "worked example", "pictures"}
     own |= {"descriptions of actions", "the farthest units"}
     assert {cut.name for cut in CUTS if not cut.name.endswith("(instructions)")} - own <= headings

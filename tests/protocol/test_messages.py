@@ -12,9 +12,11 @@ from pydantic import ValidationError
 
 from khala_protocol import messages
 from khala_protocol.keys import AGENT_TOPICS, NUMBERED_TOPICS, RUN_TOPICS, Topic
+from khala_protocol.manual import list_actions
 from khala_protocol.messages import (
     MESSAGE_TYPES,
     SCHEMA_VERSION,
+    ActionSpec,
     Briefing,
     Call,
     Frozen,
@@ -147,3 +149,25 @@ def test_a_price_that_is_not_known_is_not_counted_as_zero(
     one: float | None, two: float | None, total: float | None
 ) -> None:
     assert (Usage(cost_usd=one) + Usage(cost_usd=two)).cost_usd == total
+
+
+def test_actions_that_do_the_same_share_a_line_and_those_of_one_way_a_heading() -> None:
+    said = {
+        "Train_A": "Train in a free Gateway: fast.",
+        "Train_B": "Train in a free Gateway: strong.",
+        "Warp_A": "Warp one in.",
+        "Warp_B": "Warp one in.",
+        "Build_A": "Build in an own base: supply.",
+        "Stop": "",
+        "Hold": "",
+    }
+    actions = [ActionSpec(name=name, description=description) for name, description in said.items()]
+    assert list_actions(actions).splitlines() == [
+        "Train in a free Gateway:",
+        "- <Train_A()>: fast.",
+        "- <Train_B()>: strong.",
+        "- <Warp_A()>, <Warp_B()>: Warp one in.",
+        "- <Build_A()>: Build in an own base: supply.",
+        "- <Stop()>",
+        "- <Hold()>",
+    ]

@@ -181,8 +181,8 @@ def test_the_nearest_enemies_are_told_one_by_one_and_under_the_next_team_their_p
     text = Observer(task("2s3z")).observe(snapshot([*own, *foes])).agents["CombatGroupSmac"].text
     first, second = text.split("\n\nTeam Stalker-1\n")
     assert len(re.findall(r"Zergling \| tag \w+ \| screen \[.*\] \| distance [\d.]+ \| health 35/35", first)) == MOST
-    assert "        2 Zergling at [21, 12], [21.5, 12] | the nearest 8.1 away\n" in first
-    assert "by place on this screen and distance:\n        Zergling: 0xa [13, 12] 0.1, 0xb [13.5, 12] 0.6," in second
+    assert "        2 Zergling at [21, 12], [21.5, 12] | the nearest 9 away" in first
+    assert "by place on this screen and distance:\n        Zergling: 0xa [13, 12] 1, 0xb [13.5, 12] 1.5," in second
     assert "health 35/35" not in second.partition("\n\n")[0]
 
 

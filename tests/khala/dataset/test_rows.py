@@ -33,6 +33,13 @@ def reports(change: Callable[[Report], Report]) -> Callable[[Recorded], Iterable
     return lambda sample: [change(sample.message) if isinstance(sample.message, Report) else sample.message]  # type: ignore[list-item]
 
 
+def test_prompts_can_be_made_with_less_detail_than_they_were_sent_with(recording: Recording) -> None:
+    assert recording.run is not None
+    for row in Rows(recording, recording.run, detail="tiny"):
+        assert sum(-(-len(message.content) // 4) for message in row.prompt) <= 1_000
+        assert not row.prompt_recorded
+
+
 def test_every_reply_that_counted_has_a_row(recording: Recording) -> None:
     (result,) = recording.results
     found = rows_of(recording)
