@@ -11,9 +11,12 @@ Pure geometry: no unit, no observation. Above it are `khala_bridge.observe` and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -42,6 +45,15 @@ class MinimapPoint(NamedTuple):
     y: float
 
 
+def central(places: Sequence[tuple[float, float]]) -> int:
+    """Return which of some places is nearest to the middle of most of them; the first of several.
+
+    The middle is the median on each axis, so that a few that are far away do not move it.
+    """
+    x, y = (median(place[axis] for place in places) for axis in (0, 1))
+    return min(range(len(places)), key=lambda index: (places[index][0] - x) ** 2 + (places[index][1] - y) ** 2)
+
+
 @dataclass(frozen=True, slots=True)
 class MapFrame:
     """The map: its size and its playable part in world units, and the size of its minimap."""
@@ -55,6 +67,11 @@ class MapFrame:
     @property
     def _cells_per_unit(self) -> float:
         return self.minimap_size / max(self.width, self.height)
+
+    @property
+    def cell(self) -> float:
+        """World units that a cell of the minimap is wide."""
+        return 1.0 / self._cells_per_unit
 
     def minimap(self, x: float, y: float) -> MinimapPoint:
         """Return the minimap position of a world position."""

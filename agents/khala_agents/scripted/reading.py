@@ -32,6 +32,9 @@ _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
 _WRITE_TO = re.compile(r"^    You can write to: (.*)", re.MULTILINE)
 _EFFECT_ON = re.compile(r"(\w+) on (\d{1,4})", re.ASCII)
+_ON_GROUND = re.compile(
+    rf"^        (?:own|ally|enemy|neutral) (\w+) at ({_POINT}(?:, {_POINT})*)", re.MULTILINE | re.ASCII
+)
 _TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d(?:\.\d)?)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
 _HIT = re.compile(r"^        own \w+ was hit: (.*)", re.MULTILINE)
@@ -184,6 +187,8 @@ class TextTeam:
     """By the name of an action, the arguments that will do; only actions for which not all do."""
     bounds: tuple[float, float, float, float] = (0.0, 24.0, 0.0, 24.0)
     """Part of the screen that lies on the map: x from, to, y from, to."""
+    effects: list[tuple[str, Point]] = field(default_factory=list)
+    """Names and places of effects on the ground."""
     hit: set[str] = field(default_factory=set)
     """Tags of own units that were hit since the last observation."""
     resources: list[Point] = field(default_factory=list)
@@ -328,6 +333,8 @@ def _read_team(situation: Situation, team: TextTeam, body: str) -> None:
                 team.enemies += _told_again(situation, line)
             elif whose == "Allied":
                 team.allies += _group(line)
+    if "Effects on the ground" in body:
+        team.effects = [(found[1], at) for found in _ON_GROUND.finditer(body) for at in points(found[2])]
     if bounds := _SCREEN.search(body):
         x0, x1, y0, y1 = (float(number) for number in bounds.groups())
         team.bounds = (x0, x1, y0, y1)

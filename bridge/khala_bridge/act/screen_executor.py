@@ -28,6 +28,7 @@ from khala_bridge.act.plan import GameRefusal, Plan, PlanResult, PlanStep, refus
 from khala_bridge.act.select import Hand, Missed
 from khala_bridge.catalogue.functions import raw_forms
 from khala_bridge.compat import actions as pysc2
+from khala_bridge.frames import central
 from khala_bridge.state.requests import camera_move
 
 if TYPE_CHECKING:
@@ -143,11 +144,11 @@ class _Tour:
         yield from self.function(function.name, *arguments)
 
     def _home(self, command: Command) -> WorldPoint | None:
-        """Return where a team's head was at the start of the tour; None for a team without a screen of its own."""
+        """Return where a team's middle was at the start of the tour; None for a team without a screen of its own."""
         if command.said is None or command.said.team.camera is None:
             return None
-        heads = (tag for tag in command.said.team.tags if tag in self._start.units)
-        return next((self._start.units[tag].pos for tag in heads), None)
+        places = [self._start.units[tag].pos for tag in command.said.team.tags if tag in self._start.units]
+        return places[central(places)] if places else None
 
     # --- the target -------------------------------------------------------------------------------------------
 

@@ -125,7 +125,12 @@ class Asker(NamedTuple):
             tags = [tag for tag in tags if tag != doers[0].tag]
         if not tags:
             return Lack("no enemy on the screen" + (" that fits" if shown else "") if hostile else "no unit that fits")
-        return None if len(tags) == sum(map(len, shown.values())) else sorted(tags)
+        return None if len(tags) == sum(map(len, shown.values())) else sorted(tags, key=self._away)
+
+    def _away(self, tag: int) -> tuple[float, int]:
+        """Return how far a unit is from the middle of the screen, squared, and its tag."""
+        camera, at = self.around.camera, self.snapshot.units[tag].pos
+        return (((at.x - camera.x) ** 2 + (at.y - camera.y) ** 2) if camera else 0.0, tag)
 
     def _fits(self, action: Action, aim: Aim, doers: Sequence[UnitState]) -> bool:
         function = action.pysc2

@@ -1,10 +1,10 @@
 """One snapshot while views are made of it: the units on each team's screen.
 
-A team sees what its camera shows: a square of 24 world units around its head unit. The camera is virtual: it needs
-no move in the game and does not stop at the border of the map. The team's own units are listed wherever they are,
-with a position outside of the frame if the camera does not reach them; everything else only within it. Neutral units
-(resources, rocks) and larvae are left out; builders get resources apart. A team without units of its own, which
-orders units of the whole side, has no camera and sees nothing.
+A team sees what its camera shows: a square of 24 world units around the one of its units that is nearest to the middle
+of most. The camera is virtual: it needs no move in the game and does not stop at the border of the map. The team's own
+units are listed wherever they are, with a position outside of the frame if the camera does not reach them; everything
+else only within it. Neutral units (resources, rocks) and larvae are left out; builders get resources apart. A team
+without units of its own, which orders units of the whole side, has no camera and sees nothing.
 
 A dozen teams look at a hundred units in each step, so the work has this order:
 
@@ -38,7 +38,8 @@ import numpy as np
 
 from khala_bridge.auto.aims import aim_of
 from khala_bridge.auto.warp import fields
-from khala_bridge.frames import CAMERA_WIDTH, Camera
+from khala_bridge.frames import CAMERA_WIDTH, Camera, central
+from khala_bridge.names import effect_name
 from khala_bridge.observe.arguments import Around
 from khala_bridge.observe.body import body, to_tenth
 from khala_bridge.observe.events import Witnessed
@@ -47,7 +48,7 @@ from khala_bridge.observe.observation import TeamObservation
 from khala_bridge.observe.offers import Possible
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
-from khala_protocol.messages import LOOPS_PER_S, Resources, TeamView, UnitDetails, View
+from khala_protocol.messages import LOOPS_PER_S, EffectView, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -64,6 +65,14 @@ if TYPE_CHECKING:
     from khala_protocol.messages import Alliance as Whose
     from khala_protocol.messages import Frames, Point, UnitView
 
+BARRIERS = frozenset({"ForceField"})
+"""Types of units that are effects on the ground to those who see them."""
+_WHOSE: dict[Alliance, Whose] = {
+    Alliance.OWN: "own",
+    Alliance.ALLY: "ally",
+    Alliance.NEUTRAL: "neutral",
+    Alliance.ENEMY: "enemy",
+}
 UNSEEN_TYPES = frozenset({"Larva", "Cocoon"})
 _HALF = CAMERA_WIDTH / 2
 SLACK = 1e-6
@@ -96,8 +105,8 @@ class SideScene:
         """What each team with units looks at, by agent and team."""
         index = {tag: row for row, tag in enumerate(self.bodies)}
         members = [[index[tag] for tag in tags] for tags in self._teams.values()]
-        heads = [self._order[rows[0]] for rows in members]
-        cameras = [Camera(head.x, head.y, self._screen_size) for head in heads]
+        middles = [self._order[_central(self._order, rows)] for rows in members]
+        cameras = [Camera(middle.x, middle.y, self._screen_size) for middle in middles]
         return dict(zip(self._teams, looks(_arrays(self._order), cameras, members), strict=True))
 
     @functools.cached_property
@@ -132,6 +141,7 @@ class SideScene:
                 promised=self.possible.promised,
             ),
             upgrades=self.snapshot.upgrades,
+            cell=self.world.cell,
             bounds=_edges(self.world.bounds),
         )
 
@@ -153,11 +163,13 @@ class SideScene:
         camera, members, friends, foes = self._looks[team.agent, team.name]
         bodies = [self._order[row] for row in members.rows]
         around = Around(self.world, camera, self._aims(foes.rows), self._aims([*friends.rows, *members.rows]))
-        view = _team_view(team.name, bodies[0].view.minimap, self.possible.for_team(agent, bodies, around)).but(
+        place = to_tenth(self.world.minimap(camera.x, camera.y), self.world.minimap_size)
+        view = _team_view(team.name, place, self.possible.for_team(agent, bodies, around)).but(
             units=self._add_skills(agent, bodies, self._units(members, "own")),
             allies=self._units(friends, "ally"),
             enemies=self._units(foes, "enemy"),
             resources=self._resources_on(camera) if resources else (),
+            effects=self._effects_on(camera),
             bounds=_edges(camera.bounds(self.world)),
         )
         witnessed = Witnessed(*(tuple([self._tags[row] for row in shown.rows]) for shown in (members, friends, foes)))
@@ -200,6 +212,24 @@ class SideScene:
         seen = [b for b in self.resources if on_screen(camera, b)]
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
+    def _effects_on(self, camera: Camera) -> tuple[EffectView, ...]:
+        """Return the effects on the ground that a camera shows, and barriers that belong to nobody, by name."""
+        barriers = (unit for unit in self.snapshot.units.values() if unit.is_neutral and unit.name in BARRIERS)
+        found = [(effect_name(e.effect_id), e.alliance, e.radius, e.places) for e in self.snapshot.effects]
+        found += [(unit.name, unit.alliance, unit.radius, (unit.pos,)) for unit in barriers]
+        made = []
+        for name, alliance, radius, places in sorted(found):
+            shown = [place for place in places if _shows(camera, *place)]
+            if shown:
+                points = tuple(to_tenth(camera.screen(*place), camera.size) for place in shown)
+                made.append(EffectView(name=name, alliance=_WHOSE[alliance], radius=round(radius, 1), screen=points))
+        return tuple(made)
+
+
+def _central(order: Sequence[Body], rows: Sequence[int]) -> int:
+    """Return the row of the unit by which a team's camera stands."""
+    return rows[central([(order[row].x, order[row].y) for row in rows])]
+
 
 def _arrays(order: Sequence[Body]) -> BodyArrays:
     """Return bodies as arrays."""
@@ -225,7 +255,11 @@ def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:
 
 def on_screen(camera: Camera, seen: Body) -> bool:
     """Return True if a camera shows a body."""
-    right, down = seen.x - camera.x, camera.y - seen.y
+    return _shows(camera, seen.x, seen.y)
+
+
+def _shows(camera: Camera, x: float, y: float) -> bool:
+    right, down = x - camera.x, camera.y - y
     return -_HALF <= right < _HALF and -_HALF <= down < _HALF
 
 

@@ -108,6 +108,17 @@ class Event(Frozen):
     """Health and shield lost (`hurt`) or regained (`healed`)."""
 
 
+class EffectView(Frozen):
+    """An effect on the ground that a team's screen shows: a storm, a bile on its way, a force field."""
+
+    name: str
+    """As in PySC2's `features.Effects`; `ForceField`."""
+    alliance: Alliance
+    radius: float
+    """In world units; 0 if the game gives none."""
+    screen: tuple[Point, ...]
+
+
 class ActionCost(Frozen):
     """The cost of a valid action."""
 
@@ -156,6 +167,7 @@ class TeamView(Frozen):
     units: tuple[UnitView, ...] = ()
     allies: tuple[UnitView, ...] = ()
     enemies: tuple[UnitView, ...] = ()
+    effects: tuple[EffectView, ...] = ()
     events: tuple[Event, ...] = ()
     actions: tuple[ActionSpec, ...] = ()
     """Actions that are valid for this team now."""
@@ -378,6 +390,8 @@ class View(Frozen):
     """Seconds on the game's clock: game loop / 22.4."""
     resources: Resources = Resources()
     upgrades: tuple[str, ...] = ()
+    cell: float = 1.0
+    """World units that a cell of the minimap is wide."""
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 64.0, 64.0)
     """The part of the minimap frame that is the playable map: x0, y0, x1, y1."""
     teams: tuple[TeamView, ...] = ()

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from typing import Any
 
 import pytest
 from s2clientprotocol import raw_pb2
 
+from khala_agents.scripted.reading import read
 from khala_bridge.catalogue.functions import functions
+from khala_bridge.frames import WorldPoint
 from khala_bridge.observe import Feedback, Observer
 from khala_bridge.observe.text.units import MOST, MOST_PLACES
 from khala_bridge.observe.text.words import n, one_line, percent, point, whole
+from khala_bridge.state import Alliance, Effect
 from khala_protocol.messages import Received
 
 HEAD = "Stalker | tag 0x1 | screen [12, 12] | health 80/80 | shield 80/80"
@@ -206,3 +210,32 @@ def test_what_is_only_too_dear_stands_together(base_task: Any, look: Any, unit: 
     poor = {"minerals": 40, "food_used": 10, "food_cap": 30}
     text = Observer(base_task).observe(look([gateway, nexus], abilities={}, player=poor)).agents["Developer"].text
     assert "        minerals missing: Train_Probe 10\n" in text
+
+
+def test_effects_on_the_ground_are_told_with_their_place_and_size(unit: Any, snapshot: Any, task: Any) -> None:
+    seen = snapshot([unit(1, "Stalker", 16, 16)])
+    storm = Effect(1, Alliance.ENEMY, 1.5, (WorldPoint(18, 17), WorldPoint(90, 90)))
+    bile = Effect(11, Alliance.ENEMY, 0.0, (WorldPoint(16, 18),))
+    far = Effect(11, Alliance.ENEMY, 0.5, (WorldPoint(90, 90),))
+    seen = dataclasses.replace(seen, effects=(storm, bile, far))
+    text = Observer(task("3s_vs_3z")).observe(seen).agents["CombatGroupSmac"].text
+    assert "    Effects on the ground:\n        enemy CorrosiveBile at [12, 10]\n" in text
+    assert "        enemy PsiStorm at [14, 11], radius 1.5\n" in text
+    assert "[86," not in text
+    assert read(text).teams["Stalker-1"].effects == [("CorrosiveBile", (12.0, 10.0)), ("PsiStorm", (14.0, 11.0))]
+
+
+def test_a_screen_stands_around_the_middle_of_a_team_whatever_one_unit_does(
+    unit: Any, snapshot: Any, task: Any
+) -> None:
+    units = [unit(1, "Stalker", 2, 2), *(unit(tag, "Stalker", 20 + tag, 16) for tag in range(2, 6))]
+    text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text
+    assert "Stalker | tag 0x3 | screen [12, 12]" in text
+    assert "Stalker | tag 0x1 | screen [-9, 26] (off screen)" in text
+
+
+def test_agents_that_name_places_of_the_map_are_told_its_scale(pages: Any) -> None:
+    assert (
+        "as wide as 1 of the screen; distances, ranges and speeds are in cells of the screen\n" in pages({})["Builder"]
+    )
+    assert "Arguments" not in pages({})["CombatGroup1"]

@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue
+from khala_bridge.frames import CAMERA_WIDTH
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2, n, point, under_heading
 
@@ -53,8 +54,8 @@ def _will_do(team: TeamView) -> dict[str, list[str]]:
 
 def _first(tags: Sequence[str]) -> str:
     """Return the first of many tags, and how many there are beside them."""
-    others = f" or {len(tags) - MOST_TAGS} others" if len(tags) > MOST_TAGS else ""
-    return " or ".join(tags[:MOST_TAGS]) + others
+    more = len(tags) - MOST_TAGS
+    return " or ".join(tags[:MOST_TAGS]) + (f" or {more} other{'s' if more > 1 else ''}" if more > 0 else "")
 
 
 def _offers(page: Page) -> Iterable[ActionCost]:
@@ -127,10 +128,13 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
 
 @section("arguments")
 def arguments(page: Page) -> Iterator[str]:
-    """Show where the playable map ends, for actions that take a point of it; the briefing has the rest."""
-    kinds = {kind for team in page.teams for action in team.actions for kind in action.args}
-    if "minimap" in kinds and not page.view.places and (words := _playable(page)):
-        yield "Arguments"
+    """Show the scale of the minimap and where the playable map ends, for agents with actions that take its points."""
+    specs = page.observation.agent.specs()
+    if not any("minimap" in action.args for action in specs):
+        return
+    yield "Arguments"
+    yield f"{INDENT}{_scale(page)}"
+    if not page.view.places and (words := _playable(page)):
         yield f"{INDENT}minimap: {words}"
 
 
@@ -138,6 +142,14 @@ def arguments(page: Page) -> Iterator[str]:
 def no_arguments(page: Page) -> Iterator[str]:  # noqa: ARG001  # a section takes the page
     """Show nothing."""
     yield from ()
+
+
+def _scale(page: Page) -> str:
+    """Return how the cells of both frames compare, and in which of them lengths are told."""
+    screen = CAMERA_WIDTH / page.task.frames.screen
+    cell = n(round(page.view.cell / screen, 2))
+    unit = "cells of the screen" if screen == 1 else f"units, of which a cell of the screen has {n(screen)}"
+    return f"a cell of the minimap is as wide as {cell} of the screen; distances, ranges and speeds are in {unit}"
 
 
 def _playable(page: Page) -> str:

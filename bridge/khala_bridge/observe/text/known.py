@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
-    """Show lines about every type in sight, and of the army that it leads; uses and abilities only of own types."""
+    """Show what is known of every type in sight, and of the army that it leads: most of own types, least of allies."""
     return _written(_types(page), frozenset(page.view.upgrades))
 
 
@@ -40,7 +40,8 @@ def _written(types: _Types, researched: frozenset[str]) -> tuple[str, ...]:
     for name in _all(types):
         heading, *more = short(name, _opponents(name, friends, foes), researched if name in friends else frozenset())
         lines.append(f"{INDENT}{heading}")
-        lines += [f"{INDENT2}{line}" for line in more]
+        if name in types.mine or name in foes:
+            lines += [f"{INDENT2}{line}" for line in more]
         if name in types.mine:
             lines += [f"{INDENT2}{line}" for line in advice(name, researched)]
     return tuple(lines)

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import ActionSpec, Event, OrderView, TeamView, UnitDetails, UnitView
+    from khala_protocol.messages import ActionSpec, EffectView, Event, OrderView, TeamView, UnitDetails, UnitView
 
 MOST = 12
-"""Units of a list that are told one by one: of the team's own the weakest, of enemies the nearest."""
+"""Units of a list that are told one by one: of the team's own the weakest, of enemies the nearest. Pages with more than
+two teams have as many of all their teams as of two."""
 MOST_PLACES = 8
 """Units of a type whose places are told; the middle is told of more."""
 NEAR = 9.0
@@ -39,13 +40,13 @@ FEW, FEWEST = 6, 3
 @section("teams", parts=("resources",))
 def teams(page: Page) -> list[str]:
     """Show one block per team: its place, the units there, and events."""
-    return _blocks(page, lambda team: _nearest(team, MOST), _tagged_events)
+    return _blocks(page, lambda team: _nearest(team, _most(page)), _tagged_events)
 
 
 @shorter("teams", rank=10, says="enemies far from a team are grouped by type")
 def near_units(page: Page) -> list[str]:
     """Show the blocks with far enemies only by type."""
-    return _blocks(page, lambda team: _distance_within(team, NEAR), _tagged_events)
+    return _blocks(page, lambda team: _within(_nearest(team, _most(page)), NEAR), _tagged_events)
 
 
 @shorter("teams", rank=60, says="only the nearest enemies are told one by one, events and other units by type")
@@ -83,6 +84,7 @@ def _blocks(
         lines += _under_heading("Enemy units:", _lines(page, [unit for unit in near if unit.tag not in told]))
         lines += _under_heading(_AGAIN, _places_again([unit for unit in near if unit.tag in told]))
         lines += _under_heading("Other enemy units by type:", _group_lines(_without(team.enemies, near)))
+        lines += _under_heading("Effects on the ground:", _effect_lines(team.effects))
         lines += _under_heading("Resources on the screen:", _resource_lines(team.resources))
         lines += _under_heading("Since the last observation:", events(page, news[team.name]))
         told |= {unit.tag for unit in near}
@@ -118,8 +120,12 @@ def _without(units: Sequence[UnitView], told: Sequence[UnitView]) -> list[UnitVi
     return [unit for unit in units if unit.tag not in tags]
 
 
-def _distance_within(team: TeamView, distance: float) -> list[UnitView]:
-    return [unit for unit in _nearest(team, MOST) if unit.distance is not None and unit.distance <= distance]
+def _most(page: Page) -> int:
+    return max(FEWEST, min(MOST, 2 * MOST // max(1, len(page.teams))))
+
+
+def _within(units: Sequence[UnitView], distance: float) -> list[UnitView]:
+    return [unit for unit in units if unit.distance is not None and unit.distance <= distance]
 
 
 def _nearest(team: TeamView, count: int) -> list[UnitView]:
@@ -144,6 +150,10 @@ def _share(units: Sequence[UnitView]) -> float:
     return sum(unit.health + unit.shield for unit in units) / full if full else 1.0
 
 
+_CARRYING = "Carry"
+"""Beginning of the names of the effects by which workers look loaded."""
+
+
 def _group_lines(units: Sequence[UnitView]) -> list[str]:
     """Return the number of units of each type, where they are, and how much is left of them."""
     by_type: dict[str, list[UnitView]] = {}
@@ -161,7 +171,7 @@ def _group_line(name: str, group: Sequence[UnitView]) -> str:
     distances = [unit.distance for unit in group if unit.distance is not None]
     away = f" | the nearest {tenth(min(distances))} away" if distances else ""
     left = f" | {percent(_share(group))} left" if _share(group) < 1 else ""
-    buffs = Counter(buff for unit in group for buff in unit.buffs)
+    buffs = Counter(buff for unit in group for buff in unit.buffs if not buff.startswith(_CARRYING))
     under = f" | effects {', '.join(f'{buff} on {count}' for buff, count in buffs.items())}" if buffs else ""
     return f"{INDENT2}{len(group)} {name} {where}{away}{left}{under}"
 
@@ -169,7 +179,8 @@ def _group_line(name: str, group: Sequence[UnitView]) -> str:
 def _own_lines(page: Page, team: TeamView) -> list[str]:
     """Return the team's units, with the skills that they can use now, and their places where no screen shows them."""
     size = page.task.frames.screen
-    units = _weakest(team, MOST) if len(team.units) > MOST else team.units
+    most = _most(page)
+    units = _weakest(team, most) if len(team.units) > most else team.units
     lines = _lines(page, units)
     for index, unit in enumerate(units):
         if unit.details is not None:
@@ -256,6 +267,14 @@ def _order(order: OrderView) -> str:
     target = f" {order.target}" if order.target else ""
     place = f" minimap {point(order.minimap)}" if order.minimap else ""
     return f"{order.name}{target}{place}" + (f" {percent(order.progress)}" if order.progress is not None else "")
+
+
+def _effect_lines(effects: Sequence[EffectView]) -> list[str]:
+    lines = []
+    for effect in effects:
+        wide = f", radius {n(effect.radius)}" if effect.radius else ""
+        lines.append(f"{INDENT2}{effect.alliance} {effect.name} at {', '.join(map(point, effect.screen))}{wide}")
+    return lines
 
 
 def _resource_lines(resources: Sequence[UnitView]) -> list[str]:

@@ -58,7 +58,7 @@ def _production(made: Production) -> str:
 
 def _enemy(enemy: EnemyCount) -> str:
     alive = enemy.seen - enemy.dead
-    where = f" at minimap {point(enemy.minimap)}" if enemy.minimap else ""
+    where = f"{', one' if alive > 1 else ''} at minimap {point(enemy.minimap)}" if enemy.minimap else ""
     if not alive:
         return f"{enemy.seen} {enemy.type}, dead"
     if enemy.in_sight == alive:
