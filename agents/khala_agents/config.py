@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Self
 from pydantic import Field, JsonValue, field_validator, model_validator
 
 from khala_agents.answers.form import AnswerForm, AnswerRule
-from khala_agents.fitting import Detail  # noqa: TC001  # pydantic evaluates it
+from khala_agents.detail import Detail  # noqa: TC001  # pydantic evaluates it
 from khala_agents.llm.address import checked_address
 from khala_agents.llm.breaker import BreakerRule
 from khala_agents.llm.effort import Effort  # noqa: TC001  # pydantic evaluates it

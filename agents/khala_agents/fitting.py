@@ -11,21 +11,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from khala_agents.llm.client import RequestRefused, estimated_tokens
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from khala_agents.llm.vision import Vision
     from khala_protocol.messages import ImageRef
-
-
-Detail = Literal["full", "short", "tiny"]
-DETAILS: Final[Mapping[Detail, int | None]] = {"full": None, "short": 2_000, "tiny": 1_000}
-"""Estimated tokens of whole prompts, by how much detail a model is shown."""
 
 
 class PromptTooLong(RequestRefused):

@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from khala_agents.answers.form import AnswerShape
-    from khala_agents.fitting import Detail, DraftPrompt
+    from khala_agents.detail import Detail
+    from khala_agents.fitting import DraftPrompt
     from khala_agents.llm.client import Scalar
     from khala_agents.llm.limits import Ticket
     from khala_agents.llm.vision import Vision

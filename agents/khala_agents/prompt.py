@@ -19,7 +19,8 @@ from khala_agents.answers.wording import (
     how_to_answer_with_tools,
     in_json,
 )
-from khala_agents.fitting import DETAILS, DraftPrompt
+from khala_agents.detail import DETAILS
+from khala_agents.fitting import DraftPrompt
 from khala_agents.repeats import Repeats
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from khala_agents.answers.form import AnswerForm
-    from khala_agents.fitting import Detail
+    from khala_agents.detail import Detail
     from khala_protocol.messages import (
         ActionSpec,
         AgentKind,

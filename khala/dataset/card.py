@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from khala.dataset.row import Row
-    from khala_agents.fitting import Detail
+    from khala_agents.detail import Detail
 
 NAME = "README.md"
 _SIZES = {

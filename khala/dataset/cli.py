@@ -8,7 +8,7 @@ import typer
 
 from khala.dataset.choose import ExampleRule, Only, RowChoice, Split, SplitBy
 from khala.dataset.files import RowForm
-from khala_agents.fitting import Detail
+from khala_agents.detail import Detail
 from khala_protocol.commandline import say
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from khala_agents.prompt import Prompt
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from khala_agents.fitting import Detail
+    from khala_agents.detail import Detail
     from khala_protocol.messages import Briefing, ChatMessage, Observation
 
 

@@ -24,7 +24,7 @@ from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Rep
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from khala_agents.fitting import Detail
+    from khala_agents.detail import Detail
     from khala_protocol.messages import AgentReport, ChatMessage, Result, Run
     from khala_protocol.recording import Recorded, Recording
 

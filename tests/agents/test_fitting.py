@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_agents.build import replay_policies
-from khala_agents.fitting import CUTS, DETAILS, Cut, DraftPrompt, PromptTooLong
+from khala_agents.detail import DETAILS
+from khala_agents.fitting import CUTS, Cut, DraftPrompt, PromptTooLong
 from khala_agents.llm.client import Completion, RequestRefused
 from khala_agents.llm.limits import RequestLimits
 from khala_agents.llm.retry import RetryRule

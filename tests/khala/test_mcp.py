@@ -133,7 +133,7 @@ async def check_resources(client: Client, observed: CallToolResult) -> None:
     assert isinstance(briefing, TextResourceContents)
     assert isinstance(seen, TextResourceContents)
     assert "# How to play with these tools" in briefing.text
-    assert seen.text.startswith("Game\n    Time: 0:00")
+    assert "\n\nGame\n    Time: 0:00" in seen.text
 
 
 @pytest.mark.slow

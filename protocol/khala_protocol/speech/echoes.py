@@ -82,13 +82,15 @@ class ShownText:
         return found
 
     @cached_property
-    def _lists(self) -> set[str]:
-        return {_plain(line) for line in self._lines if line.count("<") > 1}
+    def lists(self) -> frozenset[str]:
+        """Lines with several calls that were shown, now or before, without marks."""
+        own = frozenset(_plain(line) for line in self._lines if line.count("<") > 1)
+        return own if self._earlier is None else own | self._earlier.lists
 
     @cached_property
     def _longest_list(self) -> int:
         """The most characters of a line that may repeat a list: reading stays linear in the length of a line."""
-        return max(map(len, self._lists), default=-LOOKED_AROUND) + LOOKED_AROUND
+        return max(map(len, self.lists), default=-LOOKED_AROUND) + LOOKED_AROUND
 
     def is_echo(self, text: str, start: int, end: int, *, ordered: bool) -> bool:
         """Return whether `text[start:end]` repeats what was shown (rules E1 to E3).
@@ -126,7 +128,7 @@ class ShownText:
             return False
         line = text[line_start:line_end]
         calls = line.count("<")
-        return calls > 1 and (calls >= MANY or not ordered) and _plain(line) in self._lists
+        return calls > 1 and (calls >= MANY or not ordered) and _plain(line) in self.lists
 
 
 NOTHING_SHOWN: Final = ShownText()
