@@ -21,7 +21,7 @@ from khala_agents.answers.wording import (
 )
 from khala_agents.detail import DETAILS
 from khala_agents.fitting import DraftPrompt
-from khala_agents.repeats import Repeats
+from khala_agents.repeats import PromptRepeats
 from khala_protocol import manual
 from khala_protocol.messages import LOOPS_PER_S, ChatMessage
 
@@ -63,7 +63,7 @@ class Prompt:
         )
         self._draft = DraftPrompt(system_text(briefing, form), () if form == "tools" else example)
         self._room = DETAILS[detail]
-        self._repeats = Repeats(briefing, form_apart=form in ("json", "tools"))
+        self._repeats = PromptRepeats(briefing, form_apart=form in ("json", "tools"))
 
     @property
     def stable(self) -> int:

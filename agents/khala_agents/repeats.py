@@ -26,7 +26,7 @@ _CONTACT = re.compile(r"- ([^\s:<]+)(?!: a channel)(?::.*)?$")
 INDENT = "    "
 
 
-class Repeats:
+class PromptRepeats:
     """What the prompts of an agent say in each step.
 
     Args:

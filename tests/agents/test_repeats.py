@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_agents.prompt import Prompt, system_text
-from khala_agents.repeats import Repeats, say_again
+from khala_agents.repeats import PromptRepeats, say_again
 from khala_agents.scripted.reading import read
 from khala_orchestrator.config import load_task
 from khala_orchestrator.match.cards import briefing as brief
@@ -56,7 +56,7 @@ def told(briefing: Callable[..., Briefing]) -> Briefing:
 
 
 def test_what_the_system_message_says_is_left_out_and_what_is_new_stays(told: Briefing) -> None:
-    assert Repeats(told).without(OBSERVATION) == (
+    assert PromptRepeats(told).without(OBSERVATION) == (
         "Unit knowledge\n    Stalker: beaten by Zergling; Blink: Jumps.\n    Zergling: Fast.\n        health 35\n\n"
         "Game\n    Time: 0:01.0\n\n"
         "Task\n    Team Stalker-1: Go to [3, 4].\n\n"
