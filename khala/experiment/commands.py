@@ -156,7 +156,7 @@ async def _until_done(
             with Watcher(stderr_console(), runner, pilot, "pilot") as watcher:
                 runner.see = watcher
                 await runner.play(pilot)
-            if runner.stopped or not await asyncio.to_thread(_goes_on, runner, matches, yes=given["yes"]):
+            if not await asyncio.to_thread(_goes_on, runner, matches, yes=given["yes"]):
                 return runner
         with Watcher(stderr_console(), runner, matches, experiment.name) as watcher:
             runner.see = watcher
@@ -169,24 +169,29 @@ def _budget(experiment: Experiment, usd: float | None) -> ExperimentBudget:
 
 
 def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
-    estimate = runner.estimate(matches)
-    if not runner.knows_anything:
-        runner.stopped = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
-        return False
-    stderr_console().print(words_of(estimate), soft_wrap=True)
+    if runner.knows_anything:
+        estimate = runner.estimate(matches)
+        stderr_console().print(words_of(estimate), soft_wrap=True)
+        runner.stopped = runner.stopped or _why_not_go_on(runner, estimate, yes=yes)
+    else:
+        nothing = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
+        runner.stopped = runner.stopped or nothing
+    return not runner.stopped
+
+
+def _why_not_go_on(runner: Runner, estimate: CostEstimate, *, yes: bool) -> str:
+    """Return why the matches after a pilot are not played; "" if they are."""
     limit = runner.budget.usd
     if limit is not None and estimate.usd is not None and runner.spent.usd + estimate.usd > limit:
-        runner.stopped = (
+        return (
             f"with the rest it would cost more than the budget of {limit:g} USD: raise it, or leave out --pilot to "
             f"play as much as it allows"
         )
-        return False
-    if yes or not estimate.matches or not sys.stdin.isatty():
-        return True
-    if typer.confirm("Play them?", default=True, err=True):
-        return True
-    runner.stopped = "you said no after the pilot"
-    return False
+    if yes or not estimate.matches:
+        return ""
+    if not sys.stdin.isatty():
+        return "nobody was there to say yes after the pilot: --yes plays the rest"
+    return "" if typer.confirm("Play them?", default=True, err=True) else "you said no after the pilot"
 
 
 def words_of(estimate: CostEstimate) -> str:

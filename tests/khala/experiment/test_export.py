@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 from khala.cli import app
 from khala.experiment.commands import shipped_experiments
 from khala.experiment.measures import Measures
-from khala.experiment.plan import plan
+from khala.experiment.plan import cells, plan
 from khala.experiment.spec import Experiment
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
@@ -111,3 +112,38 @@ def test_a_shipped_experiment_can_be_planned(name: str, monkeypatch: pytest.Monk
     matches = planned(name, monkeypatch)
     assert len(matches) == PLANNED[name]
     assert all(match.config.task.rhythm == "paper" for match in matches)
+
+
+def test_a_row_of_a_shipped_table_is_shown_for_a_model_of_ones_own_without_a_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    show = ["experiment", "show", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, [*show, "table2:model=openai/gpt-6,task=2s3z"])
+    assert done.exit_code == 0, done.exception
+    (cell,) = json.loads(done.stdout)["cells"]
+    assert (cell["task"], cell["model"], cell["matches"]) == ("2s3z", "openai/gpt-6", 20)
+    (cell,) = json.loads(CliRunner().invoke(app, [*show, "table2:model=gpt-3.5-turbo,task=2s3z"]).stdout)["cells"]
+    assert cell["matches"] == 50
+    with pytest.raises(ConfigError, match="there is no factor 'modl'; the factors are task, model"):
+        CliRunner().invoke(app, [*show, "table2:modl=silent"], catch_exceptions=False)
+
+
+def test_retired_models_are_named_with_their_successors_before_anything_is_played(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["experiment", "show", "--out", str(tmp_path), "table4:task=pvz_task1_level1"])
+    assert "gpt-3.5-turbo is retired on 2026-10-23; OpenAI names gpt-5.6-terra as its successor" in done.stderr
+
+
+def test_a_table_has_the_repeats_and_the_gaps_of_the_paper_and_the_players_without_a_model() -> None:
+    for name in ("table1", "table2", "table3", "table4"):
+        found = load(shipped_experiments()[name], Experiment)
+        games = {tuple(cell.names.values()): len(cell.seeds) for cell in cells(found)}
+        assert {model for *_, model in games} >= {"silent", "random-legal", "focus-fire", "skilled"}
+        table = found.published
+        assert table is not None
+        for row, of_row in table.rows.items():
+            for column, cell in zip(table.columns, of_row, strict=True):
+                where = {key: text.format(row=row, column=column) for key, text in table.where.items()}
+                assert games.get(tuple(where[factor] for factor in found.factors)) == (
+                    table.games_of(row) if cell else None
+                )
