@@ -29,9 +29,7 @@ SILENCE_WINS = 0.5
 """Share of games that a silent player wins in a cell that measures nothing."""
 MARK = "\N{DAGGER}"
 OF_WINS = "Wins by Boschloo's exact test"
-OF_KD = (
-    "; K/D, of which no interval was published, by a t-test of logarithms that takes published games to vary as ours do"
-)
+OF_KD = "; K/D, unless it is 0 or infinite, by a t-test of logarithms that takes published games to vary as ours do"
 MOST_NAMED = 12
 """Cells that one warning names."""
 
@@ -202,8 +200,9 @@ def _verdict(pair: _Pair, *, wins: float | None, kd: float | None) -> str:
     if wins is None:
         return NONE
     differ = [name for name, p in (("K/D", kd), ("WR", wins)) if p is not None and p < LEVEL]
-    untested = " (K/D not tested)" if kd is None and pair.theirs is not None and pair.theirs.kd is not None else ""
-    return (" and ".join(differ) or "no") + untested
+    if differ:
+        return " and ".join(differ)
+    return "no" if kd is not None or pair.theirs is None or pair.theirs.kd is None else "no (WR alone)"
 
 
 # as texts -------------------------------------------------------------------------------------------------------------
@@ -214,15 +213,15 @@ def _lines(
 ) -> Iterator[tuple[str, ...]]:
     label = place.label
     if any(pair.theirs for pair in pairs):
-        yield (label, "published", *(_marked(_theirs(pair), pair) for pair in pairs))
+        yield (label, "published", *(_with_mark(_theirs(pair), pair) for pair in pairs))
         label = ""
     if any(pair.ours for pair in pairs):
-        yield (label, "here", *(_marked(_ours(pair, only_wins=table.only_wins), pair) for pair in pairs))
+        yield (label, "here", *(_with_mark(_ours(pair, only_wins=table.only_wins), pair) for pair in pairs))
     if any(verdict != NONE for verdict in verdicts):
         yield ("", "differ", *verdicts)
 
 
-def _marked(text: str, pair: _Pair) -> str:
+def _with_mark(text: str, pair: _Pair) -> str:
     return f"{text} {MARK}" if pair.measures_nothing and text != NONE else text
 
 

@@ -78,7 +78,7 @@ def test_our_numbers_stand_below_the_published_ones_with_intervals_and_whether_t
     assert found["gpt-4o", "published"] == ("0.50 (20 [11–33])", "∞ (100 [93–100])")  # the report's
     assert found["gpt-4o", "here"][0].startswith("2.08 [2.0")
     assert found["gpt-4o", "here"][0].endswith("(90 [70–97])")
-    assert found["gpt-4o", "differ"] == ("K/D and WR", "no (K/D not tested)")
+    assert found["gpt-4o", "differ"] == ("K/D and WR", "no (WR alone)")
     assert found["gpt-4o-mini", "differ"] == ("K/D", "–")
     assert ("silent", "here") not in found
 
