@@ -71,7 +71,7 @@ def words_of_idle_wins(idle: Iterable[Idle]) -> list[str]:
         return []
     more = f" and {len(won) - MOST_NAMED} more" if len(won) > MOST_NAMED else ""
     names = "; ".join(won[:MOST_NAMED])
-    return [f"a player that gives no order wins half of its games or more, so that wins measure nothing: {names}{more}"]
+    return [f"a player without orders wins half of its games or more, so that wins measure nothing: {names}{more}"]
 
 
 # the published layout -------------------------------------------------------------------------------------------------
@@ -261,19 +261,13 @@ def _note(table: PublishedTable, pairs: dict[_Place, list[_Pair]]) -> str:
         f"Differ: by more than chance, at 5 % after Holm's correction for all tests of this table. {OF_WINS}{of_kd}.",
     ]
     if any(pair.measures_nothing for pair in cells):
-        sentences.append(f"{MARK}: a player that gives no order wins half of its games or more: it measures nothing.")
-    beaten = [idle >= kd for pair in cells if (kd := _published_kd(pair)) is not None
-              and (idle := _idle_kd(pair)) is not None]  # fmt: skip
-    if any(beaten):
+        sentences.append(f"{MARK}: a player without orders wins half of its games or more: the cell measures nothing.")
+    against = [(pair.idle.summary, pair.theirs) for pair in cells if pair.idle and pair.theirs]
+    if against:
+        wins = sum((ours.won.value or 0.0) > theirs.win_rate for ours, theirs in against)
+        kds = sum((ours.kd.value or 0.0) > theirs.kd for ours, theirs in against if theirs.kd is not None)
+        and_kd = "" if table.only_wins else f", the higher K/D in {kds}"
         sentences.append(
-            f"A player that gives no order has at least the published K/D in {sum(beaten)} of {len(beaten)} cells."
+            f"Of {len(against)} published cells, a player without orders has the higher win rate in {wins}{and_kd}."
         )
     return " ".join(sentences)
-
-
-def _published_kd(pair: _Pair) -> float | None:
-    return pair.theirs.kd if pair.theirs else None
-
-
-def _idle_kd(pair: _Pair) -> float | None:
-    return pair.idle.summary.kd.value if pair.idle else None

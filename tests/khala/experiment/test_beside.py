@@ -88,7 +88,10 @@ def test_a_cell_that_silence_wins_is_marked_and_named_as_one_that_measures_nothi
     play(made, "silent", "3s5z", 9)
     assert all(texts[0].endswith("†") for (_, kind), texts in lines(made).items() if kind != "differ")
     assert not any("†" in texts[1] for texts in lines(made).values())
-    assert "gives no order has at least the published K/D in 2 of 3 cells" in compared(made).note
+    assert (
+        "Of 3 published cells, a player that gives no order has the higher win rate in 1, the higher K/D in 2."
+        in compared(made).note
+    )
     (warning,) = [text for text in report(made.store).document.warnings if "measure nothing" in text]
     assert warning.endswith("measure nothing: 2s3z")
 
