@@ -89,7 +89,7 @@ def test_a_cell_that_silence_wins_is_marked_and_named_as_one_that_measures_nothi
     assert all(texts[0].endswith("†") for (_, kind), texts in lines(made).items() if kind != "differ")
     assert not any("†" in texts[1] for texts in lines(made).values())
     assert (
-        "Of 3 published cells, a player that gives no order has the higher win rate in 1, the higher K/D in 2."
+        "Of 3 published cells, a player without orders has the higher win rate in 1, the higher K/D in 2."
         in compared(made).note
     )
     (warning,) = [text for text in report(made.store).document.warnings if "measure nothing" in text]
