@@ -171,7 +171,7 @@ def _budget(experiment: Experiment, usd: float | None) -> ExperimentBudget:
 def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
     if runner.knows_anything:
         estimate = runner.estimate(matches)
-        stderr_console().print(words_of(estimate), soft_wrap=True)
+        stderr_console().print(words_of(estimate, len(matches)), soft_wrap=True)
         runner.stopped = runner.stopped or _why_not_go_on(runner, estimate, yes=yes)
     else:
         nothing = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
@@ -194,11 +194,11 @@ def _why_not_go_on(runner: Runner, estimate: CostEstimate, *, yes: bool) -> str:
     return "" if typer.confirm("Play them?", default=True, err=True) else "you said no after the pilot"
 
 
-def words_of(estimate: CostEstimate) -> str:
-    """Return an estimate as a sentence."""
+def words_of(estimate: CostEstimate, planned: int) -> str:
+    """Return an estimate as a sentence, with the number of all planned matches."""
     money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
     return (
-        f"after the pilot: {estimate.matches} matches are left, about {money}{estimate.tokens / 1e6:.3g} M tokens and "
+        f"after the pilot: {estimate.matches} of {planned} matches are left, about {money}{estimate.tokens / 1e6:.3g} M tokens and "
         f"{estimate.hours:.2g} hours"
     )
 

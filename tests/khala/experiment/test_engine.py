@@ -106,7 +106,7 @@ def test_a_pilot_estimates_the_rest_and_plays_it_only_for_somebody_who_says_yes(
     file = experiments.write(tmp_path, seeds=2, steps=2)
     run = ["experiment", "run", str(file), "--out", str(tmp_path), "--jobs", "1", "--pilot", "1"]
     told = CliRunner().invoke(app, run)
-    assert "after the pilot: 4 matches are left, about" in told.output
+    assert "after the pilot: 4 of 8 matches are left, about" in told.output
     assert "nobody was there to say yes after the pilot: --yes plays the rest" in told.output
     assert len(Store(tmp_path / "attacked").matches()) == 4
 
