@@ -198,8 +198,8 @@ def words_of(estimate: CostEstimate, planned: int) -> str:
     """Return an estimate as a sentence, with the number of all planned matches."""
     money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
     return (
-        f"after the pilot: {estimate.matches} of {planned} matches are left, about {money}{estimate.tokens / 1e6:.3g} M "
-        f"tokens and {estimate.hours:.2g} hours"
+        f"after the pilot: {estimate.matches} of {planned} matches are left, about {money}"
+        f"{estimate.tokens / 1e6:.3g} M tokens and {estimate.hours:.2g} hours"
     )
 
 
