@@ -103,7 +103,7 @@ def test_every_shipped_model_file_is_tried() -> None:
 def test_a_retired_model_says_since_when_and_its_successor() -> None:
     retired = {name: load_model(name).retired for name in SHIPPED if load_model(name).retired}
     assert set(retired) == {"claude3-haiku", "glm-4-plus", "gpt-3.5-turbo", "gpt-4o", "gpt-4o-mini", "gpt-o1-mini"}
-    assert retired["gpt-3.5-turbo"] == "on 2026-10-23; OpenAI names gpt-5.6-terra as its successor"
+    assert retired["gpt-3.5-turbo"] == "on 2026-10-23; OpenAI named gpt-5.6-terra as its successor"
     assert load_model("gpt-3.5-turbo/gpt-5.6-terra").retired == ""
 
 

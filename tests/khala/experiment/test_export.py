@@ -131,7 +131,7 @@ def test_a_row_of_a_shipped_table_is_shown_for_a_model_of_ones_own_without_a_key
 
 def test_retired_models_are_named_with_their_successors_before_anything_is_played(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["experiment", "show", "--out", str(tmp_path), "table4:task=pvz_task1_level1"])
-    assert "gpt-3.5-turbo is retired on 2026-10-23; OpenAI names gpt-5.6-terra as its successor" in done.stderr
+    assert "gpt-3.5-turbo is retired on 2026-10-23; OpenAI named gpt-5.6-terra as its successor" in done.stderr
 
 
 def test_a_table_has_the_repeats_and_the_gaps_of_the_paper_and_the_players_without_a_model() -> None:
