@@ -83,6 +83,10 @@ class PublishedTable(Frozen):
         """Return what was published at a row and a column, if anything."""
         return self.rows[row][self.columns.index(column)] if row in self.rows else None
 
+    def values_at(self, row: str, column: str) -> dict[str, str]:
+        """Return the values of our factors at a row and a column."""
+        return {name: text.replace("{row}", row).replace("{column}", column) for name, text in self.where.items()}
+
     @property
     def only_wins(self) -> bool:
         """Whether no cell has a K/D."""

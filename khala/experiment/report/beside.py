@@ -124,13 +124,8 @@ def beside(table: PublishedTable, summaries: Sequence[CellSummary], idle: Sequen
 
 def _pairs(table: PublishedTable, summaries: Sequence[CellSummary], idle: Sequence[Idle]) -> dict[_Place, list[_Pair]]:
     """Return the cells of each row: the published rows first, each followed by our other players in it."""
-    found = {
-        (place, column): (summary, place)
-        for summary in summaries
-        if summary.games and (at := _place(table, summary)) is not None
-        for place, column in [at]
-    }
-    published = [_Place(row, table.where.get(MODEL, "").format(row=row) or row) for row in table.rows]
+    found = {at: summary for summary in summaries if summary.games and (at := _place(table, summary)) is not None}
+    published = [_Place(row, table.values_at(row, "").get(MODEL, row)) for row in table.rows]
     others = dict.fromkeys(place for place, _ in found if place not in published)
     of_rows = [other for place in published for other in (place, *(o for o in others if o.row == place.row))]
     places = dict.fromkeys([*of_rows, *others])
@@ -139,7 +134,7 @@ def _pairs(table: PublishedTable, summaries: Sequence[CellSummary], idle: Sequen
             _Pair(
                 theirs=table.cell(place.row, column) if place in published else None,
                 their_games=table.games_of(place.row),
-                ours=found.get((place, column), (None,))[0],
+                ours=found.get((place, column)),
                 idle=next((cell for cell in idle if cell.where == _where(table, place, column)), None),
             )
             for column in table.columns
@@ -150,7 +145,7 @@ def _pairs(table: PublishedTable, summaries: Sequence[CellSummary], idle: Sequen
 
 def _where(table: PublishedTable, place: _Place, column: str) -> dict[str, str]:
     """Return the values of our factors at a place, without the model."""
-    return {name: text.format(row=place.row, column=column) for name, text in table.where.items() if name != MODEL}
+    return {name: value for name, value in table.values_at(place.row, column).items() if name != MODEL}
 
 
 def _place(table: PublishedTable, summary: CellSummary) -> tuple[_Place, str] | None:

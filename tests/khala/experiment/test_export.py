@@ -143,7 +143,7 @@ def test_a_table_has_the_repeats_and_the_gaps_of_the_paper_and_the_players_witho
         assert table is not None
         for row, of_row in table.rows.items():
             for column, cell in zip(table.columns, of_row, strict=True):
-                where = {key: text.format(row=row, column=column) for key, text in table.where.items()}
+                where = table.values_at(row, column)
                 assert games.get(tuple(where[factor] for factor in found.factors)) == (
                     table.games_of(row) if cell else None
                 )
