@@ -97,6 +97,8 @@ class ModelConfig(Frozen):
     """The kind of endpoint; `compatible` for one that speaks OpenAI's chat completions and has no row."""
     model: str = Field(min_length=1)
     """As the endpoint calls it."""
+    retired: str = ""
+    """When its provider ends it or has ended it, and its successor: `on 2026-10-23; …`. Empty while it is served."""
     base_url: str
     """Usually ends in `/v1`."""
     base_url_env: str | None = None
@@ -251,8 +253,10 @@ class ModelConfig(Frozen):
 
     def with_model(self, model: str) -> ModelConfig:
         """Return the same endpoint with another model, whose price its file does not know."""
-        prices = self.prices if self.profile == "scripted" or model == self.model else Prices()
-        return self.model_copy(update={"model": model, "prices": prices})
+        if model == self.model:
+            return self
+        prices = self.prices if self.profile == "scripted" else Prices()
+        return self.model_copy(update={"model": model, "prices": prices, "retired": ""})
 
     @property
     def vision(self) -> Vision | None:

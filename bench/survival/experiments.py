@@ -191,7 +191,7 @@ async def _account(file: Path, out: Path, cap_usd: float | None, pilot: int, slo
         if pilot:
             await runner.play(pilot_of(matches, pilot))
             rest = runner.estimate(matches)
-            print(words_of(rest), file=sys.stderr)
+            print(words_of(rest, len(matches)), file=sys.stderr)
             estimated = runner.spent.usd + (rest.usd or 0.0)
         await runner.play(matches)
     print(f"{len(store.matches())} matches; {runner.stopped}", file=sys.stderr)

@@ -9,4 +9,4 @@ from typing import Final
 _PACKAGE: Final = Path(__file__).resolve().parent
 
 CONFIGS: Final = _PACKAGE if (_PACKAGE / "tasks").is_dir() else _PACKAGE.parent
-"""The directory with `tasks/`, `models/`, `agents/` and `experiments/`."""
+"""The directory with `tasks/`, `models/`, `agents/`, `experiments/` and `published/`."""

@@ -96,8 +96,10 @@ def _shipped() -> str:
     for name in model_files():
         model = load_model(name)
         prices = f"{model.prices.prompt:g} / {model.prices.completion:g}" if model.prices.known else "not given"
-        rows.append((code(name), model.profile, code(model.model), code(model.base_url), *_variables(model), prices))
-    return table(("name", "profile", "model", "base URL", "or at", "key in", "USD per million tokens, in / out"), rows)
+        place = (code(model.model), code(model.base_url), *_variables(model))
+        rows.append((code(name), model.profile, *place, prices, model.retired))
+    money = "USD per million tokens, in / out"
+    return table(("name", "profile", "model", "base URL", "or at", "key in", money, "retired"), rows)
 
 
 def _variables(model: ModelConfig) -> tuple[str, ...]:

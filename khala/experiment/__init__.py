@@ -2,6 +2,7 @@
 
 cli         the commands `khala experiment …`
 spec        the file: factors, fixed settings, seeds, budget
+published   tables of papers, to print beside ours
 plan        the matches of a grid, each under the hash of what it plays
 runner      plays what is missing: pilot, budget, retries
 engine      where a match is played: this machine, or (`ray_engine`) a Ray cluster

@@ -18,7 +18,8 @@ app = typer.Typer(
 RUN_EPILOG = """
 Examples:\n
     khala experiment run smoke\n
-    khala experiment run llm_pysc2 --jobs 4\n
+    khala experiment run table2 --pilot 1 --jobs 4\n
+    khala experiment run table3:model=openai/gpt-5\n
     khala experiment run my_grid.yaml --pilot 2 --budget-usd 20\n
     khala experiment run my_grid.yaml --on ray --address 10.0.0.5:6379
 """
@@ -34,7 +35,12 @@ USUAL_MEASURES = ["win", "kd"]
 Directory = Annotated[Path, typer.Argument(help="Directory of an experiment, or its name below --out.", metavar="DIR")]
 Out = Annotated[Path, typer.Option(help="Directory in which each experiment gets its own.", metavar="DIR")]
 File = Annotated[
-    str, typer.Argument(help="A shipped experiment, see `khala experiment list`, or a .yaml file.", metavar="FILE")
+    str,
+    typer.Argument(
+        help="A shipped experiment, see `khala experiment list`, or a .yaml file; with :factor=value,… a part of it, "
+        "or a row for a model of yours.",
+        metavar="FILE",
+    ),
 ]
 On = Annotated[str, typer.Option(help="Where matches are played: local, or ray for a Ray cluster.", metavar="ENGINE")]
 Jobs = Annotated[

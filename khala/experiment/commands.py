@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import json
+import re
 import signal
 import sys
 from pathlib import Path
@@ -21,25 +22,32 @@ from khala.commands.exit_codes import FAILED, NOT_VALID, SIGNALLED
 from khala.experiment.plan import check_playable, plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store
+from khala.playing.minds import groups_of
+from khala_agents.config import load_model
 from khala_configs import CONFIGS
 from khala_orchestrator.console import stderr_console, stdout_console
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.signals import cancelled_by_signal
+from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
+    from khala.experiment.played import PlayedMatch
     from khala.experiment.runner import CostEstimate, Runner
     from khala.experiment.spec import ExperimentBudget
 
 SHIPPED = "experiments"
+_PART = re.compile(r"(?P<file>.+?):(?P<where>\w+=.+)")
+"""Cells of an experiment: `table3:model=gpt-4o,task=pvz_task1_level1`."""
 
 
 def run(file: str, out: Path, options: dict[str, Any]) -> None:
     """Play the matches of an experiment that were not played yet."""
-    path = path_of(file)
-    experiment = load(path, Experiment)
+    path, experiment = _load(file)
     _play(experiment, Store(out / experiment.name), path, **options)
 
 
@@ -65,7 +73,7 @@ def list_shipped(*, as_json: bool) -> None:
 
 def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
     """Show what an experiment would play."""
-    experiment = load(path_of(file), Experiment)
+    _, experiment = _load(file)
     matches = plan(experiment, game=game)
     _print_cells(experiment, matches, Store(out / experiment.name), as_json=as_json)
 
@@ -74,13 +82,27 @@ def status(directory: Path, *, game: str, out: Path, as_json: bool) -> None:
     """Show how far an experiment is."""
     store = Store.open(directory, out)
     experiment = store.experiment()
-    _print_cells(experiment, plan(experiment, game=game), store, as_json=as_json)
+    _print_cells(experiment, plan(experiment, game=game), store, as_json=as_json, with_added=True)
 
 
 def index(directory: Path, *, out: Path) -> None:
     """Make the index of an experiment again."""
     store = Store.open(directory, out)
     stderr_console().print(f"{store.rebuild()} matches are in {store.directory / 'index.sqlite'}", soft_wrap=True)
+
+
+def _load(text: str) -> tuple[Path, Experiment]:
+    """Return the file of an experiment, and the part of it that a text names: `FILE`, or `FILE:factor=value`."""
+    found = _PART.fullmatch(text)
+    path = path_of(found["file"] if found else text)
+    experiment = load(path, Experiment)
+    if found is None:
+        return path, experiment
+    where = dict(part.partition("=")[::2] for part in re.split(r",(?=\w+=)", found["where"]))
+    try:
+        return path, experiment.only(where)
+    except ValueError as error:
+        raise ConfigError(str(error), source=text) from None
 
 
 def path_of(file: str) -> Path:
@@ -106,6 +128,7 @@ def shipped_experiments() -> dict[str, Path]:
 
 def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any) -> None:
     matches = plan(experiment, game=given["game"])
+    _tell_retired(matches)
     check_playable(matches, _budget(experiment, given["budget_usd"]).usd)
     if file is not None:
         store.begin(file)
@@ -133,7 +156,7 @@ async def _until_done(
             with Watcher(stderr_console(), runner, pilot, "pilot") as watcher:
                 runner.see = watcher
                 await runner.play(pilot)
-            if runner.stopped or not await asyncio.to_thread(_goes_on, runner, matches, yes=given["yes"]):
+            if not await asyncio.to_thread(_goes_on, runner, matches, yes=given["yes"]):
                 return runner
         with Watcher(stderr_console(), runner, matches, experiment.name) as watcher:
             runner.see = watcher
@@ -146,32 +169,37 @@ def _budget(experiment: Experiment, usd: float | None) -> ExperimentBudget:
 
 
 def _goes_on(runner: Runner, matches: list[PlannedMatch], *, yes: bool) -> bool:
-    estimate = runner.estimate(matches)
-    if not runner.knows_anything:
-        runner.stopped = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
-        return False
-    stderr_console().print(words_of(estimate), soft_wrap=True)
+    if runner.knows_anything:
+        estimate = runner.estimate(matches)
+        stderr_console().print(words_of(estimate, len(matches)), soft_wrap=True)
+        runner.stopped = runner.stopped or _why_not_go_on(runner, estimate, yes=yes)
+    else:
+        nothing = "no match of the pilot was valid, so there is nothing to estimate from: `status` says why"
+        runner.stopped = runner.stopped or nothing
+    return not runner.stopped
+
+
+def _why_not_go_on(runner: Runner, estimate: CostEstimate, *, yes: bool) -> str:
+    """Return why the matches after a pilot are not played; "" if they are."""
     limit = runner.budget.usd
     if limit is not None and estimate.usd is not None and runner.spent.usd + estimate.usd > limit:
-        runner.stopped = (
+        return (
             f"with the rest it would cost more than the budget of {limit:g} USD: raise it, or leave out --pilot to "
             f"play as much as it allows"
         )
-        return False
-    if yes or not estimate.matches or not sys.stdin.isatty():
-        return True
-    if typer.confirm("Play them?", default=True, err=True):
-        return True
-    runner.stopped = "you said no after the pilot"
-    return False
+    if yes or not estimate.matches:
+        return ""
+    if not sys.stdin.isatty():
+        return "nobody was there to say yes after the pilot: --yes plays the rest"
+    return "" if typer.confirm("Play them?", default=True, err=True) else "you said no after the pilot"
 
 
-def words_of(estimate: CostEstimate) -> str:
-    """Return an estimate as a sentence."""
+def words_of(estimate: CostEstimate, planned: int) -> str:
+    """Return an estimate as a sentence, with the number of all planned matches."""
     money = "" if estimate.usd is None else f"{estimate.usd:.4f} USD, "
     return (
-        f"after the pilot: {estimate.matches} matches are left, about {money}{estimate.tokens / 1e6:.3g} M tokens and "
-        f"{estimate.hours:.2g} hours"
+        f"after the pilot: {estimate.matches} of {planned} matches are left, about {money}"
+        f"{estimate.tokens / 1e6:.3g} M tokens and {estimate.hours:.2g} hours"
     )
 
 
@@ -205,10 +233,16 @@ def _say_how_it_ended(store: Store, matches: list[PlannedMatch], runner: Runner,
         raise typer.Exit(NOT_VALID)
 
 
-def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Store, *, as_json: bool) -> None:
+def _print_cells(
+    experiment: Experiment, matches: list[PlannedMatch], store: Store, *, as_json: bool, with_added: bool = False
+) -> None:
+    """Print a line for each cell; those of models that are not in the file, but were added to its grid, too."""
     played = store.matches()
     rows: dict[tuple[str, ...], dict[str, Any]] = {}
-    for match in matches:
+    planned = {match.key for match in matches}
+    added = [match for match in played.values() if match.key not in planned] if with_added else []
+    shown: list[PlannedMatch | PlayedMatch] = [*matches, *added]
+    for match in shown:
         row = rows.setdefault(tuple(match.cell.values()), dict(match.cell) | {"matches": 0, "done": 0, "invalid": 0,
                               "crashed": 0, "cost_usd": 0.0, "causes": []})  # fmt: skip
         row["matches"] += 1
@@ -221,12 +255,26 @@ def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Sto
         typer.echo(json.dumps({"cells": list(rows.values()), "not_done": plain}, default=str))
         return
     table = Table(box=None, pad_edge=False, title=f"{experiment.name}: {len(matches)} matches")
-    for column in (*experiment.factors, "done", "not valid", "crashed", "USD", "why"):
+    for column in (*experiment.factors, "done", "not valid", "crashed", "USD"):
         table.add_column(column)
     for row in rows.values():
         names = [str(row.get(factor, "")) for factor in experiment.factors]
         done = f"{row['done']} of {row['matches']}"
         costs = f"{row['cost_usd']:.4f}" if row["cost_usd"] else ""
         numbers = [done, *(str(row[state] or "") for state in ("invalid", "crashed"))]
-        table.add_row(*names, *numbers, costs, "; ".join(row["causes"]))
+        table.add_row(*names, *numbers, costs)
     stdout_console().print(table)
+    for row in rows.values():
+        for cause in row["causes"]:
+            where = ", ".join(str(row.get(factor, "")) for factor in experiment.factors)
+            stdout_console().print(visible_line(f"{where}: {cause}"), soft_wrap=True, markup=False, highlight=False)
+    _tell_retired(matches)
+
+
+def _tell_retired(matches: Iterable[PlannedMatch]) -> None:
+    """Say which models their providers end, and what takes their place."""
+    some = {tuple(map(str, match.minds.values())): match for match in matches}.values()
+    minds = [mind for match in some for _, mind, _ in groups_of(match.config.task, match.minds)]
+    for name in dict.fromkeys(mind.full_name for mind in minds if mind.policy is None):
+        if retired := load_model(name).retired:
+            stderr_console().print(f"{name} is retired {retired}", style="yellow", soft_wrap=True)

@@ -11,9 +11,9 @@ import hashlib
 import itertools
 import json
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from khala.experiment.spec import MOST_MATCHES, Level, Settings, level_of
+from khala.experiment.spec import MOST_MATCHES, Level, level_of
 from khala.playing import games
 from khala.playing.minds import Minds, groups_of, minds_of
 from khala_agents.config import load_model
@@ -27,7 +27,7 @@ from khala_protocol.trust import check_keys, check_trusted
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from khala.experiment.spec import Experiment
+    from khala.experiment.spec import Experiment, Settings
     from khala_bridge.task.config import TaskConfig
 
 KEY_CHARACTERS = 16
@@ -71,17 +71,24 @@ def plan(experiment: Experiment, *, game: str = "simulator") -> list[PlannedMatc
         ConfigError: a cell cannot be played; the text says which and why.
     """
     grid = list(cells(experiment))
-    count = len(grid) * len(experiment.seeds) * experiment.repetitions
+    count = count_matches(experiment)
     if count > MOST_MATCHES:
         raise ConfigError(f"the grid has {count} matches, more than {MOST_MATCHES}: split the experiment")
     name = games.name_of(game)
-    prepared = [_prepare(cell, settings, name) for cell, settings in grid]
+    prepared = [(_prepare(cell, name), cell.seeds) for cell in grid]
+    seeds = dict.fromkeys(seed for cell in grid for seed in cell.seeds)
     planned = [
         cell.match(experiment.name, seed, repetition)
-        for repetition, seed in itertools.product(range(experiment.repetitions), experiment.seeds)
-        for cell in prepared
+        for repetition, seed in itertools.product(range(experiment.repetitions), seeds)
+        for cell, its_seeds in prepared
+        if seed in its_seeds
     ]
     return list({match.key: match for match in planned}.values())
+
+
+def count_matches(experiment: Experiment) -> int:
+    """Return the number of matches of the whole grid."""
+    return sum(len(cell.seeds) for cell in cells(experiment)) * experiment.repetitions
 
 
 def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) -> None:
@@ -109,16 +116,25 @@ def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) ->
             raise ConfigError(f"{_title(match.cell)}: {error}") from None
 
 
-def cells(experiment: Experiment) -> Iterator[tuple[dict[str, str], Settings]]:
-    """Yield each cell of the grid: the names of its values, and its settings."""
+class GridCell(NamedTuple):
+    """One cell of the grid."""
+
+    names: dict[str, str]
+    """Of the factors' values."""
+    settings: Settings
+    seeds: tuple[int, ...]
+
+
+def cells(experiment: Experiment) -> Iterator[GridCell]:
+    """Yield each cell of the grid."""
     for levels in itertools.product(*experiment.factors.values()):
-        cell = dict(zip(experiment.factors, (level.name for level in levels), strict=True))
-        if not any(excluded.items() <= cell.items() for excluded in experiment.exclude):
-            yield from _both_ways(experiment, cell, levels)
+        names = dict(zip(experiment.factors, (level.name for level in levels), strict=True))
+        if not any(excluded.items() <= names.items() for excluded in experiment.exclude):
+            yield from _both_ways(experiment, names, levels)
     for number, included in enumerate(experiment.include, 1):
         chosen = [_included_level(experiment, factor, value, number) for factor, value in included.items()]
-        names = [level.name for level in chosen]
-        yield from _both_ways(experiment, dict(zip(included, names, strict=True)), chosen)
+        names = dict(zip(included, (level.name for level in chosen), strict=True))
+        yield from _both_ways(experiment, names, chosen)
 
 
 def _included_level(experiment: Experiment, factor: str, value: object, number: int) -> Level:
@@ -131,20 +147,21 @@ def _included_level(experiment: Experiment, factor: str, value: object, number: 
         raise ConfigError(str(error), source=f"cell {number} of include", field=factor) from None
 
 
-def _both_ways(
-    experiment: Experiment, cell: dict[str, str], levels: Iterable[Level]
-) -> Iterator[tuple[dict[str, str], Settings]]:
+def _both_ways(experiment: Experiment, names: dict[str, str], levels: Iterable[Level]) -> Iterator[GridCell]:
     settings = experiment.fixed
+    seeds = experiment.seeds
     for level in levels:
         settings = level.settings.over(settings)
+        seeds = level.seeds or seeds
     if not experiment.swap_sides:
-        yield cell, settings
+        yield GridCell(names, settings, seeds)
         return
     if not settings.sides or len(settings.sides) != 2:
-        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_title(cell)} has none")
+        raise ConfigError(f"swap_sides needs the models of two sides, as `sides`: {_title(names)} has none")
     (blue, red), (first, second) = settings.sides, settings.sides.values()
-    yield cell | {SWAPPED: "no"}, settings
-    yield cell | {SWAPPED: "yes"}, settings.model_copy(update={"sides": {blue: second, red: first}})
+    swapped = settings.model_copy(update={"sides": {blue: second, red: first}})
+    yield GridCell(names | {SWAPPED: "no"}, settings, seeds)
+    yield GridCell(names | {SWAPPED: "yes"}, swapped, seeds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,10 +184,10 @@ class _Prepared:
         return PlannedMatch(key, self.cell, seed, repetition, config, self.minds)
 
 
-def _prepare(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
+def _prepare(cell: GridCell, game: str) -> _Prepared:
     try:
-        task = task_of(settings)
-        minds = minds_for(task, settings)
+        task = task_of(cell.settings)
+        minds = minds_for(task, cell.settings)
         list(groups_of(task, minds))  # do minds name agents that are there?
         played = {
             "task": task.model_dump(mode="json"),
@@ -179,8 +196,8 @@ def _prepare(cell: dict[str, str], settings: Settings, game: str) -> _Prepared:
             "minds": {side: _identity(mind) for side, mind in minds.items()},
         }
     except ConfigError as error:
-        raise ConfigError(f"{_title(cell)}: {error}") from None
-    return _Prepared(cell, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
+        raise ConfigError(f"{_title(cell.names)}: {error}") from None
+    return _Prepared(cell.names, task, minds, json.dumps(played, sort_keys=True, separators=(",", ":")))
 
 
 def task_of(settings: Settings) -> TaskConfig:

@@ -37,6 +37,8 @@ SPARE = 1.2
 """A match is begun with so many times what is usual: its last requests are held at the most that they may cost."""
 ROOM = 2.0
 """A match may spend this many times what the dearest one of its cell has cost."""
+FIRST = 0.1
+"""The first match of a cell may spend this part of what is left, if that is more: what others cost says little."""
 _CRASHES = {"lost": "crash", "stopped": "crash", "error": "crash", "timeout": "timeout"}
 
 
@@ -156,7 +158,7 @@ class Runner:
             found = unread(match, tries, crash or "crash", cost_usd), []
         self.store.add(*found)
         if any(row.cause == REFUSED for row, _ in found[1]):
-            self._refused[_minds_of(match)] = found[0].cause
+            self._refused[_minds_of(match)] = self.stopped = found[0].cause
         self.spent.held_usd -= part_usd or 0.0
         if found[0].cause == "budget" and part_usd is not None:
             self._was_short(match.cell, part_usd)
@@ -228,9 +230,10 @@ class Runner:
         if left is None or not any(mind.asks_a_model for mind in match.minds.values()):
             return None
         costs = self._numbers(match, "cost_usd")
-        wanted = ROOM * max(*costs, self._short_usd.get(str(match.cell), 0.0), 0.0)
-        if wanted:
-            return min(left, wanted)
+        short = self._short_usd.get(str(match.cell), 0.0)
+        if wanted := ROOM * max(*costs, short, 0.0):
+            is_first = not short and all(played.cell != match.cell for played in self._played.values())
+            return min(left, max(wanted, FIRST * left) if is_first else wanted)
         return left / max(1, min(self.engine.slots, len(self._waiting) + 1)) if costs else left
 
     def _numbers(self, match: PlannedMatch, name: str) -> list[float]:

@@ -16,10 +16,12 @@ A factor is a setting with several values, or a name of its own whose values are
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping  # noqa: TC003  # pydantic looks at annotations of methods, too
 from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, JsonValue, field_validator, model_validator
 
+from khala.experiment.published import PublishedTable, table_named
 from khala_agents.answers.form import AnswerForm  # noqa: TC001  # pydantic evaluates it
 from khala_bridge.task.maps import Difficulty, Race  # noqa: TC001  # pydantic evaluates them
 from khala_protocol.clock_rule import ClockRule  # noqa: TC001  # pydantic evaluates it
@@ -53,6 +55,10 @@ def _seeds(value: object) -> object:
             raise ValueError(f"there are at most {MOST_SEEDS} seeds")
         return list(range(int(first), int(last) + 1))
     return value
+
+
+Seeds = Annotated[tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], BeforeValidator(_seeds),
+                  Field(min_length=1, max_length=MOST_SEEDS)]  # fmt: skip
 
 
 class Settings(Frozen):
@@ -103,6 +109,8 @@ class Level(Frozen):
 
     name: str
     settings: Settings
+    seeds: Seeds | None = None
+    """Of the cells that have this value, instead of the experiment's: of two such values in a cell the later counts."""
 
 
 class ExperimentBudget(Frozen):
@@ -112,16 +120,6 @@ class ExperimentBudget(Frozen):
     tokens: int | None = Field(default=None, gt=0)
     """Prompt and answer."""
     hours: float | None = Field(default=None, gt=0)
-
-
-class Published(Frozen):
-    """A number from elsewhere to print beside ours, such as one of a paper's tables."""
-
-    where: dict[str, str]
-    """The names of the factors' values that it belongs to; `model` may name one that was not played here."""
-    win_rate: float | None = Field(default=None, ge=0, le=1)
-    kd: float | None = Field(default=None, ge=0)
-    source: str
 
 
 class Experiment(Frozen):
@@ -135,10 +133,9 @@ class Experiment(Frozen):
     """Further cells, each with a value for every factor."""
     exclude: tuple[dict[str, str], ...] = ()
     """Cells that are left out: those that have all of these values."""
-    seeds: Annotated[tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], BeforeValidator(_seeds)] = Field(
-        default=(1,), min_length=1, max_length=MOST_SEEDS
-    )
-    """Of the game: `20` for 1 to 20, `1-20`, or a list. All cells have the same, so that they can be paired."""
+    seeds: Seeds = (1,)
+    """Of the game: `20` for 1 to 20, `1-20`, or a list. All cells have the same, so that they can be paired; a value of
+    a factor may have more or fewer: `{name: small, model: openai, seeds: 50}`."""
     repetitions: int = Field(default=1, ge=1, le=1000)
     """Matches of the same cell and seed; more than one says something only if the model is not deterministic."""
     swap_sides: bool = False
@@ -148,9 +145,8 @@ class Experiment(Frozen):
     """How often a match that crashed is played again; a lost match is a result and is not."""
     match_hours: float = Field(default=6.0, gt=0)
     """A match that takes longer is ended, and counts as crashed."""
-    differs: str = ""
-    """For the report: what in this experiment differs from the one that `published` is of."""
-    published: tuple[Published, ...] = ()
+    published: Annotated[PublishedTable | None, BeforeValidator(table_named)] = None
+    """What others published of the same cells, for the report: the name of a shipped table, or a table."""
 
     @field_validator("factors", mode="before")
     @classmethod
@@ -188,6 +184,29 @@ class Experiment(Frozen):
             raise ValueError("no task is named: give the factor task, or fixed.task")
         return self
 
+    def only(self, where: Mapping[str, str]) -> Self:
+        """Return the experiment with nothing but these values of factors.
+
+        A value that the factor does not have is added where the factor is a setting: a model or a task of one's own.
+
+        Raises:
+            ValueError: there is no such factor or value.
+        """
+        for factor in where:
+            if factor not in self.factors:
+                raise ValueError(f"there is no factor {factor!r}; the factors are {', '.join(self.factors)}")
+        chosen = {factor: (self._level(factor, name),) for factor, name in where.items()}
+        included = tuple(cell for cell in self.include if where.items() <= _names_in(cell).items())
+        return self.model_copy(update={"factors": self.factors | chosen, "include": included})
+
+    def _level(self, factor: str, name: str) -> Level:
+        if (known := {level.name: level for level in self.factors[factor]}.get(name)) is not None:
+            return known
+        if factor in Settings.model_fields:
+            return Level.model_validate(level_of(factor, name))
+        names = ", ".join(level.name for level in self.factors[factor])
+        raise ValueError(f"the factor {factor} has no value {name!r}; its values are {names}")
+
     def _all_have_a_task(self) -> bool:
         return any(all(level.settings.task for level in levels) for levels in self.factors.values())
 
@@ -199,7 +218,8 @@ def level_of(factor: str, value: object) -> dict[str, Any]:
         ValueError: the factor is no setting, and its value has no name.
     """
     if isinstance(value, dict) and "name" in value:
-        return {"name": str(value["name"]), "settings": {k: v for k, v in value.items() if k != "name"}}
+        settings = {name: set_to for name, set_to in value.items() if name not in ("name", "seeds")}
+        return {"name": str(value["name"]), "settings": settings, "seeds": value.get("seeds")}
     if factor in Settings.model_fields:
         return {"name": _word(value), "settings": {factor: value}}
     close = difflib.get_close_matches(factor, Settings.model_fields, n=1)
@@ -214,6 +234,12 @@ def _levels_of(factor: str, values: object) -> object:
     if not isinstance(values, list | tuple):
         raise ValueError(f"the factor {factor} needs a list of values")  # noqa: TRY004  # pydantic wants a ValueError
     return [value if isinstance(value, Level) else level_of(factor, value) for value in values]
+
+
+def _names_in(included: Mapping[str, JsonValue]) -> dict[str, str]:
+    """Return the names of the values of a cell of `include`."""
+    return {factor: str(level_of(factor, value)["name"]) if isinstance(value, dict) else str(value)
+            for factor, value in included.items()}  # fmt: skip
 
 
 def _word(value: object) -> str:

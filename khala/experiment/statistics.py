@@ -306,6 +306,32 @@ def _permutation(statistic: Callable[..., Floats], samples: tuple[Floats, ...], 
     return float(found.pvalue)
 
 
+def variation_of_ratio(over: Sequence[float | None], under: Sequence[float | None]) -> float | None:
+    """Return how much the logarithm of a ratio of sums varies from game to game, as a standard deviation.
+
+    It is that of each game's share of both sums (delta method): with n games, the logarithm of their ratio has this
+    deviation divided by the root of n. None with fewer than two games or a sum of nothing.
+    """
+    killed, lost = _known(over, under)
+    if len(killed) < 2 or not killed.any() or not lost.any():
+        return None
+    return float((killed / killed.mean() - lost / lost.mean()).std(ddof=1))
+
+
+def p_of_published_ratio(
+    ratio: float | None, variation: float | None, games: int, published: float, published_games: int
+) -> float | None:
+    """Return p of a ratio of sums against a published one, of which nothing but the number of games is known.
+
+    Both are assumed to vary alike from game to game: the difference of their logarithms, divided by its standard
+    error from our games, has Student's distribution. None if a ratio is 0 or infinite, or if our games do not vary.
+    """
+    if not ratio or not variation or not published or math.isinf(ratio) or math.isinf(published):
+        return None
+    error = variation * math.sqrt(1 / games + 1 / published_games)
+    return float(2 * stats.t.sf(abs(math.log(ratio / published)) / error, games - 1))
+
+
 # many tests -----------------------------------------------------------------------------------------------------------
 
 

@@ -86,6 +86,11 @@ class Minds:
         model, _, name = text.partition("/")
         return replace(self, model=model, model_name=name or None, base_url=None, policy=None)
 
+    @property
+    def full_name(self) -> str:
+        """The model file, with the model that is asked for instead of the one of the file: `openai/gpt-5`."""
+        return f"{self.model}/{self.model_name}" if self.model_name else self.model
+
     def code(self) -> Iterator[str]:
         """Yield the modules of policies that it names; those of single agents are in groups of their own."""
         yield from filter(None, (module_of(name) for name in (self.policy, self.fallback) if name))

@@ -9,7 +9,8 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from khala.experiment.report.build import count_planned, report
+from khala.experiment.plan import count_matches
+from khala.experiment.report.build import report
 from khala.experiment.store import FILE, INDEX, Store
 from khala.view.library import lines, run_id
 from khala.view.wire import ExperimentLine, ExperimentView, TableCell, TableRow
@@ -37,7 +38,7 @@ def line_of(directory: Path) -> ExperimentLine:
         name=experiment.name,
         description=experiment.description,
         played=len(store.matches()),
-        matches=count_planned(experiment),
+        matches=count_matches(experiment),
     )
 
 

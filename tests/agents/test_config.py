@@ -39,14 +39,23 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 OWN_APIS: dict[str, type[HttpClient[Any]]] = {
-    "anthropic": Anthropic, "gemini": Gemini, "openai-responses": Responses,
+    "anthropic": Anthropic, "claude3-haiku": Anthropic, "gemini": Gemini, "openai-responses": Responses,
 }  # fmt: skip
 SHIPPED = [
     "anthropic",
     "azure",
+    "claude3-haiku",
     "deepseek",
     "gemini",
     "glm",
+    "glm-4-plus",
+    "gpt-3.5-turbo",
+    "gpt-4o",
+    "gpt-4o-mini",
+    "gpt-o1-mini",
+    "llama3.1-405b",
+    "llama3.1-70b",
+    "llama3.1-8b",
     "llamacpp",
     "lmstudio",
     "ollama",
@@ -89,6 +98,13 @@ def test_an_answer_that_fills_the_context_is_a_mistake() -> None:
 
 def test_every_shipped_model_file_is_tried() -> None:
     assert sorted(model_files()) == SHIPPED
+
+
+def test_a_retired_model_says_since_when_and_its_successor() -> None:
+    retired = {name: load_model(name).retired for name in SHIPPED if load_model(name).retired}
+    assert set(retired) == {"claude3-haiku", "glm-4-plus", "gpt-3.5-turbo", "gpt-4o", "gpt-4o-mini", "gpt-o1-mini"}
+    assert retired["gpt-3.5-turbo"] == "on 2026-10-23; OpenAI named gpt-5.6-terra as its successor"
+    assert load_model("gpt-3.5-turbo/gpt-5.6-terra").retired == ""
 
 
 @pytest.mark.parametrize("name", ["anthropic", "deepseek", "gemini", "glm", "openai", "openai-responses"])

@@ -6,6 +6,7 @@
 summary      the numbers of a cell, with intervals
 conditions   how it was played, and what should be the same and is not
 tables       summaries as tables
+beside       published tables with ours, and cells that measure nothing
 calls        what became of calls, by agent and action
 figures      summaries as pictures
 document     what a report consists of, in no format

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from khala.experiment.plan import cells as planned_cells
+from khala.experiment.plan import count_matches
+from khala.experiment.report.beside import beside, idle_cells, words_of_idle_wins
 from khala.experiment.report.calls import calls
 from khala.experiment.report.conditions import conditions, warnings
 from khala.experiment.report.document import ReportDocument, ReportSection
@@ -13,7 +14,7 @@ from khala.experiment.report.html import Html
 from khala.experiment.report.latex import Latex
 from khala.experiment.report.markdown import Markdown
 from khala.experiment.report.summary import cells, summary
-from khala.experiment.report.tables import beside, not_counted, overview, tables
+from khala.experiment.report.tables import not_counted, overview, tables
 from khala.experiment.selection import factors_of
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import make_private, write_together
@@ -61,7 +62,9 @@ def report(store: Store, by: Sequence[str] = ()) -> ExperimentReport:
     done = {match.key for match in played if match.state == "done"}
     groups = cells(played, rows, by)
     summaries = sorted((summary(cell) for cell in groups), key=lambda cell: _place(experiment, cell))
-    compared = beside(experiment.published, summaries)
+    published = experiment.published
+    idle = idle_cells(experiment, summaries)
+    compared = beside(published, summaries, idle) if published else None
     of_cells = tables(summaries)
     sections = [
         ReportSection(
@@ -70,15 +73,21 @@ def report(store: Store, by: Sequence[str] = ()) -> ExperimentReport:
             figures=tuple(figures(summaries)),
         ),
         ReportSection(
-            "Beside what was published", (experiment.differs,) if experiment.differs else (), _existing(compared)
+            "Beside what was published",
+            (published.differs,) if published and published.differs else (),
+            _existing(compared),
         ),
         ReportSection("More", tables=_existing(*of_cells[1:], calls(store.calls(), done))),
         ReportSection("Not counted", tables=_existing(not_counted(summaries))),
         ReportSection("How it was played", tables=(conditions(store, played, rows),)),
     ]
     sections = [section for section in sections if section.tables or section.figures]
-    found = [*warnings(cells(played, rows), played), *_missing(experiment, len(played))]
-    paragraphs = tuple(filter(None, (experiment.description, _count(experiment, summaries, factors_of(played)))))
+    found = [
+        *words_of_idle_wins(idle),
+        *warnings(cells(played, rows), played),
+        *_missing(experiment, len(played)),
+    ]
+    paragraphs = tuple(filter(None, (experiment.description, _count(summaries, factors_of(played)))))
     return ExperimentReport(ReportDocument(experiment.name, paragraphs, tuple(found), tuple(sections)), summaries)
 
 
@@ -111,18 +120,13 @@ def _place(experiment: Experiment, cell: CellSummary) -> list[int]:
     ]
 
 
-def count_planned(experiment: Experiment) -> int:
-    """Return the number of matches of the whole grid."""
-    return len(list(planned_cells(experiment))) * len(experiment.seeds) * experiment.repetitions
-
-
 def _missing(experiment: Experiment, played: int) -> list[str]:
-    count = count_planned(experiment)
+    count = count_matches(experiment)
     return [f"{count - played} of {count} matches were not played yet"] if played < count else []
 
 
-def _count(experiment: Experiment, summaries: Sequence[CellSummary], factors: Sequence[str]) -> str:
+def _count(summaries: Sequence[CellSummary], factors: Sequence[str]) -> str:
     games = sum(cell.games for cell in summaries)
     costs = [cell.usd * cell.games for cell in summaries if cell.usd is not None]
     money = f" They cost {sum(costs):.2f} USD." if any(costs) else ""
-    return f"{games} games in {len(summaries)} cells of {', '.join(factors)}; {len(experiment.seeds)} seeds.{money}"
+    return f"{games} games in {len(summaries)} cells of {', '.join(factors)}.{money}"

@@ -28,10 +28,15 @@ SPECIAL = {
     "[": "{[}", "]": "{]}", "*": "{*}",  # would be options of the command before them, such as the end of a row
     "|": r"\textbar{}", '"': r"\textquotedbl{}", "\N{EN DASH}": "--", "—": "---", "\N{MINUS SIGN}": "$-$",
     "∞": r"$\infty$", "…": r"\ldots{}", "·": r"$\cdot$", "\N{MULTIPLICATION SIGN}": r"$\times$",
+    "\N{DAGGER}": r"\dag{}",
 }  # fmt: skip
 SIZE = r"width=0.9\textwidth,height=0.85\textheight,keepaspectratio"
 WIDE = 9
 """With more columns a table stands across the page."""
+PORTRAIT = 110
+"""Characters of the longest cells of a row; with more a table stands across the page, with more than `LANDSCAPE` in the
+smallest letters."""
+LANDSCAPE = 150
 LONG_TEXT = 40
 """Characters; a column with longer words breaks lines."""
 
@@ -66,9 +71,11 @@ class Latex(DocumentWriter):
         return rf"\subsubsection*{{{self._escape(title)}}}"
 
     def _table(self, table: ReportTable) -> Iterator[str]:
-        wide = len(table.columns) > WIDE
+        width = sum(min(max(map(len, cells)), LONG_TEXT) for cells in zip(table.columns, *table.rows, strict=True))
+        wide = len(table.columns) > WIDE or width > PORTRAIT
+        size = r"\small" if width <= LANDSCAPE else r"\scriptsize"
         yield r"\begin{landscape}" if wide else r"\begingroup"
-        yield rf"\small\begin{{longtable}}{{@{{}}{''.join(_columns(table))}@{{}}}}"
+        yield rf"{size}\begin{{longtable}}{{@{{}}{''.join(_columns(table))}@{{}}}}"
         if any(table.columns):
             yield rf"\toprule {self._row(table.columns)} \midrule\endhead"
         else:

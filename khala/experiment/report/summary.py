@@ -54,6 +54,8 @@ class CellSummary:
     """Share of decisions that the agents made themselves."""
     kd: Interval
     """Value killed in all games / value lost in all games."""
+    kd_variation: float | None
+    """How much the logarithm of K/D varies from game to game."""
     length_s: float | None
     """Median of the games, in seconds of the game."""
     accepted: float | None
@@ -140,13 +142,15 @@ def summary(cell: Cell) -> CellSummary:
     wins = sum(row["outcome"] == "win" for row in rows)
     costs = [cost for row in rows if (cost := _usd(row)) is not None]
     expansions = _known(rows, "expansion_s")
+    values = [row["killed_value"] for row in rows], [row["lost_value"] for row in rows]
     return CellSummary(
         where=cell.where,
         games=games,
         won=statistics.wilson(wins, games),
         draws=sum(row["outcome"] == "draw" for row in rows),
         decided=_decided_share(rows),
-        kd=statistics.ratio_of_sums([row["killed_value"] for row in rows], [row["lost_value"] for row in rows]),
+        kd=statistics.ratio_of_sums(*values),
+        kd_variation=statistics.variation_of_ratio(*values),
         length_s=_median(rows, "game_s"),
         accepted=_mean(rows, "accepted"),
         refused=_mean(rows, "rejected"),

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from khala.experiment.report.summary import CellSummary
-    from khala.experiment.spec import Published
 
 
 MOST_COLUMNS = 4
@@ -161,33 +160,6 @@ def not_counted(summaries: Sequence[CellSummary]) -> ReportTable | None:
         "Invalid: played, and says nothing about its agents. Crashed: not played to its end. `resume` plays them again."
     )
     return ReportTable("Not counted", (*factors, *causes), tuple(rows), len(factors), note)
-
-
-def beside(published: Sequence[Published], summaries: Sequence[CellSummary]) -> ReportTable | None:
-    """Return published numbers beside ours; None if none was published."""
-    rows = [_row(result, ours) for result in published for ours in _matching(result, summaries)]
-    columns = ("published of", "source", "ours", "won there", "won here", "K/D there", "K/D here", "games here")
-    return ReportTable("Beside what was published", columns, tuple(rows), 3) if rows else None
-
-
-def _matching(result: Published, summaries: Sequence[CellSummary]) -> list[CellSummary | None]:
-    """Return the cells that a published number belongs to; `model` may be one that was not played."""
-    ours = [other for other in summaries if all(other.where.get(name, value) == value or name == "model"
-            for name, value in result.where.items()) and _names_a_factor(result, other)]  # fmt: skip
-    exact = [other for other in ours if other.where.get("model") == result.where.get("model")]
-    return list(exact or ours) or [None]
-
-
-def _names_a_factor(result: Published, summary: CellSummary) -> bool:
-    return any(name in summary.where for name in result.where)
-
-
-def _row(result: Published, ours: CellSummary | None) -> tuple[str, ...]:
-    there = (", ".join(result.where.values()), result.source)
-    if ours is None:
-        return (*there, "not played", share(result.win_rate), NONE, ratio(result.kd), NONE, NONE)
-    rates = (share(result.win_rate), share_with(ours.won), ratio(result.kd), ratio_with(ours.kd))
-    return (*there, ", ".join(ours.where.values()), *rates, str(ours.games))
 
 
 def _won_and_kd(summary: CellSummary | None) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from bench.survival import experiments
 from khala.cli import app
+from khala.commands.exit_codes import NOT_VALID
 from khala.experiment.engine import Local
 from khala.experiment.plan import plan
 from khala.experiment.spec import Experiment
@@ -83,6 +84,31 @@ def test_an_experiment_from_the_command_line(tmp_path: Path) -> None:
         assert index.execute("select count(*) from results").fetchone() == (4,)
     again = CliRunner().invoke(app, ["experiment", "resume", "attacked", "--out", str(tmp_path)])
     assert "4 of 4 matches were played before" in again.output
+
+
+@pytest.mark.timeout(120)
+def test_a_model_that_its_endpoint_does_not_have_ends_the_run_in_the_first_step_with_the_reason(tmp_path: Path) -> None:
+    file = tmp_path / "nobody.yaml"
+    file.write_text("{name: nobody, factors: {task: [2s3z], model: [scripted/nobody]}, seeds: 3}")
+    run = ["experiment", "run", str(file), "--out", str(tmp_path), "--jobs", "1", "--pilot", "1"]
+    told = CliRunner().invoke(app, run)
+    assert told.exit_code == NOT_VALID
+    assert "not all were played: the endpoint of blue/CombatGroupSmac will not answer it" in told.output
+    assert "http 404: there is no model 'nobody'" in told.output
+    (row,) = Store(tmp_path / "nobody").results()
+    assert row["steps"] <= 1
+    status = CliRunner().invoke(app, ["experiment", "status", "nobody", "--out", str(tmp_path)])
+    assert "2s3z, scripted/nobody: the endpoint of blue/CombatGroupSmac will not answer it" in status.stdout
+
+
+@pytest.mark.timeout(120)
+def test_a_pilot_estimates_the_rest_and_plays_it_only_for_somebody_who_says_yes(tmp_path: Path) -> None:
+    file = experiments.write(tmp_path, seeds=2, steps=2)
+    run = ["experiment", "run", str(file), "--out", str(tmp_path), "--jobs", "1", "--pilot", "1"]
+    told = CliRunner().invoke(app, run)
+    assert "after the pilot: 4 of 8 matches are left, about" in told.output
+    assert "nobody was there to say yes after the pilot: --yes plays the rest" in told.output
+    assert len(Store(tmp_path / "attacked").matches()) == 4
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 from khala.cli import app
 from khala.experiment.commands import shipped_experiments
 from khala.experiment.measures import Measures
-from khala.experiment.plan import plan
+from khala.experiment.plan import cells, plan
 from khala.experiment.spec import Experiment
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[3]
 PLANNED = {
-    "smoke": 6, "full_game": 420, "llm_smac": 360, "llm_pysc2": 960, "ablations": 320,
-    "full_game_scripted": 840, "llm_smac_scripted": 360, "llm_pysc2_scripted": 960, "ablations_scripted": 640,
+    "smoke": 6, "full_game": 420, "llm_smac": 360, "llm_pysc2": 960, "pictures_and_messages": 320,
+    "full_game_scripted": 840, "llm_smac_scripted": 360, "llm_pysc2_scripted": 960,
+    "pictures_and_messages_scripted": 640, "table1": 1260, "table2": 1380, "table3": 1870, "table4": 2730,
 }  # fmt: skip
 
 
@@ -88,8 +90,8 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def planned(name: str, monkeypatch: pytest.MonkeyPatch) -> list[PlannedMatch]:
-    for key in ("OPENAI_API_KEY", "DEEPSEEK_API_KEY"):
-        monkeypatch.setenv(key, "none")
+    for key in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "DEEPSEEK_API_KEY"):
+        monkeypatch.delenv(key, raising=False)
     return plan(load(shipped_experiments()[name], Experiment))
 
 
@@ -100,9 +102,48 @@ def test_the_shipped_experiments_are_these() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [one if one in {"smoke", "ablations"} else pytest.param(one, marks=pytest.mark.slow) for one in PLANNED]
+    "name",
+    [
+        one if one in {"smoke", "pictures_and_messages", "table2"} else pytest.param(one, marks=pytest.mark.slow)
+        for one in PLANNED
+    ],
 )
 def test_a_shipped_experiment_can_be_planned(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     matches = planned(name, monkeypatch)
     assert len(matches) == PLANNED[name]
     assert all(match.config.task.rhythm == "paper" for match in matches)
+
+
+def test_a_row_of_a_shipped_table_is_shown_for_a_model_of_ones_own_without_a_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    show = ["experiment", "show", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, [*show, "table2:model=openai/gpt-6,task=2s3z"])
+    assert done.exit_code == 0, done.exception
+    (cell,) = json.loads(done.stdout)["cells"]
+    assert (cell["task"], cell["model"], cell["matches"]) == ("2s3z", "openai/gpt-6", 20)
+    (cell,) = json.loads(CliRunner().invoke(app, [*show, "table2:model=gpt-3.5-turbo,task=2s3z"]).stdout)["cells"]
+    assert cell["matches"] == 50
+    with pytest.raises(ConfigError, match="there is no factor 'modl'; the factors are task, model"):
+        CliRunner().invoke(app, [*show, "table2:modl=silent"], catch_exceptions=False)
+
+
+def test_retired_models_are_named_with_their_successors_before_anything_is_played(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["experiment", "show", "--out", str(tmp_path), "table4:task=pvz_task1_level1"])
+    assert "gpt-3.5-turbo is retired on 2026-10-23; OpenAI named gpt-5.6-terra as its successor" in done.stderr
+
+
+def test_a_table_has_the_repeats_and_the_gaps_of_the_paper_and_the_players_without_a_model() -> None:
+    for name in ("table1", "table2", "table3", "table4"):
+        found = load(shipped_experiments()[name], Experiment)
+        games = {tuple(cell.names.values()): len(cell.seeds) for cell in cells(found)}
+        assert {model for *_, model in games} >= {"silent", "random-legal", "focus-fire", "skilled"}
+        table = found.published
+        assert table is not None
+        for row, of_row in table.rows.items():
+            for column, cell in zip(table.columns, of_row, strict=True):
+                where = table.values_at(row, column)
+                assert games.get(tuple(where[factor] for factor in found.factors)) == (
+                    table.games_of(row) if cell else None
+                )

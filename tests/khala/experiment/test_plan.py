@@ -26,7 +26,7 @@ def experiment(**fields: Any) -> Experiment:
 
 
 def cells_of(found: Experiment) -> list[Mapping[str, str]]:
-    return [cell for cell, _ in cells(found)]
+    return [cell.names for cell in cells(found)]
 
 
 def test_a_grid_has_every_combination_and_plays_every_cell_before_the_next_seed() -> None:

@@ -169,16 +169,6 @@ def test_what_was_not_played_yet_is_a_warning(made: HandMade) -> None:
     assert report(made.store).document.warnings == ("10 of 50 matches were not played yet",)
 
 
-def test_published_numbers_stand_beside_ours_with_what_differs(made: HandMade) -> None:
-    made.describe(
-        more="differs: Another game.\npublished: [{where: {task: 2s3z, model: gpt}, win_rate: 0.6, source: P}]"
-    )
-    found = report(made.store)
-    section = next(one for one in found.document.sections if one.title == "Beside what was published")
-    assert section.paragraphs == ("Another game.",)
-    assert section.tables[0].rows[0][:5] == ("2s3z, gpt", "P", "2s3z, skilled", "60 %", "75 % (53\N{EN DASH}89)")
-
-
 def test_an_experiment_without_a_match_has_no_report(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no match of made was played"):
         report(HandMade(tmp_path / "empty").store)

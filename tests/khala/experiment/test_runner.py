@@ -163,6 +163,13 @@ async def test_while_nobody_knows_what_a_match_costs_one_is_played_alone(store: 
     assert (states(store), runner.stopped) == (["done"] * 3, "the budget of 1 USD is used up (0.9000 were spent)")
 
 
+async def test_the_first_match_of_a_cell_gets_room_where_much_is_left(store: Store) -> None:
+    engine = MadeEngine(slots=1, cost_usd=lambda job: 0.3 if job.config.task.name == "2s3z_pair" else 1.5)
+    await run(store, engine, usd=100.0)
+    assert [job.minds["blue"].budget_usd for job in engine.jobs] == pytest.approx([100.0, 9.97, 0.6, 3.0, 0.6, 3.0])
+    assert states(store) == ["done"] * 6
+
+
 async def test_a_match_waits_for_money_that_others_give_back(store: Store) -> None:
     engine = MadeEngine(slots=4, cost_usd=lambda _: 0.3)
     runner = await run(store, engine, usd=1.9)
