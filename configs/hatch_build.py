@@ -6,7 +6,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-FOLDERS = ("agents", "experiments", "models", "tasks")
+FOLDERS = ("agents", "arenas", "experiments", "models", "tasks")
 
 
 class ConfigFiles(BuildHookInterface):

@@ -110,7 +110,7 @@ def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any)
     if file is not None:
         store.begin(file)
     with store.lock():
-        engine = _engine(given, store)
+        engine = engine_of(given, store)
         playing = _until_done(experiment, store, engine, matches, given)
         done = asyncio.run(cancelled_by_signal(playing))
     if isinstance(done, signal.Signals):
@@ -175,7 +175,12 @@ def words_of(estimate: CostEstimate) -> str:
     )
 
 
-def _engine(given: dict[str, Any], store: Store) -> Engine:
+def engine_of(given: dict[str, Any], store: Store) -> Engine:
+    """Return the engine that the options `on`, `jobs`, `game`, `address` and `recordings` ask for.
+
+    Raises:
+        ConfigError: there is no such engine.
+    """
     from khala.experiment.engine import Local, slots_of_this_machine  # noqa: PLC0415
 
     if given["on"] == "local":
