@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from khala.commands.run_options import Game
-from khala.experiment.cli import Address, BudgetUsd, Jobs, On, Processes, Url
+from khala.experiment.cli import Address, BudgetUsd, Head, Jobs, On, Processes, Url
 from khala_agents.cli import Trust
 from khala_orchestrator.cli import Json
 
@@ -54,6 +54,7 @@ def run(
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Out = Path("arenas"),
     address: Address = None,
+    head: Head = None,
     recordings: Url = None,
     as_json: Json = False,
 ) -> None:
@@ -65,7 +66,7 @@ def run(
     from khala.arena import commands  # noqa: PLC0415  # see there
 
     options = {"on": on, "jobs": jobs, "budget_usd": budget_usd, "processes": processes, "game": game,
-               "address": address, "recordings": recordings}  # fmt: skip
+               "address": address, "head": head, "recordings": recordings}  # fmt: skip
     commands.run(file, out, options, as_json=as_json)
 
 

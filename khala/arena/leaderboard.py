@@ -9,25 +9,32 @@ from rich.table import Table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from khala.arena.ratings import Leaderboard, Rating, LeaderboardLine
+    from khala.arena.ratings import Leaderboard, LeaderboardLine, Rating
 
 
 def table_of(board: Leaderboard) -> Table:
     """Return the table for a terminal; columns of money and tokens are there if a model has played."""
     table = Table(box=None, pad_edge=False)
-    spent = any(line.tokens or line.cost_usd for line in board.standings)
-    costs = ("USD a game", "tokens a game") if spent else ()
+    costs = ("USD a game", "tokens a game") if has_costs(board) else ()
     for column in ("player", *board.columns, "games", *costs, "clock"):
         table.add_column(column, no_wrap=column in ("player", "clock"))
     for line in board.standings:
         ratings = [_rating_words(line.ratings.get(column)) for column in board.columns]
         name = f"{line.player}\nanchor" if line.is_anchor else line.player
-        table.add_row(name, *ratings, str(line.games), *(costs_of(line) if spent else ()), ", ".join(line.clocks))
+        table.add_row(name, *ratings, str(line.games), *(costs_of(line) if costs else ()), ", ".join(line.clocks))
     return table
 
 
 def _rating_words(rating: Rating | None) -> str:
-    return "" if rating is None else f"{rating.value:.0f}\n{rating.low:.0f} to {rating.high:.0f}"
+    if rating is None:
+        return ""
+    bounds = "fixed" if rating.low == rating.high else f"{rating.low:.0f} to {rating.high:.0f}"
+    return f"{rating.value:.0f}\n{bounds}"
+
+
+def has_costs(board: Leaderboard) -> bool:
+    """Return whether a model has played, so that games have cost tokens or money."""
+    return any(line.tokens or line.cost_usd for line in board.standings)
 
 
 def costs_of(line: LeaderboardLine) -> tuple[str, str]:

@@ -15,7 +15,7 @@ import logging
 import re
 from typing import TYPE_CHECKING
 
-from khala.arena.leaderboard import costs_of, remarks_of
+from khala.arena.leaderboard import costs_of, has_costs, remarks_of
 from khala.arena.ratings import games_of, outcome_for, seat_of
 from khala.experiment.report.html import STYLE
 from khala.view.export import export
@@ -30,14 +30,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
     from pathlib import Path
 
-    from khala.arena.ratings import Leaderboard, Rating, LeaderboardLine
+    from khala.arena.ratings import Leaderboard, LeaderboardLine, Rating
     from khala.arena.results import ArenaGame, PlayerPool
 
 log = logging.getLogger(__name__)
 
 GAMES, MATCHES, INDEX = "games", "matches", "index.html"
-BAR_PX = 140
+BAR_PX = 110
 OURS = """
+body { max-width: 84rem; }
 a { color: inherit; text-decoration-color: var(--faint); text-underline-offset: .2em; }
 td small { color: var(--faint); }
 td svg { display: block; }
@@ -99,33 +100,36 @@ def _leaderboard(pool: PlayerPool, board: Leaderboard) -> Iterator[str]:
     ratings = [rating for line in board.standings for rating in line.ratings.values()]
     low = min((rating.low for rating in ratings), default=0.0)
     high = max((rating.high for rating in ratings), default=1.0)
-    names = ["", "player", *board.columns, "won", "drawn", "lost", "USD a game", "tokens a game", "clock"]
+    costs = ("USD a game", "tokens a game") if has_costs(board) else ()
+    names = ["", "player", *board.columns, "won", "drawn", "lost", *costs, "clock"]
     yield '<div class="scroll"><table><thead><tr>'
     yield "".join(f"<th>{_safe(name)}</th>" for name in names)
     yield "</tr></thead><tbody>"
     for number, line in enumerate(board.standings, start=1):
-        yield f"<tr>{''.join(_cells(number, line, board.columns, low, high))}</tr>"
+        yield f"<tr>{''.join(_cells(number, line, board, low, high))}</tr>"
     yield "</tbody></table></div>"
     yield from (f'<p class="note">{_safe(remark)}</p>' for remark in remarks_of(board, pool.remarks))
 
 
-def _cells(number: int, line: LeaderboardLine, columns: Iterable[str], low: float, high: float) -> Iterator[str]:
+def _cells(number: int, line: LeaderboardLine, board: Leaderboard, low: float, high: float) -> Iterator[str]:
     yield f'<td class="number">{number}</td>'
     anchor = " · anchor" if line.is_anchor else ""
     yield f"<td>{_safe(line.player)}<br><small>{_safe(line.kind)}: {_safe(line.about)}{anchor}</small></td>"
-    for column in columns:
+    for column in board.columns:
         yield f"<td>{_rating(line.player, column, line.ratings.get(column), low, high)}</td>"
     overall = line.ratings.get("overall")
     counts = (overall.won, overall.drawn, overall.lost) if overall else ("", "", "")
     yield from (f'<td class="number">{count}</td>' for count in counts)
-    yield from (f'<td class="number">{_safe(cost)}</td>' for cost in costs_of(line))
+    if has_costs(board):
+        yield from (f'<td class="number">{_safe(cost)}</td>' for cost in costs_of(line))
     yield f"<td>{_safe(', '.join(line.clocks))}</td>"
 
 
 def _rating(player: str, column: str, rating: Rating | None, low: float, high: float) -> str:
     if rating is None:
         return ""
-    words = f"{rating.value:.0f} <small>{rating.low:.0f} to {rating.high:.0f}</small>"
+    bounds = "fixed" if rating.low == rating.high else f"{rating.low:.0f} to {rating.high:.0f}"
+    words = f"{rating.value:.0f} <small>{bounds}</small>"
     return f'<a href="{_place(player, column)}">{words}</a>{_whisker(rating, low, high)}'
 
 

@@ -176,7 +176,7 @@ def words_of(estimate: CostEstimate) -> str:
 
 
 def engine_of(given: dict[str, Any], store: Store) -> Engine:
-    """Return the engine that the options `on`, `jobs`, `game`, `address` and `recordings` ask for.
+    """Return the engine that the options `on`, `jobs`, `game`, `address`, `head` and `recordings` ask for.
 
     Raises:
         ConfigError: there is no such engine.
@@ -188,7 +188,8 @@ def engine_of(given: dict[str, Any], store: Store) -> Engine:
     if given["on"] == "ray":
         from khala.experiment.ray_engine import Ray  # noqa: PLC0415
 
-        return Ray(given["jobs"], game=given["game"], address=given["address"], recordings=given["recordings"])
+        where = {name: given[name] for name in ("address", "head", "recordings")}
+        return Ray(given["jobs"], game=given["game"], **where)
     raise ConfigError(f"there is no engine {given['on']!r}: give local or ray", source="--on")
 
 
