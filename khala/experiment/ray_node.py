@@ -28,7 +28,11 @@ START_S = 300.0
 """Time for the head to begin: it is a dozen processes, and a machine may have two cores."""
 RETRY_S = 0.5
 END_S = 10.0
-_QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_agent_register_timeout_ms": "300000"}
+_PATIENT = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_agent_register_timeout_ms": "300000",
+    "RAY_raylet_start_wait_time_s": "300",
+}
 
 
 @contextlib.asynccontextmanager
@@ -59,14 +63,14 @@ async def running_head(address: str) -> AsyncIterator[None]:
 
 
 def join(address: str, jobs: int | None) -> None:
-    """Be a node of a cluster until its head is gone.
+    """Be a node of a cluster until its head is gone; begin again if the node dies before.
 
     Args:
         address: of the head, `HOST:PORT`; it need not be there yet.
         jobs: matches at the same time; None for as many as this machine has room for.
 
     Raises:
-        ConfigError: the node died while the head was there, or Ray is not installed.
+        ConfigError: the address is no address, or Ray is not installed.
     """
     if subprocess.run([sys.executable, "-c", "import ray"], check=False, capture_output=True).returncode:
         raise ConfigError("there is no ray: pip install 'khala[ray]'", source="khala experiment join")
@@ -74,14 +78,13 @@ def join(address: str, jobs: int | None) -> None:
     signal.signal(signal.SIGTERM, _interrupt)
     while not _is_open(host, port):
         time.sleep(RETRY_S)
-    matches = jobs or slots_of_this_machine()
-    process = _start(f"--address={socket.gethostbyname(host)}:{port}", own=_own_address(host, port), matches=matches)
-    try:
-        process.wait()
-    finally:
-        _end(process)
-    if _is_open(host, port):
-        raise ConfigError("this machine's part of the cluster died: its matches are played elsewhere", source=address)
+    while _is_open(host, port):
+        where = f"--address={socket.gethostbyname(host)}:{port}"
+        process = _start(where, own=_own_address(host, port), matches=jobs or slots_of_this_machine())
+        try:
+            process.wait()
+        finally:
+            _end(process)
 
 
 def split_address(address: str) -> tuple[str, int]:
@@ -102,7 +105,7 @@ def _start(*words: str, own: str, matches: int) -> subprocess.Popen[bytes]:
         f"--num-cpus={matches}", f"--memory={max(matches, 1) * MATCH_MB * 2**20}",
         f"--object-store-memory={OBJECTS_BYTES}", "--disable-usage-stats",
     ]  # fmt: skip
-    return subprocess.Popen(command, env=_QUIET | os.environ, stdout=subprocess.DEVNULL)  # noqa: S603  # our own words
+    return subprocess.Popen(command, env=_PATIENT | os.environ, stdout=subprocess.DEVNULL)  # noqa: S603  # our own words
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

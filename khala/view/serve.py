@@ -99,7 +99,7 @@ def door_of(options: ViewOptions) -> Door:
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near = is_near(options.published.rpartition(":")[0] or options.host)
+    near = is_near(options.published.rpartition(":")[0] if options.published else options.host)
     if options.published and not near:
         raise ConfigError(f"{options.published} is no port of this machine alone: give 127.0.0.1:PORT",
                           source="--published")  # fmt: skip
