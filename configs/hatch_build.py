@@ -6,7 +6,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-FOLDERS = ("agents", "experiments", "models", "published", "tasks")
+FOLDERS = ("agents", "arenas", "experiments", "models", "published", "tasks")
 
 
 class ConfigFiles(BuildHookInterface):

@@ -22,6 +22,7 @@ from docs.pages import (
     messages,
     observations,
     probes,
+    ratings,
     rules,
     simulator,
 )
@@ -49,6 +50,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "rules.md": rules.page,
     "simulator.md": simulator.page,
     "probes.md": probes.page,
+    "ratings.md": ratings.page,
 }
 
 

@@ -18,6 +18,7 @@ import khala_orchestrator.cli
 import khala_simulator.cli
 import khala_simulator.process.install
 from khala import __version__
+from khala.arena.cli import app as arena
 from khala.calibrate.cli import CALIBRATE_EPILOG, calibrate
 from khala.commands.actions import EPILOG as ACTIONS_EPILOG
 from khala.commands.actions import actions
@@ -274,6 +275,7 @@ for command, epilog in (
 ):
     app.command(epilog=epilog)(command)
 app.command("try", epilog=TRY_EPILOG)(try_model)
+app.add_typer(arena, name="arena")
 app.add_typer(dataset, name="dataset")
 app.add_typer(experiment, name="experiment")
 app.add_typer(keys, name="keys")

@@ -21,7 +21,13 @@ Examples:\n
     khala experiment run table2 --pilot 1 --jobs 4\n
     khala experiment run table3:model=openai/gpt-5\n
     khala experiment run my_grid.yaml --pilot 2 --budget-usd 20\n
-    khala experiment run my_grid.yaml --on ray --address 10.0.0.5:6379
+    khala experiment run my_grid.yaml --on ray --address 10.0.0.5:6379\n
+    khala experiment run my_grid.yaml --on ray --head 10.0.0.5:6379
+"""
+JOIN_EPILOG = """
+Examples:\n
+    khala experiment join 10.0.0.5:6379\n
+    khala experiment join 10.0.0.5:6379 --jobs 4
 """
 COMPARE_EPILOG = """
 Examples:\n
@@ -60,6 +66,13 @@ Processes = Annotated[
 Address = Annotated[
     str | None, typer.Option(help="Address of the Ray cluster.", show_default="a local one", metavar="HOST")
 ]
+Head = Annotated[
+    str | None,
+    typer.Option(
+        help="With --on ray: start a cluster here, which others reach at this address and join with `join`.",
+        metavar="HOST:PORT",
+    ),
+]
 Url = Annotated[
     str | None, typer.Option("--recordings", help="With --on ray: where nodes write recordings, an fsspec URL.")
 ]
@@ -95,6 +108,7 @@ def run(
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Out = OUT,
     address: Address = None,
+    head: Head = None,
     recordings: Url = None,
     as_json: Json = False,
 ) -> None:
@@ -106,7 +120,8 @@ def run(
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
     options = {"on": on, "jobs": jobs, "budget_usd": budget_usd, "pilot": pilot, "yes": yes, "processes": processes,
-               "game": game, "address": address, "recordings": recordings, "as_json": as_json}  # fmt: skip
+               "game": game, "address": address, "head": head, "recordings": recordings,
+               "as_json": as_json}  # fmt: skip
     commands.run(file, out, options)
 
 
@@ -122,6 +137,7 @@ def resume(
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     out: Out = OUT,
     address: Address = None,
+    head: Head = None,
     recordings: Url = None,
     as_json: Json = False,
 ) -> None:
@@ -129,8 +145,25 @@ def resume(
     from khala.experiment import commands  # noqa: PLC0415  # see there
 
     options = {"on": on, "jobs": jobs, "budget_usd": budget_usd, "pilot": 0, "yes": True, "processes": processes,
-               "game": game, "address": address, "recordings": recordings, "as_json": as_json}  # fmt: skip
+               "game": game, "address": address, "head": head, "recordings": recordings,
+               "as_json": as_json}  # fmt: skip
     commands.resume(directory, out, options)
+
+
+@app.command(epilog=JOIN_EPILOG)
+def join(
+    address: Annotated[str, typer.Argument(help="Where `khala experiment run --head` plays.", metavar="HOST:PORT")],
+    *,
+    jobs: Jobs = None,
+) -> None:
+    """Play matches of an experiment that runs on another machine, until it is over.
+
+    Waits for the experiment to begin. Machines may join and go at any time: the matches of a machine that goes are
+    played on another one. Keys of models come from this machine's environment.
+    """
+    from khala.experiment.ray_node import join as join_cluster  # noqa: PLC0415  # see `commands`
+
+    join_cluster(address, jobs)
 
 
 @app.command(name="list")

@@ -133,7 +133,7 @@ def _play(experiment: Experiment, store: Store, file: Path | None, **given: Any)
     if file is not None:
         store.begin(file)
     with store.lock():
-        engine = _engine(given, store)
+        engine = engine_of(given, store)
         playing = _until_done(experiment, store, engine, matches, given)
         done = asyncio.run(cancelled_by_signal(playing))
     if isinstance(done, signal.Signals):
@@ -203,7 +203,12 @@ def words_of(estimate: CostEstimate, planned: int) -> str:
     )
 
 
-def _engine(given: dict[str, Any], store: Store) -> Engine:
+def engine_of(given: dict[str, Any], store: Store) -> Engine:
+    """Return the engine that the options `on`, `jobs`, `game`, `address`, `head` and `recordings` ask for.
+
+    Raises:
+        ConfigError: there is no such engine.
+    """
     from khala.experiment.engine import Local, slots_of_this_machine  # noqa: PLC0415
 
     if given["on"] == "local":
@@ -211,7 +216,8 @@ def _engine(given: dict[str, Any], store: Store) -> Engine:
     if given["on"] == "ray":
         from khala.experiment.ray_engine import Ray  # noqa: PLC0415
 
-        return Ray(given["jobs"], game=given["game"], address=given["address"], recordings=given["recordings"])
+        where = {name: given[name] for name in ("address", "head", "recordings")}
+        return Ray(given["jobs"], game=given["game"], **where)
     raise ConfigError(f"there is no engine {given['on']!r}: give local or ray", source="--on")
 
 

@@ -91,6 +91,25 @@ def count_matches(experiment: Experiment) -> int:
     return sum(len(cell.seeds) for cell in cells(experiment)) * experiment.repetitions
 
 
+def plan_cell(
+    name: str, cell: dict[str, str], settings: Settings, seeds: Iterable[int], *, game: str = "simulator"
+) -> list[PlannedMatch]:
+    """Return the matches of one cell, which need not be of a grid, one for each seed.
+
+    Args:
+        name: of the experiment or the arena.
+        cell: names for what `settings` say, by factor.
+        settings: what is played.
+        seeds: of the game.
+        game: as `khala.playing.games` takes it.
+
+    Raises:
+        ConfigError: it cannot be played.
+    """
+    prepared = _prepare(GridCell(cell, settings, tuple(seeds)), games.name_of(game))
+    return [prepared.match(name, seed, 0) for seed in seeds]
+
+
 def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) -> None:
     """Check that matches can be played and a budget be kept, before anything is: who only looks needs no key.
 
@@ -193,7 +212,7 @@ def _prepare(cell: GridCell, game: str) -> _Prepared:
             "task": task.model_dump(mode="json"),
             "game": game,
             "actions": catalogue_sha256(),
-            "minds": {side: _identity(mind) for side, mind in minds.items()},
+            "minds": {side: identity_of(mind) for side, mind in minds.items()},
         }
     except ConfigError as error:
         raise ConfigError(f"{_title(cell.names)}: {error}") from None
@@ -239,7 +258,7 @@ def minds_for(task: TaskConfig, settings: Settings) -> dict[str, Minds]:
     return minds_of([side.side for side in task.per_side()], common, settings.sides or {})
 
 
-def _identity(mind: Minds) -> dict[str, Any]:
+def identity_of(mind: Minds) -> dict[str, Any]:
     """Return what makes a difference to what a side's agents say: not an address, not a budget."""
     said = {name: value for name, value in asdict(mind).items() if name not in ("budget_usd", "base_url")}
     for name in ("rethink", "answer"):  # matches that were planned before there were these keep their keys

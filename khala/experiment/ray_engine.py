@@ -8,9 +8,11 @@ plays it once more.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import signal
 import tempfile
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -26,6 +28,7 @@ try:
     from ray.exceptions import RayError
 
     from khala.experiment.ray_limits import endpoints, gates_at
+    from khala.experiment.ray_node import RETRY_S, START_S, running_head
 except ModuleNotFoundError as error:
     raise ConfigError(f"there is no {error.name}: pip install 'khala[ray]'", source="--on ray") from None
 
@@ -34,13 +37,21 @@ if TYPE_CHECKING:
 
 MATCH_BYTES = MATCH_MB * 2**20
 REACH_S = 10.0
+MOST_WAITING = 64
+"""Matches that are given to a cluster that machines join at any time; those that find no room wait there."""
 
 
 class Ray:
     """Plays matches on the nodes of a Ray cluster."""
 
     def __init__(
-        self, slots: int | None, *, game: str, address: str | None = None, recordings: str | None = None
+        self,
+        slots: int | None,
+        *,
+        game: str,
+        address: str | None = None,
+        head: str | None = None,
+        recordings: str | None = None,
     ) -> None:
         """Take how many matches at a time, which game, and where the cluster is.
 
@@ -48,29 +59,47 @@ class Ray:
             slots: None for as many as the cluster has room for when the engine begins.
             game: as the nodes find it.
             address: of the cluster: `HOST:PORT`, or `auto`; None for one on this machine, which ends with the engine.
+            head: instead: where a cluster is begun here, `HOST:PORT`; it has no room for matches until others join it,
+                and ends with the engine.
             recordings: where nodes write recordings, each in a directory with its key as name, an fsspec URL; None to
                 get them over Ray.
         """
         self.slots = slots or 0
-        self._game, self._address, self._url = game, address, recordings
+        self._game = game
+        self._address = address
+        self._head = head
+        self._url = recordings
+        self._stack = contextlib.AsyncExitStack()
         self._endpoints: Any = None
 
     async def __aenter__(self) -> Self:
+        try:
+            await self._begin()
+        except BaseException:
+            await self._stack.aclose()
+            raise
+        return self
+
+    async def _begin(self) -> None:
+        if self._head is not None:
+            await self._stack.enter_async_context(running_head(self._head))
+            self._address = self._head
+            self.slots = self.slots or MOST_WAITING
         if self._address not in (None, "auto"):
             await _check(self._address)
-        self._connect()
+        await self._connect_until(time.monotonic() + (START_S if self._head else 0.0))
         self.slots = self.slots or _room_of_the_cluster()
         if not self.slots:
             ray.shutdown()
             raise ConfigError(f"no node of the cluster has a core and {MATCH_MB} MB: give --jobs to say how many "
                               "matches to play at a time once one has", source=f"Ray at {self._address}")  # fmt: skip
         self._endpoints = endpoints()
-        return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         ray.shutdown()  # Ray ends what still runs with the runner, and each game its process is gone
+        await self._stack.aclose()
 
     async def play(self, job: Job) -> Ended:
         """Play a match on a node that has room for it."""
@@ -98,6 +127,16 @@ class Ray:
         if recording is not None:
             _write(record, recording)
         return Ended.model_validate_json(ended)
+
+    async def _connect_until(self, end_s: float) -> None:
+        """Connect; a head that listens already may still need a minute until it has nodes."""
+        while True:
+            try:
+                return self._connect()
+            except ConfigError:
+                if time.monotonic() > end_s:
+                    raise
+            await asyncio.sleep(RETRY_S)
 
     def _connect(self) -> None:
         ended_by = signal.getsignal(signal.SIGTERM)

@@ -14,7 +14,7 @@ import statistics
 import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from khala.experiment.played import unread
 from khala.playing.jobs import Job
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from khala.experiment.engine import Engine
     from khala.experiment.plan import PlannedMatch
     from khala.experiment.played import PlayedMatch
-    from khala.experiment.spec import Experiment, ExperimentBudget
+    from khala.experiment.spec import ExperimentBudget
     from khala.experiment.store import Store
     from khala.playing.jobs import Ended
 
@@ -74,11 +74,23 @@ class Spent:
     held_usd: float = 0.0
 
 
+class PlayRules(Protocol):
+    """What an experiment or an arena says of single matches."""
+
+    @property
+    def retries(self) -> int:
+        """How often a match that crashed is played again."""
+
+    @property
+    def match_hours(self) -> float:
+        """After so long a match is ended, and counts as crashed."""
+
+
 @dataclass(slots=True)
 class Runner:
-    """Plays the matches of one experiment."""
+    """Plays the matches of one experiment or arena."""
 
-    experiment: Experiment
+    experiment: PlayRules
     store: Store
     engine: Engine
     budget: ExperimentBudget

@@ -55,6 +55,13 @@ def view(
     https: Annotated[
         tuple[Path, Path] | None, typer.Option(help="Serve HTTPS with this certificate.", metavar="CERT KEY")
     ] = None,
+    published: Annotated[
+        str | None,
+        typer.Option(
+            help="Address on this machine at which a container's port is published, instead of a password.",
+            metavar="127.0.0.1:PORT",
+        ),
+    ] = None,
     no_open: Annotated[bool, typer.Option("--no-open", help="Print the address, and open no browser.")] = False,
     export: Annotated[
         Path | None, typer.Option(help="Write one file that opens without a server, and end.", metavar="FILE.html")
@@ -74,7 +81,8 @@ def view(
 
     options = ViewOptions(
         given=tuple(given or ()), connect=tuple(connect or ()), tls=tls, insecure=insecure, adviser=adviser or "",
-        host=host, port=port, asks_password=password, password_file=password_file, https=https, opens=not no_open,
+        host=host, port=port, asks_password=password, password_file=password_file, https=https,
+        published=published or "", opens=not no_open,
     )  # fmt: skip
     if export is not None:
         run_export(options, export, steps=steps, agents=agents or ())

@@ -62,6 +62,8 @@ class ViewOptions:
     asks_password: bool = False
     password_file: Path | None = None
     https: tuple[Path, Path] | None = None
+    published: str = ""
+    """`127.0.0.1:PORT`, where a container's port is published; "" if it is in no container."""
     opens: bool = True
 
 
@@ -97,7 +99,10 @@ def door_of(options: ViewOptions) -> Door:
     Raises:
         ConfigError: other machines could reach it without a password and without TLS.
     """
-    near = is_near(options.host)
+    near = is_near(options.published.rpartition(":")[0] if options.published else options.host)
+    if options.published and not near:
+        raise ConfigError(f"{options.published} is no port of this machine alone: give 127.0.0.1:PORT",
+                          source="--published")  # fmt: skip
     password = password_of(options)
     if not near and not password and options.https is None:
         raise ConfigError(
@@ -158,7 +163,8 @@ async def _view(options: ViewOptions, door: Door, context: ssl.SSLContext | None
         await runner.setup()
         port = await stack.enter_async_context(_listening(runner, options, context))
         scheme = "https" if door.is_secure else "http"
-        address = f"{scheme}://{_name(options.host)}:{port}/?{TOKEN}={door.token}"
+        place = options.published or f"{_name(options.host)}:{port}"
+        address = f"{scheme}://{place}/?{TOKEN}={door.token}"
         stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
         if options.opens:
             with contextlib.suppress(webbrowser.Error):

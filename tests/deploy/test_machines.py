@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.cli import main
+from khala.experiment.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -106,12 +108,18 @@ class Machine:
         """Change its network."""
         _ip("-n", self.name, *arguments)
 
+    def crash(self) -> None:
+        """Kill all that runs there, as if its power were cut."""
+        pids = subprocess.run(["ip", "netns", "pids", self.name], check=True, capture_output=True, text=True).stdout
+        for pid in map(int, pids.split()):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
     async def off(self) -> None:
         """End all that runs there."""
+        self.crash()
         for command in self.commands:
-            if command.process.returncode is None:
-                command.process.kill()
-                await command.process.communicate()
+            await command.process.communicate()
 
 
 def _ip(*arguments: str) -> None:
@@ -269,3 +277,32 @@ async def test_the_sides_of_a_duel_play_from_two_machines_and_read_nothing_of_ea
         assert (await agent.result(END_S))["agents"]["Captain"]["replies"] == {"ok": steps}
     own = f"khala/{RUN}/red/Captain"
     assert await spy.line() == {f"{own}/briefing": 1, f"{own}/observation": steps}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+async def test_workers_play_an_experiment_and_one_that_is_killed_loses_nothing(
+    machines: tuple[Machine, Machine, Machine],
+) -> None:
+    first, second, doomed = machines
+    file = first.directory / "many.yaml"
+    fixed = {"task": TASK, "max_steps": 6, "model": "skilled"}
+    file.write_text(json.dumps({"name": "many", "fixed": fixed, "factors": {"task": [TASK]}, "seeds": 8}))
+    head = f"{first.address}:6379"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("RAY_AUTH_MODE", "disabled")
+        out = ("--out", str(first.directory), "--json")
+        runner = await first.khala("experiment", "run", str(file), "--on", "ray", "--head", head, *out)
+        for machine in (second, doomed):
+            await machine.khala("experiment", "join", head, "--jobs", "1")
+    assert runner.process.stderr is not None
+    async with asyncio.timeout(600):
+        async for line in runner.process.stderr:
+            if b"done in" in line:
+                break
+        doomed.crash()
+        done = json.loads(await runner.ended(600))
+    assert done["matches"] == {"done": 8}
+    played = Store(first.directory / "many").matches()
+    assert {match.seed for match in played.values()} == set(range(1, 9))
+    assert len(list(first.directory.glob("many/matches/*/recording*.mcap"))) == 8

@@ -32,6 +32,9 @@ COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / FILES[0]).read_text())
 LAN: dict[str, Any] = yaml.safe_load((ROOT / FILES[1]).read_text())
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
 KEYS = {key for name in model_files() if (key := load_model(name).api_key_env)}
+IMAGES = {"llm": "khala-agents", "agents": "khala-agents", "experiment": "khala-ray", "worker": "khala-ray"}
+CLUSTER = {"experiment", "worker", "page"}
+"""Services of the profile `experiment`, which need none of the others."""
 every_service = pytest.mark.parametrize("service", SERVICES)
 
 
@@ -99,15 +102,21 @@ def test_a_service_is_locked_down(service: str, field: str, value: object) -> No
 
 @every_service
 def test_a_service_runs_in_the_image_that_has_what_it_needs(service: str) -> None:
-    image = "khala-agents" if service in {"llm", "agents"} else "khala"
+    image = IMAGES.get(service, "khala")
     assert plain(SERVICES[service]["image"]) == image
-    assert SERVICES[service]["build"] == {"context": ".", "target": image.removeprefix("khala-")}
+    target = "agents" if image == "khala-agents" else "khala"
+    extras = {"args": {"EXTRAS": "--extra ray"}} if image == "khala-ray" else {}
+    assert SERVICES[service]["build"] == {"context": ".", "target": target} | extras
 
 
 @every_service
 @pytest.mark.parametrize("field", ["privileged", "cap_add", "devices", "pid", "ipc", "network_mode", "ports"])
 def test_a_service_asks_for_nothing_that_opens_it(service: str, field: str) -> None:
-    assert field not in SERVICES[service]
+    if (service, field) == ("page", "ports"):
+        assert plain(SERVICES[service][field]) == ["127.0.0.1:8000:8000"], "of this machine alone"
+        assert parsed(command_of(service))["published"] == "127.0.0.1:8000"
+    else:
+        assert field not in SERVICES[service]
 
 
 @every_service
@@ -119,25 +128,26 @@ def test_a_service_runs_as_an_ordinary_user(service: str) -> None:
 @every_service
 def test_a_service_is_healthy_or_waits_for_one_that_is(service: str) -> None:
     conditions = {name: needed["condition"] for name, needed in SERVICES[service].get("depends_on", {}).items()}
-    alone = service == "experiment"  # it needs none of the others
-    assert alone or "healthcheck" in SERVICES[service] or "service_healthy" in conditions.values()
+    assert service in CLUSTER or "healthcheck" in SERVICES[service] or "service_healthy" in conditions.values()
     for name, condition in conditions.items():
         assert condition == ("service_healthy" if "healthcheck" in SERVICES[name] else "service_started")
 
 
-def test_only_agents_and_experiments_reach_the_world() -> None:
+def test_only_agents_workers_and_the_page_reach_the_world() -> None:
     inside = {name for name, network in COMPOSE["networks"].items() if network.get("internal")}
     outside = {name for name, service in SERVICES.items() if not inside.issuperset(service["networks"])}
-    assert outside == {"agents", "experiment"}
+    assert outside == {"agents", "worker", "page"}
+    on_bus = {name for name, service in SERVICES.items() if "bus" in service["networks"]}
+    assert not on_bus & CLUSTER
 
 
 def test_an_experiment_is_played_when_its_profile_is_asked_for() -> None:
-    assert {name: service["profiles"] for name, service in SERVICES.items() if "profiles" in service} == {
-        "experiment": ["experiment"]
-    }
+    assert {name for name, service in SERVICES.items() if service.get("profiles") == ["experiment"]} == CLUSTER
     asked = parsed(command_of("experiment"))
-    assert asked["processes"]
     assert asked["out"].is_relative_to("/runs"), "where the volume is"
+    assert SERVICES["experiment"]["depends_on"].keys() == {"worker", "page"}
+    assert parsed(command_of("worker"))["address"] == asked["head"] == "experiment:6379"
+    assert set(SERVICES["worker"]["networks"]) >= set(SERVICES["experiment"]["networks"]) == {"cluster"}
 
 
 def test_who_joins_from_outside_comes_over_loopback_unless_told_otherwise() -> None:
@@ -146,15 +156,16 @@ def test_who_joins_from_outside_comes_over_loopback_unless_told_otherwise() -> N
 
 def test_services_stay_and_a_match_ends() -> None:
     policies = {name: service["restart"] for name, service in SERVICES.items()}
-    assert policies == {**dict.fromkeys(SERVICES, "unless-stopped"), "host": "no", "experiment": "no"}
+    ending = {"host": "no", "experiment": "no", "worker": "on-failure"}
+    assert policies == dict.fromkeys(SERVICES, "unless-stopped") | ending
 
 
 # --- keys ---------------------------------------------------------------------------------------------
 
 
 def test_keys_are_given_to_agents_as_a_file_and_to_nobody_else() -> None:
-    assert [name for name, service in SERVICES.items() if "secrets" in service] == ["agents", "experiment"]
-    for service in ("agents", "experiment"):
+    assert [name for name, service in SERVICES.items() if "secrets" in service] == ["agents", "experiment", "worker"]
+    for service in ("agents", "experiment", "worker"):
         environment = SERVICES[service]["environment"]
         assert {name for name in environment if "KEY" in name} == {f"{key}_FILE" for key in KEYS}
         assert {environment[f"{key}_FILE"] for key in KEYS} == {"/run/secrets/model_key"}
@@ -300,7 +311,7 @@ def test_the_documentation_names_files_and_services_that_exist(page: str) -> Non
         assert set(profiles) <= {"experiment"}
         if "up" in words:
             named = words[words.index("up") + 1 :]
-            assert {word for word in named if not word.startswith("-")} <= SERVICES.keys()
+            assert {word for word in named if word[0] != "-" and "=" not in word} <= SERVICES.keys()
 
 
 # --- the image ----------------------------------------------------------------------------------------

@@ -144,6 +144,15 @@ def test_only_this_machine_may_look_without_a_password(host: str, near: bool) ->
             door_of(look)
 
 
+def test_a_port_that_a_container_publishes_to_its_machine_alone_needs_no_password() -> None:
+    look = ViewOptions(given=(), host="0.0.0.0", published="127.0.0.1:8000")  # nobody listens
+    assert door_of(look).is_near
+    assert not door_of(look).password
+    for published in ("10.0.0.5:8000", "8000", "example.org:8000"):
+        with pytest.raises(ConfigError, match="is no port of this machine alone: give 127"):
+            door_of(ViewOptions(given=(), host="0.0.0.0", published=published))
+
+
 def test_a_password_comes_from_a_file_or_the_environment_or_is_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,249 @@
+"""An arena: its file, who meets whom, what is played once, ratings of several files, and the site."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yaml
+
+from khala.arena import commands
+from khala.arena.matches import plan_round, tasks_of
+from khala.arena.pairing import pair_swiss
+from khala.arena.ratings import distinct_games, rate
+from khala.arena.results import RESULTS, ArenaGame, ArenaResults, PoolPlayer, pool_results, write_results
+from khala.arena.spec import Arena
+from khala.cli import main
+from khala_protocol.errors import ConfigError
+from tests.khala.experiment.made import MadeEngine
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from khala.playing.jobs import Job
+
+MODELS = [{"name": name, "model": name} for name in ("skilled", "focus-fire", "silent")]
+GROUPS = {"duels": ["duel_3m"], "battles": ["2s3z"], "full games": ["simple64_eceb_terran"]}
+
+
+def arena(**fields: Any) -> Arena:
+    players = [*MODELS, {"name": "easy", "level": "easy"}]
+    given = {"name": "a", "players": players, "groups": GROUPS, "anchors": {"silent": 1000}, "rounds": 2}
+    return Arena.model_validate(given | fields)
+
+
+def game(first: str, second: str, outcome: str, **fields: Any) -> ArenaGame:
+    number = fields.setdefault("seed", 1)
+    key = hashlib.sha256(f"{first} {second} {number} {fields.get('task')}".encode()).hexdigest()[:16]
+    given = {"match": key, "group": "duels", "task": "duel_3m", "cause": "enemy defeated", "clock": "frozen",
+             "steps": 10 + number, "game_s": 5.0, "killed": 150.0, "lost": 50.0, "card": "0" * 12,
+             "recording": f"matches/{key}/recording.mcap"}  # fmt: skip
+    seats = {"first": {"player": first}, "second": {"player": second} | fields.pop("of_second", {})}
+    return ArenaGame.model_validate(given | seats | {"outcome": outcome} | fields)
+
+
+def results(*games: ArenaGame, **fields: Any) -> ArenaResults:
+    names = {seat.player for found in games for seat in (found.first, found.second)}
+    players = {name: PoolPlayer(kind="model", about=name, identity="0" * 16) for name in sorted(names)}
+    given = {"arena": "a", "anchors": {"a": 1000.0}, "players": players, "cards": {}, "games": games}
+    return ArenaResults(**(given | fields))
+
+
+# --- the file and the pairing ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"anchors": {"nobody": 1}}, "the anchor nobody is no player; the players are skilled"),
+        ({"players": [*MODELS, MODELS[0]]}, "there are two players skilled"),
+        ({"players": [*MODELS, {"name": "x", "model": "m", "level": "easy"}]}, "x needs a model, a level or a guest"),
+        ({"groups": {"overall": ["duel_3m"]}}, "the group overall is that of all games"),
+        ({"groups": {"a": ["duel_3m"], "b": ["duel_3m"]}}, "the task duel_3m is there twice"),
+        ({"fixed": {"model": "skilled"}}, "fixed has model, which players and groups say"),
+    ],
+)
+def test_a_mistake_in_the_file_is_named(fields: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        arena(**fields)
+
+
+def test_models_meet_each_other_in_duels_the_map_in_battles_and_levels_in_full_games() -> None:
+    duel, battle, full = tasks_of(arena())
+    assert duel.pairs == (("skilled", "focus-fire"), ("skilled", "silent"), ("focus-fire", "silent"))
+    assert duel.ways(("skilled", "silent")) == [("skilled", "silent"), ("silent", "skilled")]
+    assert battle.pairs == tuple((name, "map-2s3z") for name in ("skilled", "focus-fire", "silent"))
+    assert full.pairs == tuple((name, "easy") for name in ("skilled", "focus-fire", "silent"))
+    assert full.ways(("skilled", "easy")) == [("skilled", "easy")]
+
+
+def test_a_task_on_which_nobody_can_meet_is_refused() -> None:
+    with pytest.raises(ConfigError, match="nobody can meet on the task simple64_eceb_terran"):
+        tasks_of(arena(players=MODELS))
+
+
+def test_a_match_plays_who_sits_where_and_a_level_is_the_opponent() -> None:
+    matches = plan_round(arena(), 2, met={}, ratings={}, game="simulator")
+    assert len({match.key for match in matches}) == len(matches) == 3 * 2 + 3 + 3
+    assert {match.seed for match in matches} == {2}
+    duel = next(match for match in matches if match.cell["first"] == "silent" and match.cell["task"] == "duel_3m")
+    assert [mind.policy for mind in duel.minds.values()] == ["silent", duel.cell["second"]]
+    full = next(match for match in matches if match.cell["second"] == "easy")
+    assert full.config.task.opponent.difficulty == "easy"
+
+
+def test_a_guest_is_started_by_its_command() -> None:
+    players = [MODELS[0], {"name": "bot", "guest": "python 'my bot/run.py'"}]
+    found = arena(players=players, groups={"full games": ["simple64_eceb_terran"]}, anchors={"bot": 1})
+    (match,) = plan_round(found, 1, met={}, ratings={}, game="simulator")
+    assert match.config.task.opponent.command == ("python", "my bot/run.py")
+
+
+def test_a_swiss_round_pairs_neighbours_who_have_not_met() -> None:
+    ratings = {"a": 1300.0, "b": 1200.0, "c": 1000.0, "d": 900.0}
+    pairs = [("a", "b"), ("a", "c"), ("a", "d"), ("b", "c"), ("b", "d"), ("c", "d")]
+    assert pair_swiss(pairs, {}, ratings, ratings) == [("a", "b"), ("c", "d")]
+    met = {frozenset("ab"): 2, frozenset("cd"): 2}
+    assert pair_swiss(pairs, met, ratings, ratings) == [("b", "c"), ("a", "d")]
+    levels = [("a", "easy"), ("b", "easy"), ("a", "hard"), ("b", "hard")]
+    strong = {"a": 1300.0, "b": 900.0, "easy": 950.0, "hard": 1400.0}
+    assert pair_swiss(levels, {}, strong, ["a", "b"]) == [("b", "easy"), ("a", "hard")]
+
+
+# --- played ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def engine(monkeypatch: pytest.MonkeyPatch) -> MadeEngine:
+    made = MadeEngine()
+    monkeypatch.setattr(commands, "engine_of", lambda _options, _store: made)
+    return made
+
+
+def play(tmp_path: Path, **fields: Any) -> dict[str, Any]:
+    file = tmp_path / "a.yaml"
+    file.write_text(yaml.safe_dump(arena(**fields).model_dump(mode="json", exclude_defaults=True)))
+    with pytest.raises(SystemExit) as ended:
+        main(["arena", "run", str(file), "--out", str(tmp_path / "arenas")])
+    assert not ended.value.code
+    found: dict[str, Any] = json.loads((tmp_path / "arenas" / "a" / RESULTS).read_text())
+    return found
+
+
+@pytest.mark.parametrize("pairing", ["round-robin", "swiss"])
+def test_every_match_is_played_once_and_more_rounds_play_only_what_is_new(
+    pairing: str, tmp_path: Path, engine: MadeEngine
+) -> None:
+    first = play(tmp_path, pairing=pairing)
+    number = len(engine.jobs)
+    assert len(first["games"]) == number == (24 if pairing == "round-robin" else 16)
+    again = play(tmp_path, pairing=pairing)
+    assert (again, len(engine.jobs)) == (first, number)
+    longer = play(tmp_path, pairing=pairing, rounds=3)
+    assert len(longer["games"]) == len(engine.jobs) == number * 3 // 2
+
+
+def test_matches_that_are_not_valid_are_counted_apart(tmp_path: Path, engine: MadeEngine) -> None:
+    def ends(job: Job, _: int) -> str:
+        return "invalid" if job.config.labels["factor.task"] == "2s3z" else "done"
+
+    engine.ends = ends
+    file = tmp_path / "a.yaml"
+    file.write_text(yaml.safe_dump(arena().model_dump(mode="json", exclude_defaults=True)))
+    with pytest.raises(SystemExit) as ended:
+        main(["arena", "run", str(file), "--out", str(tmp_path)])
+    assert ended.value.code == 3
+    pool = pool_results([tmp_path / "a"])
+    assert pool.remarks[0] == "6 matches of a crashed or are not valid: not counted."
+    assert "map-2s3z" not in {line.player for line in rate(pool).standings if line.ratings}
+
+
+# --- ratings -----------------------------------------------------------------------------------------
+
+
+def test_games_of_deterministic_players_that_end_alike_with_each_seed_count_once() -> None:
+    alike = [game("a", "b", "win", seed=seed, steps=9) for seed in (1, 2, 3)]
+    unlike = [game("b", "a", "win", seed=seed) for seed in (1, 2, 3)]
+    assert distinct_games([*alike, *unlike]) == [alike[0], *unlike]
+
+
+def test_ratings_stand_by_group_and_overall_with_what_a_game_costs(tmp_path: Path) -> None:
+    paid = {"tokens": 300, "cost_usd": 0.5}
+    games = [game("a", "b", "loss", seed=seed, of_second=paid) for seed in range(6)]
+    games += [game("a", "c", "win", seed=seed, group="battles", task="2s3z") for seed in range(6)]
+    write_results(results(*games), tmp_path / RESULTS)
+    board = rate(pool_results([tmp_path]))
+    assert board.columns == ("overall", "duels", "battles")
+    best, anchor, worst = board.standings
+    assert [line.player for line in (best, anchor, worst)] == ["b", "a", "c"]
+    assert (anchor.is_anchor, anchor.ratings["overall"].low, anchor.ratings["overall"].high) == (True, 1000.0, 1000.0)
+    assert (best.cost_usd, best.tokens, best.clocks) == (0.5, 300, ("frozen",))
+    assert (worst.cost_usd, worst.tokens) == (None, 0)
+    assert best.ratings["duels"].value > 1000 > worst.ratings["battles"].value
+    assert "battles" not in best.ratings
+    assert (best.ratings["overall"].won, best.ratings["overall"].lost) == (6, 0)
+
+
+def test_the_anchors_of_two_arenas_make_their_ratings_comparable(tmp_path: Path) -> None:
+    for name, rival in (("one", "b"), ("two", "c")):
+        (tmp_path / name).mkdir()
+        games = [game("a", rival, "loss" if seed % 3 else "win", seed=seed) for seed in range(9)]
+        write_results(results(*games, arena=name), tmp_path / name / RESULTS)
+    alone = [rate(pool_results([tmp_path / name])).standings[0].ratings["overall"] for name in ("one", "two")]
+    both = {
+        line.player: line.ratings["overall"]
+        for line in rate(pool_results([tmp_path / "one", tmp_path / "two"])).standings
+    }
+    assert alone[0].value == pytest.approx(alone[1].value)
+    assert both["b"].value == pytest.approx(alone[0].value, abs=1)
+    assert both["c"].value == pytest.approx(alone[1].value, abs=1)
+
+
+def test_a_match_that_two_files_have_counts_once(tmp_path: Path) -> None:
+    games = [game("a", "b", "win", seed=seed) for seed in range(3)]
+    for name in ("x.json", "y.json"):
+        write_results(results(*games), tmp_path / name)
+    assert len(pool_results([tmp_path / "x.json", tmp_path / "y.json"]).games) == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"players": {n: PoolPlayer(kind="model", about=n, identity="1" * 16) for n in "ab"}}, "a is another player"),
+        ({"anchors": {"a": 1100.0}}, "the anchor a has 1100 here and 1000 in a file before"),
+        ({"players": {}}, "has the player 'a', whom `players` does not have"),
+    ],
+)
+def test_files_that_do_not_fit_together_are_refused(changes: dict[str, Any], complaint: str, tmp_path: Path) -> None:
+    write_results(results(game("a", "b", "win")), tmp_path / "x.json")
+    write_results(results(game("a", "b", "win", seed=2), **changes), tmp_path / "y.json")
+    with pytest.raises(ConfigError, match=complaint):
+        pool_results([tmp_path / "x.json", tmp_path / "y.json"])
+
+
+def test_a_file_of_anyone_names_no_path_outside_of_its_directory(tmp_path: Path) -> None:
+    write_results(results(game("a", "b", "win")), tmp_path / "x.json")
+    text = (tmp_path / "x.json").read_text()
+    (tmp_path / "x.json").write_text(text.replace("matches/", "../matches/"))
+    with pytest.raises(ConfigError, match=r"x\.json.*games\.0\.recording"):
+        pool_results([tmp_path / "x.json"])
+
+
+# --- the site ----------------------------------------------------------------------------------------
+
+
+def test_every_cell_of_the_site_lists_its_games_and_names_cannot_break_out(tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>"
+    write_results(results(game("a", evil, "win"), game(evil, "a", "draw")), tmp_path / RESULTS)
+    with pytest.raises(SystemExit) as ended:
+        main(["arena", "export", str(tmp_path), "--into", str(tmp_path / "site")])
+    assert not ended.value.code
+    index = (tmp_path / "site" / "index.html").read_text()
+    assert "<script" not in index and "&lt;script&gt;alert(1)" in index
+    links = {link.partition('"')[0] for link in index.split('href="')[1:]}
+    assert len(links) == 2 * 2
+    for link in links:
+        cell = (tmp_path / "site" / link).read_text()
+        assert cell.count("<tr>") == 1 + 2 and "<script" not in cell
