@@ -106,8 +106,9 @@ def plan_cell(
     Raises:
         ConfigError: it cannot be played.
     """
-    prepared = _prepare(GridCell(cell, settings, tuple(seeds)), games.name_of(game))
-    return [prepared.match(name, seed, 0) for seed in seeds]
+    planned = GridCell(cell, settings, tuple(seeds))
+    prepared = _prepare(planned, games.name_of(game))
+    return [prepared.match(name, seed, 0) for seed in planned.seeds]
 
 
 def check_playable(matches: Iterable[PlannedMatch], budget_usd: float | None) -> None:
