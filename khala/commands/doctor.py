@@ -153,16 +153,12 @@ def _engine() -> Iterator[Finding]:
 def _bus() -> Iterator[Finding]:
     yield Finding("Zenoh", "ok", importlib.metadata.version("eclipse-zenoh"))
     for port, user in PORTS.items():
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError as error:
-                yield Finding(
-                    f"port {port}", "note", os.strerror(error.errno or 0), f"{user} needs another one: --listen"
-                )
-            else:
-                yield Finding(f"port {port}", "ok", f"free for {user}")
+        try:
+            socket.create_server(("127.0.0.1", port)).close()
+        except OSError as error:
+            yield Finding(f"port {port}", "note", os.strerror(error.errno or 0), f"{user} needs another one: --listen")
+        else:
+            yield Finding(f"port {port}", "ok", f"free for {user}")
 
 
 def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:

@@ -148,6 +148,7 @@ def test_a_torn_recording_is_recovered_by_a_command(
         replay(path, new=new)
 
 
+@pytest.mark.posix
 def test_a_pipe_is_no_recording(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(RecordingError, match=r"pipe cannot be read: it is a pipe or a device: name a file$"):
