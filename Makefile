@@ -9,6 +9,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # uv from PATH if it is there, else our own in .uv
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
+PROGRESS := bash .ci/progress
 # pytest on every core; `PARALLEL=` for one core
 PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 # per cent that `make cover` requires of these packages; make cover COVERED=0 COVERED_PACKAGES=bridge only prints
@@ -24,19 +25,22 @@ help: ## List the targets
 
 .uv/bin/uv:
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	$(PYTHON) -m venv .uv
-	.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
+	@echo "Installing uv, which installs everything else, into .uv"
+	@$(PYTHON) -m venv .uv
+	@.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
 
 # A C compiler, where there is one, builds the simulator's compiled systems; see docs/design/engine.md.
 ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(filter-out %/columns.pxd %/columns.pyx,$(wildcard simulator/khala_simulator/*/*.p*))
 
 .venv/.ready: pyproject.toml uv.lock $(ENGINE) $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON)
+	@$(PROGRESS) "Installing what a match needs into .venv: 90 packages, and a compiled simulator (a minute or two on two cores)" \
+	  $(UV) sync --frozen --inexact --python $(PYTHON)
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
+	@$(PROGRESS) "Installing what the tests need into .venv" \
+	  $(UV) sync --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
 	@touch $@
 
 # Not every machine has a wheel of llama.cpp; the tests that need it are skipped there, and say so.

@@ -45,7 +45,8 @@ class Finding:
 
 def examine(tls: Path | None = None, game: str | None = None) -> Iterator[Finding]:
     """Run every check, in the order in which a newcomer would ask; of certificates and of a game if they are named."""
-    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
+    usual = [check for check in CHECKS if not (game and check is _game)]  # the game that is named counts, no other
+    for check in (*usual, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others

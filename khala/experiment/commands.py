@@ -22,7 +22,7 @@ from khala.experiment.plan import check_playable, plan
 from khala.experiment.spec import Experiment
 from khala.experiment.store import Store
 from khala_configs import CONFIGS
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.signals import cancelled_by_signal
@@ -60,7 +60,7 @@ def list_shipped(*, as_json: bool) -> None:
         table.add_column(column)
     for name, experiment in found.items():
         table.add_row(name, experiment.description)
-    stdout_console().print(table)
+    print_table(table)
 
 
 def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
@@ -229,4 +229,4 @@ def _print_cells(experiment: Experiment, matches: list[PlannedMatch], store: Sto
         costs = f"{row['cost_usd']:.4f}" if row["cost_usd"] else ""
         numbers = [done, *(str(row[state] or "") for state in ("invalid", "crashed"))]
         table.add_row(*names, *numbers, costs, "; ".join(row["causes"]))
-    stdout_console().print(table)
+    print_table(table)

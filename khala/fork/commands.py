@@ -21,7 +21,7 @@ from khala.fork.futures import Plan, play_all
 from khala.fork.players import players_of
 from khala.fork.recorded import play_recorded
 from khala.playing.matches import newest_recording
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console
 from khala_orchestrator.past.fork import Trunk, trunk_of
 from khala_protocol.errors import RecordingError
 from khala_protocol.signals import cancelled_by_signal
@@ -144,7 +144,7 @@ def _print(data: dict[str, Any], table: object, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(data))
     else:
-        stdout_console().print(table)
+        print_table(table)
 
 
 def _origin(trunk: Trunk) -> dict[str, Any]:
