@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
     from typing import TypeVar
 
+    from rich.table import Table
+
     from khala.fork.futures import Fork, Future
     from khala.playing.minds import Minds
 
@@ -140,7 +142,7 @@ def _until_interrupted(work: Coroutine[Any, Any, T], what_is_left: str) -> T:
     return done
 
 
-def _print(data: dict[str, Any], table: object, *, as_json: bool) -> None:
+def _print(data: dict[str, Any], table: Table, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(data))
     else:

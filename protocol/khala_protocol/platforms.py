@@ -149,7 +149,8 @@ def cores() -> int:
     """Return how many cores this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    else:  # noqa: RET505  # for mypy, which takes what follows for dead code
+        return os.cpu_count() or 1
 
 
 # --- sockets and pipes --------------------------------------------------------------------------------
