@@ -9,11 +9,14 @@ export PYTHONDONTWRITEBYTECODE :=
 # uv from PATH if it is there, else our own in .uv
 UV ?= $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := .venv/bin/
+PROGRESS := bash .ci/progress
 # pytest on every core; `PARALLEL=` for one core
 PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 # per cent that `make cover` requires of these packages; make cover COVERED=0 COVERED_PACKAGES=bridge only prints
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
+# What people install is typed as macOS and Windows have it; tests skip there what they lack, and bench runs on Linux.
+INSTALLED := agents bridge configs khala orchestrator protocol simulator
 
 .PHONY: help install install-tests check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
 
@@ -22,19 +25,22 @@ help: ## List the targets
 
 .uv/bin/uv:
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	$(PYTHON) -m venv .uv
-	.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
+	@echo "Installing uv, which installs everything else, into .uv"
+	@$(PYTHON) -m venv .uv
+	@.uv/bin/pip install --quiet --disable-pip-version-check 'uv>=0.9'
 
 # A C compiler, where there is one, builds the simulator's compiled systems; see docs/design/engine.md.
 ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(filter-out %/columns.pxd %/columns.pyx,$(wildcard simulator/khala_simulator/*/*.p*))
 
 .venv/.ready: pyproject.toml uv.lock $(ENGINE) $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON)
+	@$(PROGRESS) "Installing what a match needs into .venv: 90 packages, and a compiled simulator (a minute or two on two cores)" \
+	  $(UV) sync --frozen --inexact --python $(PYTHON)
 	@touch $@
 
 .venv/.tests: .venv/.ready
-	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
+	@$(PROGRESS) "Installing what the tests need into .venv" \
+	  $(UV) sync --frozen --inexact --python $(PYTHON) --group env --group experiments --group page --group tools
 	@touch $@
 
 # Not every machine has a wheel of llama.cpp; the tests that need it are skipped there, and say so.
@@ -46,8 +52,11 @@ install: .venv/.ready ## Install what is needed to play into .venv
 
 install-tests: .venv/.tests ## Install what the tests need as well
 
-demo: install ## Play 2s3z on this machine: simulator, host, two agents, scripted model
-	$(RUN)khala run 2s3z_pair
+demo: install ## Play a battle on this machine: simulator, host, two agents, scripted model; then without orders
+	$(RUN)khala run 3s_vs_3z_pair --model-name skilled
+	@echo "And now the same army without orders, which lost all of 20 battles when it was measured:"
+	$(RUN)khala run 3s_vs_3z_pair --policy silent
+	@echo "Look at both battles: .venv/bin/khala view"
 
 test: install-tests ## Lint, types, contracts and every short test
 	@said=$$(mktemp) && trap 'rm -f $$said' EXIT; \
@@ -74,10 +83,11 @@ cover: install-tests ## Branch coverage of packages by their own tests; fails be
 	  echo "== $$package"; $(RUN)coverage report --include "$$package/*" --skip-covered --fail-under $(COVERED) || exit 1; \
 	done
 
-check: install-tests ## Lint, format, types, import contracts, rows of bench/doors for every command, and habits of the code
+check: install-tests ## Lint, format, types on three platforms, import contracts, rows of bench/doors for every command, and habits of the code
 	$(RUN)ruff check .
 	$(RUN)ruff format --check .
 	$(RUN)mypy
+	for platform in darwin win32; do $(RUN)mypy --platform $$platform --no-warn-unreachable --cache-dir .mypy_cache/$$platform $(INSTALLED) || exit 1; done
 	$(RUN)lint-imports --no-logo
 	$(RUN)python -m bench doors --check
 	$(RUN)python -m bench house

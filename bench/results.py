@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.figures import Better
 from bench.paths import RESULTS, ROOT
+from khala_protocol.platforms import cores
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -132,10 +133,9 @@ def begin() -> Results:
 def this_machine() -> Machine:
     """Return what is known of this machine."""
     named = re.search(r"^model name\s*: (.+)$", CPUINFO.read_text() if CPUINFO.exists() else "", re.MULTILINE)
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return Machine(
         cpu=named[1].strip() if named else platform.machine(),
-        cores=cores,
+        cores=cores(),
         memory_gb=round(psutil.virtual_memory().total / 2**30),
         system=platform.system(),
         python=platform.python_version(),

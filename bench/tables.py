@@ -1,4 +1,4 @@
-"""Tables of figures on a terminal, wide enough for their names where there is none."""
+"""Tables of figures; in a pipe or a file, a row is one line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from rich.table import Table
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-LEAST_WIDTH = 140
-"""Characters of a line that goes into a file."""
+WIDEST = 10_000
+"""Characters of a line that goes into a pipe or a file, where none is cut; no table is as wide."""
 
 
 def print_table(
@@ -37,7 +37,7 @@ def print_table(
     for row in rows:
         table.add_row(*map(str, row))
     console = Console(file=file)
-    Console(file=file, width=None if console.is_terminal else LEAST_WIDTH, highlight=False).print(table)
+    Console(file=file, width=None if console.is_terminal else WIDEST, highlight=False).print(table)
 
 
 def two_digits(value: float | None) -> str:

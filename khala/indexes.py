@@ -14,6 +14,8 @@ import sqlite3
 import tempfile
 from typing import TYPE_CHECKING
 
+from khala_protocol.platforms import NO_FOLLOW
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -67,7 +69,7 @@ def create(path: Path, schema: str, version: int, *, journal: str = "delete") ->
     Raises:
         OSError: the disk is full, or takes nothing.
     """
-    os.close(os.open(path, os.O_CREAT | os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), 0o600))
+    os.close(os.open(path, os.O_CREAT | os.O_RDWR | NO_FOLLOW, 0o600))
     with contextlib.closing(sqlite3.connect(path, timeout=BUSY_S)) as db, faults(path):
         statements = f"{schema}; pragma user_version = {version}; commit; pragma journal_mode = {journal};"
         try:

@@ -6,6 +6,7 @@ import asyncio
 import gc
 import importlib
 import selectors
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 LONG_S = 600.0
 """What a long test may take unless it says otherwise: several times what it takes, for slow machines."""
+
+NEEDS: Mapping[str, tuple[str, ...]] = {"linux": (), "win32": ("posix", "linux"), "other": ("linux",)}
+"""Marks of tests that a platform cannot run."""
 
 # No deadlines: a busy machine is no fault of what is tested.
 settings.register_profile("short", max_examples=30, deadline=None)
@@ -28,6 +32,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if (many_examples or item.get_closest_marker("slow")) and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(LONG_S))
+        for name in NEEDS.get(sys.platform, NEEDS["other"]):
+            if item.get_closest_marker(name):
+                item.add_marker(pytest.mark.skip(reason=f"needs what {name} has"))
 
 
 def pytest_collection_finish() -> None:

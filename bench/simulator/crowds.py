@@ -18,6 +18,7 @@ that all of them cover shoulder to shoulder. Units that walk in single file at s
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -28,6 +29,7 @@ import numpy as np
 from rich.console import Console
 
 from bench.command_line import make_parser
+from bench.tables import WIDEST
 from khala.experiment.statistics import wilson
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, lifecycle
@@ -473,7 +475,7 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="write three moments of the first experiment to this file instead")
     parser.add_argument("--only", default="", help="experiments whose title contains this")
     options = parser.parse_args()
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else WIDEST)
     if options.mirrors:
         mirrors(options.mirrors, console)
         return

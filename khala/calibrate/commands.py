@@ -25,7 +25,7 @@ from khala_bridge.calibrate.catalogue import choose
 from khala_bridge.calibrate.connection import run_game, version
 from khala_bridge.calibrate.record import Calibration, Values, load
 from khala_bridge.calibrate.run import play
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 
@@ -58,7 +58,7 @@ def show_probes(patterns: Sequence[str], *, as_json: bool) -> None:
     table = Table("probe", "measures", "settles", "estimates", box=None, pad_edge=False)
     for probe in probes:
         table.add_row(probe.id, probe.measures, probe.settles, str(len(waiting.get(probe.id, [])) or ""))
-    stdout_console().print(table)
+    print_table(table)
 
 
 def show_comparison(a: Path, b: Path, *, as_json: bool) -> None:

@@ -45,7 +45,8 @@ class Finding:
 
 def examine(tls: Path | None = None, game: str | None = None) -> Iterator[Finding]:
     """Run every check, in the order in which a newcomer would ask; of certificates and of a game if they are named."""
-    for check in (*CHECKS, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
+    usual = [check for check in CHECKS if not (game and check is _game)]  # the game that is named counts, no other
+    for check in (*usual, *([_certificates_in(tls)] if tls else []), *([_game_process(game)] if game else [])):
         try:
             yield from check()
         except Exception as error:  # noqa: BLE001  # one check that breaks must not hide the others
@@ -153,16 +154,12 @@ def _engine() -> Iterator[Finding]:
 def _bus() -> Iterator[Finding]:
     yield Finding("Zenoh", "ok", importlib.metadata.version("eclipse-zenoh"))
     for port, user in PORTS.items():
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError as error:
-                yield Finding(
-                    f"port {port}", "note", os.strerror(error.errno or 0), f"{user} needs another one: --listen"
-                )
-            else:
-                yield Finding(f"port {port}", "ok", f"free for {user}")
+        try:
+            socket.create_server(("127.0.0.1", port)).close()
+        except OSError as error:
+            yield Finding(f"port {port}", "note", os.strerror(error.errno or 0), f"{user} needs another one: --listen")
+        else:
+            yield Finding(f"port {port}", "ok", f"free for {user}")
 
 
 def _certificates_in(directory: Path) -> Callable[[], Iterator[Finding]]:

@@ -18,7 +18,7 @@ from rich.text import Text
 
 from khala.commands.exit_codes import DONE, FAILED, NOT_VALID, SIGNALLED
 from khala_orchestrator.commands import access_rules
-from khala_orchestrator.console import Progress, stderr_console, stdout_console
+from khala_orchestrator.console import Progress, print_table, stderr_console
 from khala_protocol.errors import ConfigError
 from khala_protocol.joining import client_config, router_config
 from khala_protocol.signals import cancelled_by_signal
@@ -110,5 +110,5 @@ def doctor(tls: Path | None, game: str | None, *, as_json: bool) -> None:
         for finding in findings:
             state, advice = Text(finding.state, marks[finding.state]), Text(finding.advice, "dim")
             table.add_row(state, finding.name, finding.found, advice)
-        stdout_console().print(table)
+        print_table(table)
     raise typer.Exit(FAILED if wrong else DONE)

@@ -101,7 +101,7 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    from khala_orchestrator.console import stdout_console  # noqa: PLC0415
+    from khala_orchestrator.console import print_table  # noqa: PLC0415
     from khala_protocol.certificates import certificates  # noqa: PLC0415
 
     found = certificates(directory)
@@ -126,7 +126,7 @@ def show(directory: Directory, *, as_json: Json = False) -> None:
         days = Text(str(certificate.days_left), "red" if certificate.warning else "")
         ends = f"{certificate.ends:%Y-%m-%d}"
         table.add_row(certificate.name, certificate.path.parent.name, ends, days, ", ".join(certificate.hosts))
-    stdout_console().print(table)
+    print_table(table)
     for certificate in found:
         if certificate.warning:
             say(certificate.warning, err=True)

@@ -25,7 +25,7 @@ from khala.experiment.store import Store
 from khala.playing.minds import groups_of
 from khala_agents.config import load_model
 from khala_configs import CONFIGS
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console, stdout_console
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.signals import cancelled_by_signal
@@ -68,7 +68,7 @@ def list_shipped(*, as_json: bool) -> None:
         table.add_column(column)
     for name, experiment in found.items():
         table.add_row(name, experiment.description)
-    stdout_console().print(table)
+    print_table(table)
 
 
 def show(file: str, *, game: str, out: Path, as_json: bool) -> None:
@@ -269,7 +269,7 @@ def _print_cells(
         costs = f"{row['cost_usd']:.4f}" if row["cost_usd"] else ""
         numbers = [done, *(str(row[state] or "") for state in ("invalid", "crashed"))]
         table.add_row(*names, *numbers, costs)
-    stdout_console().print(table)
+    print_table(table)
     for row in rows.values():
         for cause in row["causes"]:
             where = ", ".join(str(row.get(factor, "")) for factor in experiment.factors)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from collections import Counter
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -14,6 +13,7 @@ import psutil
 
 from khala.playing.jobs import MatchWorker
 from khala_protocol.files import make_private
+from khala_protocol.platforms import cores
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -45,8 +45,7 @@ class Engine(Protocol):
 
 def slots_of_this_machine() -> int:
     """Return how many matches this machine plays at the same time: one a core, as far as there is memory."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(cores, int(psutil.virtual_memory().available) // 2**20 // MATCH_MB))
+    return max(1, min(cores(), int(psutil.virtual_memory().available) // 2**20 // MATCH_MB))
 
 
 class Local:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console, stdout_console
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
 from khala_protocol.visible import visible_line
@@ -27,8 +27,6 @@ TO_SHOW_IT = (
     "To show it: with so many games more, a difference in wins that is as large as it seems here would be found in four"
     " of five experiments."
 )
-WIDE = 160
-"""Characters of a line that no terminal shows."""
 
 
 def compare(a: str, b: str, *, allow: Sequence[str], measures: Sequence[str], out: Path, as_json: bool) -> None:
@@ -42,8 +40,7 @@ def compare(a: str, b: str, *, allow: Sequence[str], measures: Sequence[str], ou
         typer.echo(json.dumps(plain(findings)))
         return
     screen = stdout_console()
-    screen.width = screen.width if screen.is_terminal else WIDE
-    screen.print(_table(findings))
+    print_table(_table(findings))
     for line in _remarks(findings):
         screen.print(visible_line(line), soft_wrap=True)
 

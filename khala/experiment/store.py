@@ -12,7 +12,6 @@ beside the one of the next try.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import logging
 import re
 import sqlite3
@@ -20,6 +19,8 @@ import weakref
 from collections import defaultdict
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
+
+from filelock import FileLock, Timeout
 
 from khala import indexes
 from khala.experiment.index import CALLS, Row, add, connect, create, played_in, results_in, schema, take
@@ -31,7 +32,7 @@ from khala.playing.spending import paid_usd
 from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError, RecordingError
-from khala_protocol.files import make_private, open_private, write_private
+from khala_protocol.files import make_private, write_private
 from khala_protocol.recording import Recording
 
 if TYPE_CHECKING:
@@ -90,11 +91,11 @@ class Store:
         Raises:
             ConfigError: another one is at work here.
         """
-        with open_private(self.directory / LOCK, "ab") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise ConfigError(f"another process plays the experiment in {self.directory}: wait for it") from None
+        try:
+            held = FileLock(self.directory / LOCK, mode=0o600).acquire(blocking=False)
+        except Timeout:
+            raise ConfigError(f"another process plays the experiment in {self.directory}: wait for it") from None
+        with held:
             self._is_locked = True
             try:
                 yield

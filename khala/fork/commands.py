@@ -21,7 +21,7 @@ from khala.fork.futures import Plan, play_all
 from khala.fork.players import players_of
 from khala.fork.recorded import play_recorded
 from khala.playing.matches import newest_recording
-from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.console import print_table, stderr_console
 from khala_orchestrator.past.fork import Trunk, trunk_of
 from khala_protocol.errors import RecordingError
 from khala_protocol.signals import cancelled_by_signal
@@ -29,6 +29,8 @@ from khala_protocol.signals import cancelled_by_signal
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
     from typing import TypeVar
+
+    from rich.table import Table
 
     from khala.fork.futures import Fork, Future
     from khala.playing.minds import Minds
@@ -140,11 +142,11 @@ def _until_interrupted(work: Coroutine[Any, Any, T], what_is_left: str) -> T:
     return done
 
 
-def _print(data: dict[str, Any], table: object, *, as_json: bool) -> None:
+def _print(data: dict[str, Any], table: Table, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(data))
     else:
-        stdout_console().print(table)
+        print_table(table)
 
 
 def _origin(trunk: Trunk) -> dict[str, Any]:

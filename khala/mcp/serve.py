@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import os
 import secrets
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from khala.mcp.holder import Holder
 from khala.mcp.server import CLIENT, client_of, server_of
 from khala_protocol.commandline import say
 from khala_protocol.listening import bind
-from khala_protocol.signals import SIGNALS
+from khala_protocol.platforms import on_signals
 
 if TYPE_CHECKING:
     import signal
@@ -152,8 +153,7 @@ def _first_signal() -> asyncio.Future[signal.Signals]:
     """Return the first signal that asks for an end, once it has come."""
     loop = asyncio.get_running_loop()
     signalled: asyncio.Future[signal.Signals] = loop.create_future()
-    for number in SIGNALS:
-        loop.add_signal_handler(number, _resolve, signalled, number)
+    on_signals(functools.partial(_resolve, signalled))
     return signalled
 
 

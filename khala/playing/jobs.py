@@ -17,6 +17,7 @@ from khala.playing.processes import end_process, start_process
 from khala_orchestrator.config import MatchConfig  # noqa: TC001
 from khala_protocol.bus.config import BusConfig  # noqa: TC001
 from khala_protocol.messages import Frozen
+from khala_protocol.platforms import ask_to_end
 
 if TYPE_CHECKING:
     import asyncio
@@ -97,7 +98,7 @@ class MatchWorker:
     def stop(self) -> None:
         """Have the process end in order; `play` returns soon."""
         with contextlib.suppress(ProcessLookupError):
-            self._process.terminate()
+            ask_to_end(self._process)
 
     async def close(self) -> None:
         """End the process, in order if there is time."""

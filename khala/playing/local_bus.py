@@ -8,11 +8,12 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import socket
 import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from khala_protocol.platforms import HAS_UNIX_SOCKETS, is_mine, unix_socket
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,7 +30,7 @@ SETTLED_S = 60.0
 @contextlib.contextmanager
 def local_endpoint() -> Iterator[str]:
     """Yield an endpoint to listen on, and remove what it leaves; where such a socket cannot be, it is a free port."""
-    if not hasattr(socket, "AF_UNIX"):
+    if not HAS_UNIX_SOCKETS:
         yield LOOPBACK
         return
     remove_forgotten()
@@ -40,7 +41,7 @@ def local_endpoint() -> Iterator[str]:
 
 def running() -> list[str]:
     """Return the endpoints of our matches on this machine that are being played, the newest first."""
-    found = [path / SOCKET for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*") if _is_ours(path)]
+    found = [path / SOCKET for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*") if is_mine(path)]
     alive = [path for path in found if path.exists() and not _is_dead(path)]
     return [f"unixsock-stream/{path}" for path in sorted(alive, key=lambda path: -path.stat().st_mtime)]
 
@@ -48,14 +49,8 @@ def running() -> list[str]:
 def remove_forgotten() -> None:
     """Remove the directories of our matches that were killed: nobody listens on their sockets."""
     for directory in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        if _is_ours(directory) and _is_old(directory / SOCKET) and _is_dead(directory / SOCKET):
+        if is_mine(directory) and _is_old(directory / SOCKET) and _is_dead(directory / SOCKET):
             shutil.rmtree(directory, ignore_errors=True)
-
-
-def _is_ours(directory: Path) -> bool:
-    with contextlib.suppress(OSError):
-        return directory.stat(follow_symlinks=False).st_uid == os.getuid()
-    return False
 
 
 def _is_old(path: Path) -> bool:
@@ -65,7 +60,7 @@ def _is_old(path: Path) -> bool:
 
 
 def _is_dead(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as probe:
+    with unix_socket() as probe:
         try:
             probe.connect(str(path))
         except ConnectionRefusedError:

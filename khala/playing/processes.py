@@ -1,7 +1,7 @@
 """Processes of Khala's own code: how each of them is started, and ended.
 
-Each leads its own session, so that Ctrl-C reaches the parent alone, which ends the others in order; if the parent is
-killed, they end by themselves (`khala_protocol.parent_watch`).
+Each leads a session or group of its own, so that Ctrl-C reaches the parent alone, which ends the others in order; if
+the parent is killed, they end by themselves (`khala_protocol.parent_watch`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from khala_protocol.files import open_private
 from khala_protocol.parent_watch import named_parent
+from khala_protocol.platforms import apart, ask_to_end
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,8 +49,8 @@ async def start_process(
             stdout=ends,
             stderr=stderr,
             env={**environ, **named_parent()},
-            start_new_session=True,
             limit=LONGEST_LINE,
+            **apart(),
         )
 
 
@@ -63,7 +64,7 @@ def redirect(number: int, path: Path | str, flags: int) -> None:
 async def end_process(process: asyncio.subprocess.Process, within_s: float) -> None:
     """End a process in order, or kill it after `within_s`; its own processes watch it, and end with it."""
     with contextlib.suppress(ProcessLookupError):
-        process.terminate()
+        ask_to_end(process)
     try:
         async with asyncio.timeout(within_s):
             await process.wait()

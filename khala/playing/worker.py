@@ -33,6 +33,7 @@ from khala_orchestrator.past.resume import read_unfinished
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import Report
 from khala_protocol.parent_watch import end_with_parent, named_parent
+from khala_protocol.platforms import read_lines
 from khala_protocol.signals import cancelled_by_signal
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ async def _work(answers: FileIO, *, game: str, live: bool, spares: int) -> None:
                 await stock.ready()
             watch = _log_step if live else lambda _: None
             supplies = Supplies(spawn=stock, processes=processes)
-            jobs = await _read_stdin()
+            jobs = await read_lines(sys.stdin.buffer, LONGEST_LINE)
             while line := await jobs.readline():
                 job = Job.model_validate_json(line)
                 logs.here.clear()
@@ -161,12 +162,6 @@ def _take_stdout() -> FileIO:
 def _answer(answers: FileIO, ended: Ended) -> None:
     with contextlib.suppress(BrokenPipeError):  # the parent is gone
         answers.write(ended.model_dump_json().encode() + b"\n")
-
-
-async def _read_stdin() -> asyncio.StreamReader:
-    reader = asyncio.StreamReader(limit=LONGEST_LINE)
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-    return reader
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from khala.service import client, memory
 from khala.service.book import Limits
 from khala.service.daemon import Service
 from khala.service.pool import Pool
-from khala_orchestrator.console import Progress, stderr_console, stdout_console
+from khala_orchestrator.console import Progress, print_table, stderr_console
 from khala_protocol.access import service_settings
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
@@ -146,7 +146,7 @@ def matches(connect: list[str] | None, *, tls: Path | None, insecure: bool, as_j
         result = ", ".join(card.outcomes) or card.reason
         state = Text(card.state, STATES.get(card.state, ""))
         table.add_row(card.run, card.task, card.owner, state, progress, result)
-    stdout_console().print(table)
+    print_table(table)
 
 
 def watch(run: str, connect: list[str] | None, *, tls: Path | None, insecure: bool, as_json: bool) -> None:

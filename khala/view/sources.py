@@ -12,6 +12,7 @@ from khala.view import experiments, library
 from khala.view.library import run_id
 from khala.view.runs import NotThere, Opened
 from khala.view.wire import ExperimentView, Library
+from khala_orchestrator.past.places import place_of
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -105,9 +106,7 @@ def find(given: Sequence[str], runs: Path, *, adviser: str = "") -> Sources:
 
 def _place(name: str, runs: Path) -> Path:
     """Return the recording or the directory that a name stands for; of a run with one recording, that."""
-    path = next((path for path in (Path(name), runs / name) if path.exists()), None)
-    if path is None:
-        raise ConfigError(f"there is no {name}, nor {runs / name}: name a recording, a directory or a run")
+    path = place_of(Path(name), runs)
     if path.is_dir():
         found = library.found_in(path)
         return found.recordings[0] if len(found.recordings) == 1 and not found.experiments else path

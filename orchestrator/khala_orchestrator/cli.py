@@ -35,7 +35,8 @@ Examples:\n
 """
 REPLAY_EPILOG = """
 Examples:\n
-    khala replay runs/2s3z-20260101-120000-ab12/recording.mcap\n
+    khala replay\n
+    khala replay 2s3z-20260101-120000-ab12\n
     khala replay recording.mcap --agent Stalkers --steps 10-20 --text\n
     khala replay recording.mcap --steps 7 --images pictures\n
     khala replay recording.mcap --pace\n
@@ -88,7 +89,14 @@ def tasks(*, as_json: Json = False) -> None:
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="A recording, for example of `khala run`.")],
+    given: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="A recording, a run below runs/, or a directory, of which the newest recording counts.",
+            metavar="[RUN|RECORDING|DIR]...",
+            show_default="runs",
+        ),
+    ] = None,
     *,
     agent: Annotated[
         str | None, typer.Option(help="Only what this agent saw, said and did; red/NAME is an agent of side red.")
@@ -109,7 +117,9 @@ def replay(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Show what was said and done in a recorded run."""
+    """Show what was said and done in a recorded run, or in several, one after the other."""
     from khala_orchestrator import commands  # noqa: PLC0415  # see there
 
-    commands.replay(file, agent=agent, steps=steps, text=text, images=images, new=new, pace=pace, as_json=as_json)
+    commands.replay(
+        tuple(given or ()), agent=agent, steps=steps, text=text, images=images, new=new, pace=pace, as_json=as_json
+    )

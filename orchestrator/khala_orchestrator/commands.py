@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -16,6 +17,7 @@ from rich.text import Text
 
 from khala_orchestrator.config import all_tasks, load_task
 from khala_orchestrator.console import stderr_console, stdout_console
+from khala_orchestrator.past.places import recording_of
 from khala_orchestrator.past.transcript import StepSelection, save_pictures, summary, transcript
 from khala_protocol.bus.zenoh import open_bus, probe
 from khala_protocol.commandline import say
@@ -27,12 +29,13 @@ from khala_protocol.signals import stop_on_signal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.bus.config import BusConfig
 
 CHECK_S = 2.0
+RUNS = Path("runs")
+"""Where `khala run` records."""
 
 
 def check_router(connect: str | None, *, tls: Path | None, insecure: bool, as_json: bool) -> None:
@@ -103,7 +106,7 @@ def people(names: Sequence[str]) -> str:
 
 
 def replay(
-    file: Path,
+    given: Sequence[Path],
     *,
     agent: str | None,
     steps: str | None,
@@ -113,8 +116,27 @@ def replay(
     pace: bool,
     as_json: bool,
 ) -> None:
-    """Show what was said and done in a recorded run."""
+    """Show what was said and done in recorded runs."""
     selection = StepSelection.of(agent, steps)
+    if len(given) > 1 and (images is not None or new is not None):
+        raise ConfigError(f"the files of {len(given)} recordings would be mixed: name one")
+    for name in given or (RUNS,):
+        file = recording_of(name, RUNS)
+        if file != name or len(given) > 1:
+            stderr_console().print(Text(str(file)), style="bold", soft_wrap=True)
+        _replay(file, selection, text=text, images=images, new=new, pace=pace, as_json=as_json)
+
+
+def _replay(
+    file: Path,
+    selection: StepSelection,
+    *,
+    text: bool,
+    images: Path | None,
+    new: Path | None,
+    pace: bool,
+    as_json: bool,
+) -> None:
     recording = Recording.open(file)
     if not recording.complete:
         stderr_console().print(Text(_damage(recording)), style="yellow", soft_wrap=True)

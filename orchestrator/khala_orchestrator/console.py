@@ -7,6 +7,7 @@ here are the only ones: whatever is printed on them, no character of it does any
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections import Counter
 from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
 OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
+WIDEST = 10_000
+"""Characters of a row in a pipe; no table has as many."""
 HEARTBEAT_S = 30.0
 """Off a terminal, a line is printed after so many seconds, with the next report."""
 SIDE = {"blue": "bold blue", "red": "bold red"}
@@ -65,6 +68,14 @@ def stderr_console() -> Console:
 def stdout_console() -> Console:
     """Return a console on stdout."""
     return _VisibleConsole()
+
+
+def print_table(table: Table) -> None:
+    """Print a table that fits its contents on stdout; in a pipe or a file, a row is one line, whatever its length."""
+    console = stdout_console()
+    if not (console.is_terminal or "COLUMNS" in os.environ):
+        console.width = WIDEST
+    console.print(table)
 
 
 class Progress:

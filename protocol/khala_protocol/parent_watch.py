@@ -9,14 +9,14 @@ Above: `python -m khala`, as which `khala run` starts its processes.
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import time
 from typing import Final
 
+from khala_protocol.platforms import end_this_process, wait_for_end_of
+
 PARENT: Final = "KHALA_PARENT"
 """The variable with the process id of the parent."""
-LOOK_S = 0.25
 UNWIND_S = 1.0
 """Time to end in order; a process that is too busy for it ends anyway."""
 
@@ -37,10 +37,8 @@ def end_with_parent() -> None:
 
 
 def _watch(parent: int) -> None:
-    # Not a task of the loop, which code of the user may block. The id cannot mislead: that of the process which adopts
-    # an orphan was taken while the parent lived.
-    while os.getppid() == parent:
-        time.sleep(LOOK_S)
-    os.kill(os.getpid(), signal.SIGTERM)
+    # Not a task of the loop, which code of the user may block.
+    wait_for_end_of(parent)
+    end_this_process()
     time.sleep(UNWIND_S)
     os._exit(1)

@@ -6,29 +6,26 @@ Above: the command lines of all parts. Both functions are called on the loop tha
 from __future__ import annotations
 
 import asyncio
-import signal
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from khala_protocol.platforms import on_signals
 
 if TYPE_CHECKING:
+    import signal
     from collections.abc import Coroutine
 
 T = TypeVar("T")
-
-SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 def stop_on_signal() -> asyncio.Event:
     """Return an event that the first signal sets; the second one ends the process at once."""
     stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
 
-    def end() -> None:
+    def end(_: signal.Signals) -> None:
         stop.set()
-        for number in SIGNALS:
-            loop.remove_signal_handler(number)
+        undo()
 
-    for number in SIGNALS:
-        loop.add_signal_handler(number, end)
+    undo = on_signals(end)
     return stop
 
 
@@ -41,8 +38,7 @@ async def cancelled_by_signal(work: Coroutine[Any, Any, T]) -> T | signal.Signal
         came.append(number)
         task.cancel()
 
-    for number in SIGNALS:
-        asyncio.get_running_loop().add_signal_handler(number, end, number)
+    on_signals(end)
     try:
         return await task
     except asyncio.CancelledError:

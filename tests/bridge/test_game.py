@@ -283,6 +283,7 @@ def config(directory: Path) -> GameConfig:
     return GameConfig(sc2path=directory, map=known_maps()["2s3z"], start_timeout_s=8)
 
 
+@pytest.mark.posix
 def test_a_map_that_is_no_file_of_a_fair_size_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install = lay_out(tmp_path / "sc2", maps=False)
     path = install / "Maps" / "llm_smac" / "2s3z.SC2Map"

@@ -198,6 +198,7 @@ def test_a_game_that_dies_is_an_error_and_can_be_closed(start: Play) -> None:
     battle.game.close()
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 async def test_a_stopped_game_is_noticed_killed_and_named(
     sc2path: Path, task: Callable[..., TaskConfig], caplog: pytest.LogCaptureFixture

@@ -129,7 +129,7 @@ def _ip(*arguments: str) -> None:
 @pytest.fixture
 async def machines(tmp_path: Path) -> AsyncIterator[tuple[Machine, Machine, Machine]]:
     """Yield three machines that reach each other, through a switch at the first one, and nothing else."""
-    if os.geteuid() != 0 or shutil.which("ip") is None:
+    if sys.platform != "linux" or os.geteuid() != 0 or shutil.which("ip") is None:
         pytest.skip("network namespaces need root and iproute2")
     first, second, third = (Machine(f"khala-{os.getpid()}-{n}", f"192.0.2.{n}", tmp_path) for n in (1, 2, 3))
     async with contextlib.AsyncExitStack() as stack:

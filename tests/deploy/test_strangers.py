@@ -56,7 +56,7 @@ async def test_the_attacks_would_succeed_without_access_rules(monkeypatch: pytes
 @pytest.fixture
 def machines() -> Iterator[tuple[str, str]]:
     """Yield two network namespaces with a cable between them."""
-    if os.geteuid() != 0 or shutil.which("ip") is None:
+    if sys.platform != "linux" or os.geteuid() != 0 or shutil.which("ip") is None:
         pytest.skip("network namespaces need root and iproute2")
     names = [f"siege{os.getpid()}-{n}" for n in (1, 2)]
     try:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+pytestmark = pytest.mark.linux
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 GONE_S = 2.0
 

@@ -108,7 +108,7 @@ BAD = [
     ("agent Stalkers --run r --connect nonsense --policy silent", "'nonsense' is not an endpoint"),
     ("llm --port {taken}", "in use"),
     ("llm --fault teapot=2", "teapot"),
-    ("replay missing.mcap", "missing.mcap: there is no such file"),
+    ("replay missing.mcap", "there is no missing.mcap, nor runs/missing.mcap"),
     ("replay bad.yaml", "bad.yaml is not a recording"),
     ("view nosuch", "there is no nosuch, nor runs/nosuch: name a recording, a directory or a run"),
     ("view --host 0.0.0.0", "give --password, or --https CERT KEY"),
@@ -437,6 +437,7 @@ def test_the_doctor_says_what_a_game_needs_that_is_not_there(
     code, out = tell(capsys, "doctor", "--game", str(tmp_path), "--json")
     found = {finding["name"]: finding for finding in json.loads(out)["findings"]}
     assert code == 1
+    assert "game" not in found  # such as the simulator, which nobody asked about
     assert "no directory Versions" in found["game process"]["found"]
     assert "real-game.md" in found["game process"]["advice"]
 

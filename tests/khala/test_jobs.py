@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import Wire
 
-pytestmark = pytest.mark.game
+pytestmark = [pytest.mark.game, pytest.mark.posix]
 
 LOUD = """
 from pathlib import Path
@@ -101,6 +101,7 @@ async def test_a_process_that_is_told_to_end_closes_its_match_and_says_so(
     assert Recording.open(tmp_path / "first" / "recording.mcap").complete
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 async def test_a_process_that_is_killed_has_lost_its_match(
     process: MatchWorker, asked: asyncio.Event, tmp_path: Path

@@ -42,6 +42,7 @@ def test_agents_meet_where_no_other_user_can_enter_and_nothing_is_left(temporary
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.posix
 def test_a_match_removes_what_killed_ones_left_and_nothing_of_those_that_live(temporary: Path) -> None:
     names = ("dead", "alive", "starting", "binding")
     dead, alive, starting, binding = (temporary / f"khala-bus-{name}" for name in names)

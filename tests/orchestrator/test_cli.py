@@ -18,7 +18,7 @@ from khala_orchestrator.config import load_task
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.codec import encode
-from khala_protocol.errors import BusError, RecordingError
+from khala_protocol.errors import BusError, ConfigError, RecordingError
 from khala_protocol.messages import AgentReport, ImageRef, Observation, Report, View
 from khala_protocol.recording import Recorder, Recording
 
@@ -77,7 +77,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_a_replay_tells_the_part_that_is_asked_for(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    replay(recording, agent="Stalkers", steps="1-")
+    replay([recording], agent="Stalkers", steps="1-")
     assert capsys.readouterr().out.splitlines() == [
         "step 1  0:10  score 0",
         "  Stalkers: late",
@@ -87,12 +87,12 @@ def test_a_replay_tells_the_part_that_is_asked_for(recording: Path, capsys: pyte
 
 
 def test_a_replay_word_for_word_shows_words_as_they_are(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    replay(recording, steps="0", text=True)
+    replay([recording], steps="0", text=True)
     assert capsys.readouterr().out.splitlines()[:2] == ["step 0, Stalkers sees", "  │ [bold]nothing[/bold]"]
 
 
 def test_a_replay_as_data_is_one_object(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    replay(recording, steps="2", as_json=True)
+    replay([recording], steps="2", as_json=True)
     found = json.loads(capsys.readouterr().out)
     assert [report["step"] for report in found["reports"]] == [2]
     assert found["samples"] == {"khala/test/blue/Stalkers/observation": 3, "khala/test/report": 3}
@@ -101,10 +101,10 @@ def test_a_replay_as_data_is_one_object(recording: Path, capsys: pytest.CaptureF
 def test_a_replay_for_its_pictures_says_where_they_are(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    replay(recording, images=tmp_path / "pictures", as_json=True)
+    replay([recording], images=tmp_path / "pictures", as_json=True)
     assert json.loads(capsys.readouterr().out) == {"pictures": []}
     monkeypatch.chdir(tmp_path)
-    replay(recording, images=Path("pictures_of_it"))
+    replay([recording], images=Path("pictures_of_it"))
     out, err = capsys.readouterr()
     assert (out, err) == ("", "0 pictures are in pictures_of_it\n")
 
@@ -126,12 +126,12 @@ def test_a_replay_says_that_a_recording_is_torn_and_after_which_sample(
     path = torn(recording)
     count = Recording.open(path).samples
     assert 0 < count < 6
-    replay(path, as_json=True)
+    replay([path], as_json=True)
     out, err = capsys.readouterr()
     assert json.loads(out)["complete"] is False
     advice = "--recover NEW writes what can be read as a whole recording"
     assert err == f"{path} is torn or damaged after its sample {count}; {advice}\n"
-    replay(recording, as_json=True)
+    replay([recording], as_json=True)
     out, err = capsys.readouterr()
     assert (json.loads(out)["complete"], err) == (True, "")
 
@@ -140,18 +140,19 @@ def test_a_torn_recording_is_recovered_by_a_command(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, new = torn(recording), tmp_path / "whole.mcap"
-    replay(path, new=new, as_json=True)
+    replay([path], new=new, as_json=True)
     count = Recording.open(path).samples
     assert json.loads(capsys.readouterr().out) == {"recording": str(new), "samples": count, "complete": False}
     assert Recording.open(new).complete
     with pytest.raises(RecordingError, match=r"whole\.mcap exists already"):
-        replay(path, new=new)
+        replay([path], new=new)
 
 
+@pytest.mark.posix
 def test_a_pipe_is_no_recording(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(RecordingError, match=r"pipe cannot be read: it is a pipe or a device: name a file$"):
-        replay(tmp_path / "pipe")
+        replay([tmp_path / "pipe"])
 
 
 def test_pictures_stay_in_their_directory_whatever_they_are_called(tmp_path: Path) -> None:
@@ -168,7 +169,7 @@ def test_pictures_stay_in_their_directory_whatever_they_are_called(tmp_path: Pat
         )  # fmt: skip
         recorder.write("khala/test/blue/A/image/0", data)
         recorder.write("khala/test/blue/A/observation", encode(seen))
-    replay(tmp_path / "run.mcap", images=directory)
+    replay([tmp_path / "run.mcap"], images=directory)
     assert [path.name for path in tmp_path.rglob("*.png")] == ["0-0000-A-_.._.._out.png"]
     assert len(list(directory.glob("*.png"))) == 1
 
@@ -214,3 +215,32 @@ def test_a_router_with_tls_lets_the_agents_of_its_tasks_in_and_nobody_else() -> 
 def test_a_router_does_not_let_other_machines_in_without_being_told_to() -> None:
     with pytest.raises(BusError, match=r"^tcp/0\.0\.0\.0:0 would let every machine that reaches it join without TLS"):
         router(listen=["tcp/0.0.0.0:0"])
+
+
+def test_a_replay_takes_what_a_view_takes(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for run, age_s in (("older", 60), ("newer", 0)):
+        (tmp_path / "runs" / run).mkdir(parents=True)
+        copy = tmp_path / "runs" / run / "recording.mcap"
+        copy.write_bytes(recording.read_bytes())
+        os.utime(copy, ns=(10**18 - age_s * 10**9,) * 2)
+    newest, oldest = (f"runs/{run}/recording.mcap" for run in ("newer", "older"))
+    for given, told in (
+        ([], [newest]),
+        (["older"], [oldest]),
+        (["runs"], [newest]),
+        ([oldest, newest], [oldest, newest]),
+    ):
+        replay([Path(name) for name in given], as_json=True)
+        out, err = capsys.readouterr()
+        assert err.splitlines() == told
+        assert len(out.splitlines()) == len(told)
+    with pytest.raises(ConfigError, match=r"^there is no last, nor runs/last: name a recording, a directory or a run$"):
+        replay([Path("last")])
+    with pytest.raises(ConfigError, match="the files of 2 recordings would be mixed: name one"):
+        replay([Path(oldest), Path(newest)], images=tmp_path / "pictures")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ConfigError, match="there is no recording in empty"):
+        replay([Path("empty")])

@@ -12,7 +12,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from khala_orchestrator.console import Progress, card, clock, rule, stderr_console, stdout_console, table
+from khala_orchestrator.console import Progress, card, clock, print_table, rule, stderr_console, stdout_console, table
 from khala_protocol.messages import AgentReport, Casualties, Clock, Rejection, Report, Result, Usage
 from khala_protocol.visible import visible
 
@@ -287,3 +287,16 @@ def test_a_column_is_as_wide_as_what_is_shown_of_foreign_words(capsys: pytest.Ca
     console.width = 200
     console.print(rows)
     assert visible(EVIL) in capsys.readouterr().out
+
+
+def test_a_row_is_one_line_in_a_pipe_and_fits_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = Table("name", "words", box=None)
+    rows.add_row("x", "a word " * 40)
+    monkeypatch.delenv("COLUMNS", raising=False)
+    print_table(rows)
+    assert len(capsys.readouterr().out.splitlines()) == 2
+    monkeypatch.setenv("COLUMNS", "60")
+    print_table(rows)
+    assert all(len(line) <= 60 for line in capsys.readouterr().out.splitlines())

@@ -318,7 +318,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_links_lead_somewhere(subtests: pytest.Subtests) -> None:
-    for page in DOCUMENTS:
+    for page in (*DOCUMENTS, ROOT / "docs" / "llms.txt"):
         with subtests.test(page.relative_to(ROOT).as_posix()):
             targets = {found["target"] for found in LINK.finditer(prose(page))}
             broken = []

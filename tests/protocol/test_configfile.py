@@ -142,6 +142,7 @@ def test_a_control_character_is_refused_with_its_line(text: str, code: str) -> N
     assert str(caught.value) == f"m.yaml:2: this is not YAML: the character U+{code} is not allowed"
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     ("name", "text"),
     [

@@ -97,6 +97,7 @@ def test_a_link_is_replaced_and_what_it_points_to_stays(tmp_path: Path) -> None:
     assert ((tmp_path / "theirs").read_text(), (tmp_path / "x").is_symlink()) == ("precious", False)
 
 
+@pytest.mark.posix
 def test_a_pipe_is_written_as_it_is(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     found: list[bytes] = []

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import select
-import signal
 import subprocess
 import sys
 
+import psutil
 import pytest
 
 CHILD = """
@@ -34,13 +32,14 @@ def ended_within_s(how: str, child: str, seconds: float) -> bool:
     with subprocess.Popen([sys.executable, "-c", PARENT, child, how], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
-        end = os.pidfd_open(pid)
+        child_process = psutil.Process(pid)
         parent.kill()
-        ended = bool(select.select([end], [], [], seconds)[0])
-        if not ended:
-            signal.pidfd_send_signal(end, signal.SIGKILL)
-        os.close(end)
-    return ended
+        try:
+            child_process.wait(seconds)
+        except psutil.TimeoutExpired:
+            child_process.kill()
+            return False
+    return True
 
 
 @pytest.mark.parametrize("imports", ["os", STUBBORN], ids=["in order", "against its will"])

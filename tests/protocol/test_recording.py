@@ -269,6 +269,7 @@ with Recorder(sys.argv[2]) as recorder:
 """
 
 
+@pytest.mark.posix
 def test_a_killed_process_loses_less_than_the_step_under_way(path: Path, tmp_path: Path) -> None:
     source = tmp_path / "source.mcap"
     content = [(key, payload) for key, payload in samples(steps=2) if "/p1/" in key and "/briefing" not in key]

@@ -274,7 +274,7 @@ def endless(path: Path) -> None:
     path.symlink_to("/dev/zero")
 
 
-@pytest.mark.parametrize("make", [directory, pipe, endless])
+@pytest.mark.parametrize("make", [directory, pytest.param(pipe, marks=pytest.mark.posix), endless])
 def test_a_map_that_is_no_regular_file_is_not_opened(tmp_path: Path, make: Callable[[Path], None]) -> None:
     path = tmp_path / "x.SC2Map"
     make(path)

@@ -1,16 +1,22 @@
 """The directory that clients take for StarCraft II."""
 
+import ast
 import errno
 import re
 import stat
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
+from pysc2.run_configs import platforms as run_platforms
 
+from khala_bridge.game.processes import settle_flags
 from khala_simulator.maps.game_map import map_names
 from khala_simulator.maps.map_file import FOLDERS, read_map
+from khala_simulator.process import platforms
 from khala_simulator.process.install import InstallError, install, is_installed
 
 LAUNCHER = "Versions/Base75689/SC2_x64"
@@ -138,3 +144,34 @@ def test_a_directory_that_cannot_be_written_is_named(
     with pytest.raises(InstallError, match=sentence) as caught:
         install(tmp_path / "game")
     assert str(caught.value).startswith(str(tmp_path / "game"))
+
+
+@pytest.mark.parametrize(
+    ("platform", "launcher"),
+    [("darwin", "Versions/Base75689/SC2.app/Contents/MacOS/SC2"), ("win32", "Versions/Base75689/SC2_x64.exe")],
+)
+def test_pysc2_finds_the_launcher_on_other_platforms(
+    platform: str, launcher: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for function in (platforms.launcher_name, platforms.launcher, platforms.directories_of_game):
+        monkeypatch.setattr(platforms, function.__name__, partial(function, platform=platform))
+    settle_flags()
+    install(tmp_path)
+    before = (tmp_path / launcher).stat().st_ino
+    install(tmp_path)
+    assert (tmp_path / launcher).stat().st_ino == before
+    assert is_installed(tmp_path)
+    config = {"darwin": run_platforms.MacOS, "win32": run_platforms.Windows}[platform]
+    monkeypatch.setenv("SC2PATH", str(tmp_path))
+    found = config()
+    assert (Path(found.data_dir) / "Versions" / f"Base{found.version.build_version}" / found._exec_name).is_file()
+    assert found.cwd is None or Path(found.cwd).is_dir()
+
+
+def test_the_launcher_for_windows_holds_a_program_that_python_runs(tmp_path: Path) -> None:
+    """Its first part, which starts this Python with it, is that of pip, and runs on Windows alone."""
+    exe = tmp_path / "SC2_x64.exe"
+    exe.write_bytes(platforms.launcher("import sys; print(sys.argv[1:])", "the mark", "win32"))
+    assert f'#!"{sys.executable}" -I\r\n'.encode() in exe.read_bytes()
+    done = subprocess.run([sys.executable, "-I", exe, "-port", "7"], capture_output=True, text=True, check=True)
+    assert ast.literal_eval(done.stdout) == ["-executable", str(exe), "-port", "7"]

@@ -16,8 +16,6 @@ import asyncio
 import hashlib
 import logging
 import random
-import socket
-import struct
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Self
@@ -32,8 +30,10 @@ from khala_agents.scripted.players import PLAYERS
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.listening import Patience, bind
 from khala_protocol.manual import VERDICT
+from khala_protocol.platforms import reset_on_close
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Mapping
 
     from aiohttp.typedefs import Handler
@@ -240,7 +240,7 @@ def _reset(request: web.Request) -> web.Response:
     transport = request.transport
     if transport is not None:
         peer: socket.socket = transport.get_extra_info("socket")
-        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        reset_on_close(peer)
         transport.abort()
     return web.Response()  # the client is gone
 

@@ -15,6 +15,7 @@ import contextlib
 import functools
 import logging
 import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,6 +40,13 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
+
+USUAL_PLACE = Path(
+    {"win32": "C:/Program Files (x86)/StarCraft II", "darwin": "/Applications/StarCraft II"}.get(
+        sys.platform, "~/StarCraftII"
+    )
+)
+"""Where StarCraft II is on this platform, if SC2PATH is not set; PySC2 looks there as well."""
 
 
 class GameConfig(Frozen):
@@ -316,7 +324,7 @@ def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str
     """Return the directory of the configured game.
 
     Args:
-        source: `simulator`, `starcraft2` (by SC2PATH, else at the installer's default place), or a directory.
+        source: `simulator`, `starcraft2` (by SC2PATH, else at `USUAL_PLACE`), or a directory.
         simulator: where the simulator is installed; callers that may know it pass it.
         environ: the environment with SC2PATH.
 
@@ -330,7 +338,7 @@ def find_sc2(source: str, *, simulator: Path | None = None, environ: Mapping[str
     if source == "starcraft2":
         if "SC2PATH" in environ:
             return check_install(Path(environ["SC2PATH"]).expanduser(), told_by="SC2PATH")
-        return check_install(Path("~/StarCraftII").expanduser(), told_by="SC2PATH is not set, the usual place")
+        return check_install(USUAL_PLACE.expanduser(), told_by="SC2PATH is not set, the usual place")
     return check_install(Path(source).expanduser())
 
 

@@ -25,6 +25,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.errors import GameError
 from khala_bridge.game.manners import Manners
 from khala_protocol.files import open_private
+from khala_protocol.platforms import apart
 from khala_protocol.trust import check_trusted
 
 if TYPE_CHECKING:
@@ -223,7 +224,7 @@ def _start(
             out = stack.enter_context(open_private(log, "wb")) if log else subprocess.DEVNULL
             return subprocess.Popen(  # noqa: S603  # the user names it
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment,
-                start_new_session=True,
+                **apart(),
             )  # fmt: skip
     except OSError as error:
         raise GameError(f"the guest cannot be started with {command[0]}: {error.strerror}") from None

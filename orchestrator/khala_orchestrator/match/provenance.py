@@ -5,11 +5,12 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.util
-import os
 import platform
 from pathlib import Path
 
 import psutil
+
+from khala_protocol.platforms import cores
 
 PACKAGES = (
     "khala", "khala_agents", "khala_bridge", "khala_configs", "khala_orchestrator", "khala_protocol", "khala_simulator",
@@ -42,7 +43,7 @@ def hardware() -> dict[str, str | int]:
     """Return the processor, the number of cores that this process may use, and the memory in megabytes."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        "cores": cores(),
         "memory_mb": int(psutil.virtual_memory().total) // 2**20,
         "system": f"{platform.system()} {platform.machine()}",
     }

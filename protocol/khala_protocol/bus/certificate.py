@@ -19,6 +19,7 @@ from cryptography.x509.oid import NameOID
 
 from khala_protocol.errors import BusError
 from khala_protocol.files import MB, read_limited
+from khala_protocol.platforms import others_can_read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,7 +68,7 @@ class Certificate:
     @property
     def is_open(self) -> bool:
         """Whether others than its owner can read the private key."""
-        return self.key.exists() and bool(self.key.stat().st_mode & 0o077)
+        return self.key.exists() and others_can_read(self.key)
 
     @property
     def warning(self) -> str:

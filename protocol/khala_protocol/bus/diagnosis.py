@@ -14,6 +14,7 @@ import ssl
 from typing import TYPE_CHECKING
 
 from khala_protocol.bus.config import SECURE, address_of, host_port_of, transport_of
+from khala_protocol.platforms import open_unix_connection
 
 if TYPE_CHECKING:
     from khala_protocol.bus.config import BusConfig, TlsFiles
@@ -91,7 +92,7 @@ async def _connect(endpoint: str, tls: TlsFiles | None) -> None:
     if transport_of(endpoint) == "quic":
         raise TimeoutError  # over UDP, an attempt shows nothing
     if transport_of(endpoint) == "unixsock-stream":
-        _, writer = await asyncio.open_unix_connection(address_of(endpoint))
+        _, writer = await open_unix_connection(address_of(endpoint))
     elif transport_of(endpoint) == "tls" and tls is not None:
         writer = await _shake_hands(endpoint, tls)
     else:

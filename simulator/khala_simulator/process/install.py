@@ -1,8 +1,9 @@
 """Set up a directory like a StarCraft II install whose game is this simulator.
 
 Clients find it through `SC2PATH` and start `Versions/Base75689/SC2_x64`, a shell script that becomes the process of
-`__main__.py`; the number is the build of the game that it is. It never replaces parts of a real StarCraft II, and keeps
-maps that a user adds. A user's own maps are linked, not copied: they stay where they are.
+`__main__.py`; the number is the build of the game that it is. On macOS and Windows they look for another name, see
+`platforms.py`. It never replaces parts of a real StarCraft II, and keeps maps that a user adds. A user's own maps are
+linked, not copied: they stay where they are.
 
 Above: `cli.py`. Below: the list of scenarios.
 """
@@ -12,18 +13,19 @@ from __future__ import annotations
 import errno
 import os
 import secrets
-import shlex
 import shutil
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from khala_simulator.process import platforms
 from khala_simulator.tables.versions import BUILD_OF_VERSION, DEFAULT_VERSION
 
 OWN_FOLDER = "user"
 """Folder below `Maps` for maps without a folder that clients look into."""
 
-_MARK = "# The simulator of Khala stands in for the game here."
+_MARK = "The simulator of Khala stands in for the game here."
+_EXECUTABLES = ("SC2*", "SC2.app/Contents/MacOS/SC2")
 _REAL = (".build.info", "SC2Data", "StarCraft II.exe", "StarCraft II.app", "Support64")
 
 
@@ -46,11 +48,12 @@ def install(directory: Path | str, version: str = DEFAULT_VERSION) -> Path:
     _refuse_real_game(root)
     try:
         for other in BUILD_OF_VERSION:
-            if other != version and (launcher := root / _launcher(other)).exists():
-                shutil.rmtree(launcher.parent)
+            if other != version and (root / _launcher(other)).exists():
+                shutil.rmtree(root / _base(other))
         _write_launcher(root / _launcher(version))
         _write_maps(root / "Maps")
-        (root / "Replays").mkdir(exist_ok=True)
+        for name in ("Replays", *platforms.directories_of_game()):
+            (root / name).mkdir(exist_ok=True)
     except OSError as error:
         raise InstallError(_explain(error, root)) from error
     return root
@@ -99,20 +102,28 @@ def installed_version(directory: Path | str) -> str | None:
     return next((version for version in BUILD_OF_VERSION if _is_ours(root / _launcher(version))), None)
 
 
+def _base(version: str) -> Path:
+    return Path("Versions") / f"Base{BUILD_OF_VERSION[version]}"
+
+
 def _launcher(version: str) -> Path:
-    return Path("Versions") / f"Base{BUILD_OF_VERSION[version]}" / "SC2_x64"
+    return _base(version) / platforms.launcher_name()
 
 
 def _refuse_real_game(root: Path) -> None:
     for name in _REAL:
-        if (root / name).exists():
+        if (root / name).exists() and not _is_empty_directory(root / name):
             raise InstallError(f"{root} holds a real StarCraft II ({name}); choose another directory")
-    versions = root / "Versions"
-    found = sorted(versions.glob("Base*/SC2*")) if versions.is_dir() else []
+    bases = (root / "Versions").glob("Base*")
+    found = sorted(path for base in bases for name in _EXECUTABLES for path in base.glob(name))
     for executable in found:
-        if not _is_ours(executable):
+        if not executable.is_dir() and not _is_ours(executable):
             relative = executable.relative_to(root)
             raise InstallError(f"{root} holds a real StarCraft II ({relative}); choose another directory")
+
+
+def _is_empty_directory(path: Path) -> bool:
+    return path.is_dir() and not any(path.iterdir())
 
 
 def _is_ours(executable: Path) -> bool:
@@ -120,26 +131,24 @@ def _is_ours(executable: Path) -> bool:
         return False
     try:
         with executable.open("rb") as file:
-            return _MARK.encode() in file.read(256)
+            first = file.read(256)
+            file.seek(max(0, executable.stat().st_size - 256))
+            return _MARK.encode() in first + file.read(256)
     except OSError:
         return False
 
 
 def _write_launcher(path: Path) -> None:
     package_root = Path(__file__).absolute().parent.parent
-    # -I: the client's PYTHONPATH and its user site are not ours. exec: signals must reach the game itself.
-    # malloc: half a megabyte is made and freed for every observation; by default it goes back to the kernel each time,
-    # and fetching the pages again costs more (235 page faults, 0.5 ms) than drawing what is in them.
-    malloc = "export MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432"
     code = f"import sys; sys.path.append({str(package_root)!r}); from khala_simulator.__main__ import main; main()"
-    command = f'exec {shlex.quote(sys.executable)} -I -c {shlex.quote(code)} -executable "$0" "$@"'
     path.parent.mkdir(parents=True, exist_ok=True)
-    _put(path, f"#!/bin/sh\n{_MARK}\n{malloc}\n{command}\n".encode(), mode=0o755)
+    _put(path, platforms.launcher(code, _MARK), mode=0o755)
 
 
 def _put(path: Path, data: bytes, *, mode: int = 0o644) -> None:
     """Write a file, unless it is there already; in one step, as others may be installing, or starting the game."""
-    if path.exists() and path.read_bytes() == data and path.stat().st_mode & 0o777 == mode:
+    has_mode = sys.platform == "win32" or (path.exists() and path.stat().st_mode & 0o777 == mode)
+    if has_mode and path.exists() and path.read_bytes() == data:
         return
     fresh = path.with_name(f".{path.name}.{secrets.token_hex(4)}.new")  # with the dot, no executable of a real game
     try:

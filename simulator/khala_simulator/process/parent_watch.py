@@ -10,15 +10,15 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
-import time
 from typing import TYPE_CHECKING
+
+from khala_simulator.process.platforms import living_parent, wait_for_end_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 PARENT = "KHALA_PARENT"
 """The variable with the process id of the parent; without that parent no client needs the game."""
-PARENT_LOOK_S = 0.25
 LOOK_S = 5.0
 PATIENCE_LOOKS = 12
 """Clients may drop a connection and open another: PySC2's remote agents do so three times."""
@@ -32,15 +32,13 @@ def end_with_parent() -> None:
 
 
 def _watch(parent: int) -> None:
-    # A thread: in the middle of a thousand steps the event loop would look too late. The id cannot mislead: that of the
-    # process which adopts an orphan was taken while the parent lived.
-    while os.getppid() == parent:
-        time.sleep(PARENT_LOOK_S)
+    # A thread: in the middle of a thousand steps the event loop would look too late.
+    wait_for_end_of(parent)
     os._exit(1)
 
 
 async def wait_until_orphaned(
-    has_client: Callable[[], bool], *, parent: Callable[[], int] = os.getppid, look_s: float = LOOK_S
+    has_client: Callable[[], bool], *, parent: Callable[[], int] = living_parent, look_s: float = LOOK_S
 ) -> None:
     """Wait until the process has lost its parent and no client has been connected for `PATIENCE_LOOKS` looks.
 

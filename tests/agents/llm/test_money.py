@@ -130,6 +130,7 @@ def test_two_processes_together_never_exceed_a_budget_that_they_share(tmp_path: 
     assert MoneyLedger(path).booked_usd() == pytest.approx(1.0)
 
 
+@pytest.mark.posix
 async def test_what_a_killed_process_had_sent_stays_booked(tmp_path: Path) -> None:
     path = tmp_path / "match.ledger"
     assert start(DYING, path).wait(60) == -signal.SIGKILL

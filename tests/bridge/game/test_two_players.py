@@ -149,6 +149,7 @@ def test_each_player_of_a_full_game_sees_its_own_and_is_asked_about_its_own(sc2p
     assert not {unit.tag for unit in blue.own} & {unit.tag for unit in red.own}
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 @pytest.mark.parametrize("dead", ["first", "second", "both"])
 def test_a_game_of_two_that_loses_a_process_ends_and_leaves_none(sc2path: Path, dead: str) -> None:

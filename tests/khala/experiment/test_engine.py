@@ -51,6 +51,7 @@ async def test_a_match_is_played_and_recorded_in_one_process(tmp_path: Path) -> 
     assert len(recording.run.code_sha256) == 64
 
 
+@pytest.mark.posix
 async def test_a_worker_that_dies_loses_its_match_and_the_next_one_is_played(tmp_path: Path) -> None:
     async with Local(1, game="simulator", logs=tmp_path / "logs") as engine:
         engine._idle.append(process := await engine._start())

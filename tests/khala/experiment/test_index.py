@@ -96,7 +96,7 @@ DAMAGES: dict[str, Callable[[Path], None]] = {
     "a directory": replaced(lambda path: path.mkdir()),
     "a directory with something in it": replaced(_a_directory_with_something),
     "a link to nothing": replaced(lambda path: path.symlink_to("nowhere")),
-    "a pipe": replaced(os.mkfifo),
+    "a pipe": replaced(lambda path: os.mkfifo(path)),  # noqa: PLW0108  # Windows lacks it
     "of another version": sql("pragma user_version = 99"),
     "with another column": sql("alter table results add column more text"),
     "with a trigger": sql("create trigger t after insert on results begin delete from matches; end"),

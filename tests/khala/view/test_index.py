@@ -102,6 +102,7 @@ def test_one_with_values_of_somebody_else_makes_no_answer_lie(path: Path) -> Non
         found.moment(0, 3)
 
 
+@pytest.mark.posix
 def test_what_is_no_file_in_its_place_is_removed(path: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.write_text("of somebody else")

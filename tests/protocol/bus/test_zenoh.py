@@ -66,6 +66,7 @@ async def test_a_killed_process_is_gone_at_once(opened: OpenBus, start: StartPee
     assert time.perf_counter() - killed < 0.5
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("size", [20_000, 300_000])
 async def test_a_stopped_agent_slows_nobody_and_has_the_newest_when_it_goes_on(
     opened: OpenBus, start: StartPeer, size: int
@@ -94,6 +95,7 @@ async def test_a_stopped_agent_slows_nobody_and_has_the_newest_when_it_goes_on(
     assert healthy.missed == 0
 
 
+@pytest.mark.posix
 async def test_speech_to_a_stopped_router_holds_neither_the_loop_nor_the_end(
     opened: OpenBus, start: StartPeer, socket: str
 ) -> None:
@@ -114,6 +116,7 @@ async def test_speech_to_a_stopped_router_holds_neither_the_loop_nor_the_end(
         await agent.close()
 
 
+@pytest.mark.posix
 async def test_speech_that_waits_for_its_link_arrives_although_the_sender_closes(
     opened: OpenBus, start: StartPeer, socket: str
 ) -> None:
