@@ -7,6 +7,7 @@ scenario` is played.
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
 import itertools
 import json
@@ -222,6 +223,8 @@ def test_a_command_can_be_given(subtests: pytest.Subtests, monkeypatch: pytest.M
                     assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), (
                         f"make {words[0]}"
                     )
+                elif program == "python" and words[0] == "-m":
+                    assert importlib.util.find_spec(words[1]), f"python -m {words[1]}"
                 elif program == "python":
                     assert (ROOT / words[0]).is_file(), f"python {words[0]}"
                 else:
@@ -237,7 +240,7 @@ def test_commands_in_sentences_exist_with_their_options(subtests: pytest.Subtest
                 assert {word for word in words if word.startswith("-")} <= options, said
 
 
-@pytest.mark.parametrize(("words", "fault"), [("replay", "file"), ("run 2s3z --sead 1", "--sead"), ("rum 2s3z", "rum")])
+@pytest.mark.parametrize(("words", "fault"), [("try", "model"), ("run 2s3z --sead 1", "--sead"), ("rum 2s3z", "rum")])
 def test_a_wrong_command_would_be_found(words: str, fault: str) -> None:
     with pytest.raises(Exception, match=fault) as raised:
         parse(words.split())
