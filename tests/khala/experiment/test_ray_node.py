@@ -1,0 +1,48 @@
+"""Nodes of a cluster: where a head is, and how long a machine belongs to it. `test_ray` starts Ray itself."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from khala.experiment import ray_node
+from khala_protocol.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@pytest.fixture(autouse=True)
+def own_signals() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("address", ["", "6379", "host:", "host:port", ":6379"])
+def test_an_address_that_is_none_is_said(address: str) -> None:
+    with pytest.raises(ConfigError, match="give HOST:PORT, such as"):
+        ray_node.split_address(address)
+
+
+def test_a_machine_whose_node_dies_joins_again_and_ends_with_the_head(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ray")
+    head = socket.create_server(("127.0.0.1", 0))
+    port = head.getsockname()[1]
+    started: list[tuple[str, str, int]] = []
+
+    def start(*words: str, own: str, matches: int) -> subprocess.Popen[bytes]:
+        started.append((*words, own, matches))
+        if len(started) == 2:
+            head.close()
+        return subprocess.Popen([sys.executable, "-c", ""])
+
+    monkeypatch.setattr(ray_node, "_start", start)
+    with head:
+        ray_node.join(f"127.0.0.1:{port}", 3)
+    assert started == [(f"--address=127.0.0.1:{port}", "127.0.0.1", 3)] * 2
