@@ -157,6 +157,15 @@ def test_a_battle_is_played_to_its_end(executor: str, start: Play, finished: Bat
     assert len(dead) >= 5
 
 
+def test_a_battle_of_smac_ends_with_the_last_unit_of_a_side_and_begins_anew(start: Play) -> None:
+    battle = start("raw", "smac_3m")
+    while not battle.now.ended:
+        battle.turn(lambda _: "")
+    assert (battle.now.outcome, battle.now.own, len(battle.now.dead)) == ("loss", (), 1)
+    (fresh,) = battle.game.reset()
+    assert (fresh.ended, fresh.outcome, len(fresh.own)) == (False, None, 3)
+
+
 @pytest.mark.slow
 def test_both_executors_give_the_same_orders(start: Play) -> None:
     battles = [start("raw"), start("screen")]

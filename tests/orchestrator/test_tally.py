@@ -87,6 +87,10 @@ def test_the_cause_goes_with_the_outcome(outcome: Outcome | None, told: str, cau
     assert (found.outcome, found.cause) == (told, cause)
 
 
+def test_a_draw_without_survivors_is_no_time_limit() -> None:
+    assert result(snapshot(set(), set(), dead={1, 2, 3, 11, 12}, outcome="draw")).cause == "both sides dead"
+
+
 def test_steps_usage_statuses_and_rejections_are_added_up() -> None:
     now = snapshot({1}, {11}, loop=224)
     reports = [report(0, rejected=2), report(1, "late", None), report(2, latency_s=3.0)]

@@ -19,6 +19,7 @@ from khala_bridge.act.plan import PlanResult, PlanStep
 from khala_bridge.catalogue.functions import check_against_pysc2
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError, GameMissing
+from khala_bridge.game.battle import Battle
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.game.meeting import env_of
 from khala_bridge.game.processes import explain_errors
@@ -75,6 +76,7 @@ class PySC2Game:
         self._ended = True
         self._maps: tuple[EpisodeInfo, ...] = ()
         self._creep: list[Grid] = []
+        self._battle: Battle | None = None
         check_against_pysc2()
         check_install(config.sc2path)
         map_data = _map_data(config)
@@ -103,11 +105,14 @@ class PySC2Game:
             self._episode += 1
             self._maps = tuple(map(read_info, self._env.game_info))
             self._creep = [NO_GRID] * len(self._maps)
+            self._battle = None
             snapshots = self._snapshots(steps)
             for _ in range(_PLACING_LOOPS):
                 if all(snapshot.own or snapshot.ended for snapshot in snapshots):
                     break
                 snapshots = self._snapshots(self._env.step([[] for _ in snapshots], step_mul=1))
+            if self._config.map.endless:
+                self._battle = Battle(snapshots[0])
             return self._with_abilities(snapshots)
 
     def act(self, plans: Sequence[Plan]) -> tuple[StepResult, ...]:
@@ -183,6 +188,8 @@ class PySC2Game:
                 )
             )
             self._creep[index] = made[-1].creep
+        if self._battle:
+            made[0] = self._battle.ended(made[0])
         self._ended = made[0].ended
         if made[0].outcome == "win" and self._env.forfeit:
             made[0] = dataclasses.replace(made[0], forfeit=self._env.forfeit)

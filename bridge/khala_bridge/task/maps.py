@@ -51,6 +51,8 @@ class MapSpec(Frozen):
     """Of the computer player; the paper's setting."""
     limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Game loop at which the map itself ends the game."""
+    endless: bool = False
+    """Whether the map ends no battle: the episode is over when a side of its first units has none that fights."""
     goal: str = ""
     """The task on the map."""
     units: tuple[str, ...] = ()

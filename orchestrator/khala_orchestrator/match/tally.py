@@ -142,7 +142,8 @@ class Tally:
 
     def _ending(self, lost: Mapping[Seat, str]) -> tuple[Ending, str]:
         if self._last.outcome is not None:
-            return self._last.outcome, self._last.forfeit or CAUSES[self._last.outcome]
+            died = self._last.outcome == "draw" and not self._last.own
+            return self._last.outcome, self._last.forfeit or (BOTH_DEAD if died else CAUSES[self._last.outcome])
         if not lost:
             return "draw", "step limit"
         return "aborted", "agents gone" if AWAY in lost.values() else REFUSED
@@ -153,6 +154,7 @@ class Tally:
         self._last = snapshot
 
 
+BOTH_DEAD = "both sides dead"
 CAUSES: dict[Outcome, str] = {"win": "enemy defeated", "loss": "defeated", "draw": "time limit"}
 """What a result of the game means on maps that end by the death of one side or by a clock."""
 

@@ -203,8 +203,8 @@ class Result(Wire):
     episode: Count
     outcome: Ending
     cause: str
-    """Why it ended: `enemy defeated`, `defeated`, `time limit`, `step limit`, `agents gone`; against a guest also
-    `guest left` (it gave up), `guest gone` (its connection or its process ended), `guest hung`."""
+    """Why it ended: `enemy defeated`, `defeated`, `both sides dead`, `time limit`, `step limit`, `agents gone`; against
+    a guest also `guest left` (it gave up), `guest gone` (its connection or its process ended), `guest hung`."""
     opponent: str = ""
     """As in the run card, but a guest may be another one in each episode; the other side, if there are two."""
     valid: bool = True
