@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
-OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
+OUTCOME = {"win": "bold green", "draw": "bold yellow", "cut": "bold yellow", "loss": "bold red", "aborted": "bold red"}
 HEARTBEAT_S = 30.0
 """Off a terminal, a line is printed after so many seconds, with the next report."""
 SIDE = {"blue": "bold blue", "red": "bold red"}
@@ -267,8 +267,8 @@ def table(result: Result, *, named: bool = False) -> Panel:
     for agent in sorted(result.statuses.keys() | result.unasked.keys()):
         rows.add_row(agent, _steps_of(result, agent))
     whose = Text.assemble(side(result.side), ": ") if named else Text()
-    ending = (result.outcome, OUTCOME[result.outcome])
-    title = Text.assemble(whose, ending, f", {result.cause} (episode {result.episode})")
+    outcome, *cause = result.ending.partition(",")
+    title = Text.assemble(whose, (outcome, OUTCOME[result.outcome]), *cause, f" (episode {result.episode})")
     return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
 
 

@@ -123,7 +123,7 @@ def test_what_is_not_known_of_a_result_is_said_or_left_out(printed: Printed) -> 
         "actions  0 accepted; rejected: none",
         "tokens   0 in, 0 out, 0 request(s), no price known",
     ]
-    assert "draw, step limit (episode 3)" in printed(table(nothing))[0]
+    assert "cut at 42 steps (episode 3)" in printed(table(nothing))[0]
 
 
 def test_pictures_and_requests_of_unknown_size_are_named_beside_the_tokens(printed: Printed) -> None:

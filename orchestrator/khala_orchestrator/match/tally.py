@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.state import Alliance
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage, count_refusals
+from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, Report, Result, Usage, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -144,7 +144,7 @@ class Tally:
         if self._last.outcome is not None:
             return self._last.outcome, self._last.forfeit or CAUSES[self._last.outcome]
         if not lost:
-            return "draw", "step limit"
+            return "cut", STEP_LIMIT
         return "aborted", "agents gone" if AWAY in lost.values() else REFUSED
 
     def _note(self, snapshot: Snapshot) -> None:

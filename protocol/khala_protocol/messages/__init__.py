@@ -49,6 +49,7 @@ from khala_protocol.messages.to_agents import (
     refusals_by_reason,
 )
 from khala_protocol.messages.to_all import (
+    STEP_LIMIT,
     AgentCard,
     AgentReport,
     AgentStatus,
@@ -124,6 +125,7 @@ __all__ = [
     "MESSAGE_TYPES",
     "MOST",
     "SCHEMA_VERSION",
+    "STEP_LIMIT",
     "ActionCost",
     "ActionSpec",
     "Advice",
