@@ -29,7 +29,20 @@ PLAYERS = ("skilled", "focus-fire")
 FAMILIES = ("llm_smac/", "llm_pysc2/pvz_")
 """The directory of the paper's 33 maps."""
 SHAME = ("malformed", "unknown_action")
-COLUMNS = ("task", "player", "won", "drawn", "cut", "lost", "KD", "steps", "accepted", "rejections", "wall s", "recording")
+COLUMNS = (
+    "task",
+    "player",
+    "won",
+    "drawn",
+    "cut",
+    "lost",
+    "KD",
+    "steps",
+    "accepted",
+    "rejections",
+    "wall s",
+    "recording",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -248,6 +248,9 @@ def table(result: Result, *, named: bool = False) -> Panel:
         f"{kd}  (killed {_losses(result.killed.units, result.killed.value)}, "
         f"lost {_losses(result.lost.units, result.lost.value)})",
     )
+    if held := result.holdings:
+        counts = f"{held.workers} worker(s), {held.bases} base(s), army of {held.army}"
+        rows.add_row("held", f"{counts}, supply {held.supply_used} of {held.supply_cap}")
     took = f"{clock(result.game_loop)} of game in {result.wall_s:.1f} s, {result.env_steps} calls of SC2Env.step"
     rows.add_row("steps", f"{result.steps}, {took}")
     if result.latency_p50_s is not None and result.latency_p95_s is not None:

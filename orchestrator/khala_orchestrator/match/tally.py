@@ -7,8 +7,9 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
 from khala_bridge.state import Alliance
+from khala_bridge.state.ground import land_of
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, Report, Result, Usage, count_refusals
+from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, Holdings, Report, Result, Usage, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -122,6 +123,7 @@ class Tally:
             lost=lost,
             kd=killed.value / lost.value if lost.value else None,
             score=self._last.score.total,
+            holdings=self._holdings(),
             usage=dict(self._usage),
             statuses={name: dict(count) for name, count in self._deeds.statuses.items()},
             unasked={name: dict(count) for name, count in self._unasked.items()},
@@ -138,6 +140,19 @@ class Tally:
             accepted=self._deeds.accepted.total(),
             latency_p50_s=statistics.median(self._latencies_s) if self._latencies_s else None,
             latency_p95_s=_quantile(self._latencies_s, 0.95),
+        )
+
+    def _holdings(self) -> Holdings | None:
+        """Return what the side has at the end; None if it began without a base."""
+        if not land_of(self._first).own_halls:
+            return None
+        player = self._last.player
+        return Holdings(
+            workers=player.food_workers,
+            bases=len(land_of(self._last).own_halls),
+            army=player.army_count,
+            supply_used=player.food_used,
+            supply_cap=player.food_cap,
         )
 
     def _ending(self, lost: Mapping[Seat, str]) -> tuple[Ending, str]:

@@ -198,6 +198,18 @@ class Casualties(Frozen):
     value: float = 0.0
 
 
+class Holdings(Frozen):
+    """What a side has at the end of a game with bases."""
+
+    workers: int
+    bases: int
+    """Town halls, finished or not."""
+    army: int
+    """Units that the game counts as army."""
+    supply_used: int
+    supply_cap: int
+
+
 class Result(Wire):
     """Host → all: the result of an episode."""
 
@@ -225,6 +237,8 @@ class Result(Wire):
     kd: float | None
     """Value killed / value lost; None if nothing was lost."""
     score: float = 0.0
+    holdings: Holdings | None = None
+    """None if the side began without a base, and in recordings of versions that did not say."""
     usage: dict[str, Usage] = {}
     """By agent."""
     statuses: dict[str, dict[str, int]] = {}
