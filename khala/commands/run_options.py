@@ -85,6 +85,13 @@ Opponent = Annotated[
         metavar="WHO",
     ),
 ]
+Level = Annotated[
+    int | None,
+    typer.Option(
+        min=1, max=10, help="Level of the computer: 1 very easy, 5 hard, 7 very hard, 10 cheats.",
+        show_default="as the task says",
+    ),
+]  # fmt: skip
 Memory = Annotated[
     str | None,
     typer.Option(
@@ -160,6 +167,7 @@ class MatchOptions:
     """How a match is played; the names are those of `khala.playing.matches.new`."""
 
     opponent: Opponent = None
+    level: Level = None
     seed: Seed = None
     episodes: Episodes = None
     executor: ExecutorName = None
