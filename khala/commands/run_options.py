@@ -120,6 +120,13 @@ BaseUrl = Annotated[str | None, typer.Option(help="Another endpoint of the same 
 PolicyName = Annotated[
     str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
 ]
+AgentsPath = Annotated[
+    Path | None,
+    typer.Option(
+        "--agents", help="YAML file with the models and policies of single agents; the others get --model.",
+        metavar="FILE",
+    ),
+]  # fmt: skip
 Fallback = Annotated[
     str | None,
     typer.Option(
@@ -192,6 +199,7 @@ class MindOptions:
     model_name: ModelName = None
     base_url: BaseUrl = None
     policy: PolicyName = None
+    agents: AgentsPath = None
     fallback: Fallback = None
     rethink: Rethink = 0
     answer: Answer = None
@@ -203,8 +211,14 @@ class MindOptions:
 
     def of_all(self) -> dict[str, Any]:
         """Return what holds for all sides, as `khala.playing.minds.Minds` takes it."""
-        sides = {"blue", "red", "side_model"}
-        return {name: value for name, value in dataclasses.asdict(self).items() if name not in sides}
+        others = {"blue", "red", "side_model", "agents"}
+        common = {name: value for name, value in dataclasses.asdict(self).items() if name not in others}
+        if self.agents is None:
+            return common
+        from khala.playing.minds import agents_of  # noqa: PLC0415  # as in `of_sides`
+
+        agents, budget_usd = agents_of(self.agents)
+        return common | {"agents": agents} | ({"budget_usd": budget_usd} if self.budget_usd is None else {})
 
     def of_sides(self) -> dict[str, str]:
         """Return what single sides have instead, by their names."""

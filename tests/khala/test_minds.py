@@ -9,6 +9,7 @@ import pytest
 import typer
 
 from khala.commands.host import reasons_not_valid, until_interrupted, win_rates, without_orders
+from khala.commands.run_options import MindOptions
 from khala.playing.local import _shares_of, spent_before
 from khala.playing.minds import Minds, minds_of, named_sides
 from khala.playing.spending import spent_usd
@@ -217,3 +218,28 @@ def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
     assert list(reasons_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
     assert list(reasons_not_valid([result("blue", "x")])) == ["x"]
     assert list(reasons_not_valid([result("blue"), result("red")])) == []
+
+
+def test_a_file_says_how_single_agents_decide(tmp_path: Path) -> None:
+    file = tmp_path / "agents.yaml"
+    file.write_text("agents:\n  Stalkers: {policy: silent}\nbudget_usd: 2\n", encoding="utf-8")
+    minds = Minds(**MindOptions(agents=file).of_all())
+    assert [(mind.policy, mind.model, names) for mind, names in minds.groups(["Stalkers", "Zealots"])] == [
+        ("silent", "scripted", ["Stalkers"]), (None, "scripted", ["Zealots"]),
+    ]  # fmt: skip
+    assert minds.budget_usd == 2
+    assert MindOptions(agents=file, budget_usd=1).of_all()["budget_usd"] == 1
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("{model: scripted, memory: 1}", "A: here --memory holds for all agents: give it as an option"),
+        ("{policy: 'my_agent:decide'}", "say --trust"),
+    ],
+)
+def test_a_file_of_agents_that_a_match_cannot_follow_is_refused(spec: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "agents.yaml"
+    file.write_text(f"agents:\n  A: {spec}\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=words):
+        MindOptions(agents=file).of_all()
