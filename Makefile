@@ -125,7 +125,7 @@ docs: install ## Write the generated pages of docs/reference, and build the site
 
 golden: install ## Record the tests' battle again, after an intended change
 	rm -rf runs/golden
-	$(RUN)khala run 2s3z_pair --run golden --latency 0
+	$(RUN)khala run 2s3z_pair --model-name focus-fire --run golden --latency 0
 	cp runs/golden/recording.mcap tests/khala/golden.mcap
 
 picture: install ## Play a battle and draw docs/images/2s3z.webp from its recording

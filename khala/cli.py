@@ -67,6 +67,7 @@ Examples:\n
     khala run 3s5z --base-url http://localhost:8000/v1 --model vllm --model-name my-model\n
     khala run my_task.yaml --policy my_agent:decide --json\n
     khala run 2s3z_pair --clock realtime --speed 2\n
+    khala run simple64_eceb --level 5 --agents my_agents.yaml\n
     khala run simple64_duel --blue openai --red anthropic\n
     khala run simple64_eceb_terran --opponent "guest:python my_bot/run.py"\n
     khala run --resume runs/2s3z-20260101-120000-ab12

@@ -108,7 +108,7 @@ def _line(name: str, games: Sequence[Game]) -> str:
         str(len(valid)),
         _share(outcomes["win"], len(valid)),
         _share(outcomes["loss"], len(valid)),
-        str(outcomes["draw"]),
+        str(outcomes["draw"] + outcomes["cut"]),
         f"{killed / lost:.2f}" if lost else "none lost",
         str(sum(game.steps for game in valid)),
         str(len(games) - len(valid)),

@@ -29,7 +29,20 @@ PLAYERS = ("skilled", "focus-fire")
 FAMILIES = ("llm_smac/", "llm_pysc2/pvz_")
 """The directory of the paper's 33 maps."""
 SHAME = ("malformed", "unknown_action")
-COLUMNS = ("task", "player", "won", "drawn", "lost", "KD", "steps", "accepted", "rejections", "wall s", "recording")
+COLUMNS = (
+    "task",
+    "player",
+    "won",
+    "drawn",
+    "cut",
+    "lost",
+    "KD",
+    "steps",
+    "accepted",
+    "rejections",
+    "wall s",
+    "recording",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +67,11 @@ class Row:
     def cells(self) -> tuple[str, ...]:
         """The printed cells of the row."""
         if self.fault:
-            return (self.task, self.player, *["-"] * 7, f"{self.wall_s:.0f}", self.fault)
+            return (self.task, self.player, *["-"] * 8, f"{self.wall_s:.0f}", self.fault)
         count = sum(self.outcomes.values())
         kd = "-" if not self.killed and not self.lost else f"{self.killed / self.lost:.2f}" if self.lost else "no loss"
         said = ", ".join(f"{number} {reason}" for reason, number in sorted(self.rejections.items())) or "none"
-        outcomes = (f"{self.outcomes[name]}/{count}" for name in ("win", "draw", "loss"))
+        outcomes = (f"{self.outcomes[name]}/{count}" for name in ("win", "draw", "cut", "loss"))
         work = (str(self.steps), str(self.accepted), said, f"{self.wall_s:.0f}", self.recording)
         return (self.task, self.player, *outcomes, kd, *work)
 

@@ -243,7 +243,7 @@ def lines_about(message: Run | Report | Result) -> Iterator[str]:
             yield f"{clock(message.game_loop)}  step {message.step}  score {message.score:g}  {agents}"
             yield from (f"    {m.sender} → {m.recipient}: {visible_line(m.text)}" for m in message.messages)
         case Result():
-            yield f"{message.side}: {message.outcome}, {message.cause} (episode {message.episode})"
+            yield f"{message.side}: {message.ending} (episode {message.episode})"
 
 
 def run_advise(adviser: Adviser, *, connect: Sequence[str], tls: Path | None, insecure: bool, as_json: bool) -> None:

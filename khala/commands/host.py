@@ -25,7 +25,7 @@ from khala_protocol.signals import cancelled_by_signal
 from khala_protocol.visible import visible_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterator, Sequence
+    from collections.abc import Callable, Collection, Coroutine, Iterator, Sequence
     from pathlib import Path
 
     from khala_orchestrator.config import MatchConfig
@@ -64,8 +64,10 @@ def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json:
     if as_json:
         plain = [result.model_dump(mode="json") for result in results]
         typer.echo(json.dumps({"run": config.run, "recording": str(config.record), "results": plain}))
+    for line in win_rates(results):
+        screen.print(visible_line(line), soft_wrap=True)
     reasons = list(reasons_not_valid(results))
-    idle = without_orders(results)
+    idle = without_orders(results, talkers=_without_teams(config))
     said = f"no order of {', '.join(idle)} was carried out" if idle else ""
     if reasons:
         words = visible_line("; ".join([*reasons, *filter(None, [said])]))
@@ -75,12 +77,38 @@ def end(config: MatchConfig, results: list[Result] | signal.Signals, *, as_json:
         screen.print(Text(said, "yellow"), soft_wrap=True)
 
 
-def without_orders(results: Sequence[Result]) -> list[str]:
-    """Return the agents that were asked, and none of whose orders was carried out in any whole episode."""
+def win_rates(results: Sequence[Result]) -> Iterator[str]:
+    """Yield for each side how many of several episodes it won; those that are not valid do not count."""
+    sides = dict.fromkeys(result.side for result in results)
+    for side in sides:
+        of_side = [result for result in results if result.side == side]
+        valid = [result for result in of_side if result.valid]
+        if len(of_side) < 2:
+            continue
+        won = sum(result.outcome == "win" for result in valid)
+        share = f" ({100 * won / len(valid):.0f} %)" if valid else ""
+        others = f", {left} not valid" if (left := len(of_side) - len(valid)) else ""
+        yield f"{f'{side}: ' if len(sides) > 1 else ''}won {won} of {len(valid)} episodes{share}{others}"
+
+
+def _without_teams(config: MatchConfig) -> set[tuple[str, str]]:
+    """Return the agents, by side and name, that command no units and only talk."""
+    return {(task.side, agent.name) for task in config.task.per_side() for agent in task.agents if not agent.teams}
+
+
+def without_orders(results: Sequence[Result], *, talkers: Collection[tuple[str, str]] = ()) -> list[str]:
+    """Return the agents that were asked, and none of whose orders was carried out in any whole episode.
+
+    Args:
+        results: of all episodes and sides.
+        talkers: agents, by side and name, that have nothing to order.
+    """
     sides = {result.side for result in results}
     orders: Counter[str] = Counter()
     for result in results:
         for name in result.statuses if result.outcome != "aborted" else ():
+            if (result.side, name) in talkers:
+                continue
             orders[name if len(sides) == 1 else f"{result.side}/{name}"] += result.accepted_of.get(name, 0)
     return [name for name, count in orders.items() if not count]
 

@@ -85,6 +85,13 @@ Opponent = Annotated[
         metavar="WHO",
     ),
 ]
+Level = Annotated[
+    int | None,
+    typer.Option(
+        min=1, max=10, help="Level of the computer: 1 very easy, 5 hard, 7 very hard, 10 cheats.",
+        show_default="as the task says",
+    ),
+]  # fmt: skip
 Memory = Annotated[
     str | None,
     typer.Option(
@@ -113,6 +120,13 @@ BaseUrl = Annotated[str | None, typer.Option(help="Another endpoint of the same 
 PolicyName = Annotated[
     str | None, typer.Option(help="Decide without a model, with your own code.", metavar="MODULE:NAME")
 ]
+AgentsPath = Annotated[
+    Path | None,
+    typer.Option(
+        "--agents", help="YAML file with the models and policies of single agents; the others get --model.",
+        metavar="FILE",
+    ),
+]  # fmt: skip
 Fallback = Annotated[
     str | None,
     typer.Option(
@@ -160,6 +174,7 @@ class MatchOptions:
     """How a match is played; the names are those of `khala.playing.matches.new`."""
 
     opponent: Opponent = None
+    level: Level = None
     seed: Seed = None
     episodes: Episodes = None
     executor: ExecutorName = None
@@ -184,6 +199,7 @@ class MindOptions:
     model_name: ModelName = None
     base_url: BaseUrl = None
     policy: PolicyName = None
+    agents: AgentsPath = None
     fallback: Fallback = None
     rethink: Rethink = 0
     answer: Answer = None
@@ -195,8 +211,14 @@ class MindOptions:
 
     def of_all(self) -> dict[str, Any]:
         """Return what holds for all sides, as `khala.playing.minds.Minds` takes it."""
-        sides = {"blue", "red", "side_model"}
-        return {name: value for name, value in dataclasses.asdict(self).items() if name not in sides}
+        others = {"blue", "red", "side_model", "agents"}
+        common = {name: value for name, value in dataclasses.asdict(self).items() if name not in others}
+        if self.agents is None:
+            return common
+        from khala.playing.minds import agents_of  # noqa: PLC0415  # as in `of_sides`
+
+        agents, budget_usd = agents_of(self.agents)
+        return common | {"agents": agents} | ({"budget_usd": budget_usd} if self.budget_usd is None else {})
 
     def of_sides(self) -> dict[str, str]:
         """Return what single sides have instead, by their names."""

@@ -39,6 +39,7 @@ class Figures:
     invalid: int
     won: int
     drawn: int
+    cut: int
     lost: int
     win_rate: float | None
     low: float
@@ -61,6 +62,7 @@ def figures(results: Iterable[Result], *, from_loop: int) -> Figures:
         invalid=len(every) - number,
         won=endings["win"],
         drawn=endings["draw"],
+        cut=endings["cut"],
         lost=endings["loss"],
         win_rate=win_rate.value,
         low=win_rate.low,
@@ -97,6 +99,7 @@ def outcomes(trunk: Trunk, step: int, futures: Sequence[Future], who: str) -> Ta
         "futures",
         "won",
         "drawn",
+        "cut",
         "lost",
         "win rate (95 %)",
         "K/D",
@@ -118,7 +121,7 @@ def outcomes(trunk: Trunk, step: int, futures: Sequence[Future], who: str) -> Ta
 def _cells(found: Figures) -> list[str]:
     invalid = f" + {found.invalid} not valid" if found.invalid else ""
     return [
-        f"{found.futures}{invalid}", str(found.won), str(found.drawn), str(found.lost), rate(found),
+        f"{found.futures}{invalid}", str(found.won), str(found.drawn), str(found.cut), str(found.lost), rate(found),
         "none lost" if found.kd is None else f"{found.kd:.2f}", f"{found.balance:+.0f}", f"{found.game_s:.1f}",
     ]  # fmt: skip
 

@@ -90,8 +90,7 @@ async def _play(match: SeatedMatch, state: TaskState, config: MatchConfig) -> No
     (result,) = turn.results
     state.store.set(RESULT, result.model_dump(mode="json"))
     state.store.set(RECORDING, str(config.record))
-    said = f"{result.outcome}: {result.cause}"
-    state.output = ModelOutput.from_content(str(state.model), said)
+    state.output = ModelOutput.from_content(str(state.model), result.ending)
 
 
 class _Player:

@@ -80,7 +80,7 @@ def _fate(report: AgentReport) -> str:
 def _result(result: Result, episodes: int) -> str:
     ratio = "" if result.kd is None else f", ratio {result.kd:.2f}"
     return (
-        f"Episode {result.episode + 1} of {episodes} is over: {result.outcome} ({result.cause}) after "
+        f"Episode {result.episode + 1} of {episodes} is over: {result.ending}, after "
         f"{result.game_s:.0f} s of game time. "
         f"Value killed {result.killed.value:.0f}, lost {result.lost.value:.0f}{ratio}."
     )

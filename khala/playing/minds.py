@@ -15,17 +15,18 @@ from khala.playing import environment
 from khala_agents.answers.form import AnswerForm  # noqa: TC001  # pydantic evaluates it, too
 from khala_agents.batch_policy import reason_against_batches
 from khala_agents.build import Workshop
-from khala_agents.config import WorkerSpec, load_model, model_files
+from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.limits import own_turns
 from khala_agents.llm.money import SharedBudget
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.roster import Seat
 from khala_protocol.errors import ConfigError
-from khala_protocol.trust import module_of, trust_named
+from khala_protocol.trust import check_keys, check_trusted, module_of, trust_named
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
     from contextlib import AsyncExitStack
+    from pathlib import Path
 
     from khala_agents.llm.limits import Gates
     from khala_agents.policy import Policy
@@ -243,6 +244,29 @@ def share_budget(minds: Mapping[str, Minds], usd: float) -> dict[str, Minds]:
 def trust_options(common: Minds, sides: Mapping[str, str]) -> None:
     """Trust the code that the user has named in options: of all sides, and of single ones or of single agents."""
     trust_named(common.policy, common.fallback, *common.agents.values(), *sides.values())
+
+
+def agents_of(path: Path) -> tuple[dict[str, str], float | None]:
+    """Return how the agents of a file decide, as `Minds.agents` takes it, and what all of them may spend.
+
+    Raises:
+        ConfigError: the file is wrong, it says what `khala run` says for all agents, or it names code or an address for
+            keys that the user does not trust.
+    """
+    file = load_agents(path)
+    for name, spec in file.agents.items():
+        if others := [field for field in ("memory", "fallback", "rethink") if getattr(spec, field)]:
+            option = " and ".join(f"--{field}" for field in others)
+            raise ConfigError(
+                f"{name}: here {option} holds for all agents: give it as an option and leave it out of the file, or "
+                "play with `khala host` and `khala agent --agents`",
+                source=str(path),
+            )
+    texts = {name: spec.policy or spec.model or SCRIPTED for name, spec in file.agents.items()}
+    check_trusted(filter(None, map(module_of, (spec.policy or "" for spec in file.agents.values()))), source=str(path))
+    for text in texts.values():
+        check_keys(Minds().with_name(text).keys_sent())
+    return texts, file.budget_usd
 
 
 def named_sides(pairs: Sequence[str], **others: str | None) -> dict[str, str]:

@@ -35,7 +35,7 @@ from khala_protocol.signals import stop_on_signal
 from khala_protocol.trust import trust_files
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Sequence
+    from collections.abc import Callable, Coroutine, Iterable, Sequence
     from pathlib import Path
 
     from khala.service.daemon import MatchListener
@@ -138,15 +138,20 @@ def matches(connect: list[str] | None, *, tls: Path | None, insecure: bool, as_j
     if as_json:
         typer.echo(json.dumps(found.model_dump(mode="json", exclude={"v", "run", "kind"})))
         return
+    print_table(table_of(found.matches))
+
+
+def table_of(cards: Iterable[MatchCard]) -> Table:
+    """Return matches as a table; where it is narrow, other columns fold, so that the name of a task stays whole."""
     table = Table(box=None, pad_edge=False)
     for name in ("match", "task", "owner", "state", "progress", "result"):
-        table.add_column(name, overflow="fold")
-    for card in found.matches:
+        table.add_column(name, overflow="fold", no_wrap=name in ("task", "state"))
+    for card in cards:
         progress = f"step {card.step} of episode {card.episode + 1}/{card.episodes}" if card.step else ""
         result = ", ".join(card.outcomes) or card.reason
         state = Text(card.state, STATES.get(card.state, ""))
         table.add_row(card.run, card.task, card.owner, state, progress, result)
-    print_table(table)
+    return table
 
 
 def watch(run: str, connect: list[str] | None, *, tls: Path | None, insecure: bool, as_json: bool) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from khala_bridge.knowledge import WORKERS, is_structure, knowledge
-from khala_protocol.messages import MOST, UnitFlag, refusals_by_reason
+from khala_protocol.messages import MOST, STEP_LIMIT, UnitFlag, refusals_by_reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -155,7 +155,7 @@ class Digest:
         self.mark(
             said | {"step": self.memory.step},
             "end",
-            f"{said['outcome']}: {said['cause']}",
+            _ending_of(said),
             side=said.get("side", "blue"),
         )
 
@@ -293,3 +293,8 @@ def _count_refused(agent: dict[str, Any]) -> int:
         sum(refusals_by_reason(said.get("reason", ""), said.get("others", {})).values())
         for said in agent.get("rejections", ())
     )
+
+
+def _ending_of(said: Json) -> str:
+    """Return how and why an episode ended, also in a recording of a version that called a cut one a draw."""
+    return f"cut at {said['steps']} steps" if said["cause"] == STEP_LIMIT else f"{said['outcome']}: {said['cause']}"

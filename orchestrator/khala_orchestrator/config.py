@@ -10,13 +10,14 @@ import difflib
 import secrets
 from datetime import UTC, datetime
 from pathlib import Path  # noqa: TC003  # pydantic evaluates it
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, get_args
 
 from pydantic import Field, ValidationError, model_validator
 
 from khala_bridge.task.config import TaskConfig
 from khala_bridge.task.images import images_for
-from khala_bridge.task.maps import known_maps
+from khala_bridge.task.maps import Difficulty, known_maps
+from khala_bridge.task.opponent import opponent_of
 from khala_bridge.task.standard import standard_task
 from khala_configs import CONFIGS
 from khala_protocol.configfile import load, words_of
@@ -75,9 +76,9 @@ def load_task(name: str) -> TaskConfig:
     Raises:
         ConfigError: there is no such task, or the file is wrong; the text says what and where.
     """
-    if name.endswith((".yaml", ".yml")):
-        return load(name, TaskConfig)
     files = {path.stem: path for path in task_files()}
+    if name.endswith((".yaml", ".yml")):
+        return load(name, TaskConfig, shipped=files)
     if name in files:
         return load(files[name], TaskConfig)
     if name in known_maps():
@@ -91,7 +92,8 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     """Return the task with fields replaced. None changes nothing.
 
     `rule`, `max_wait_s` and other fields of `Clock` are those of its clock, `images` are the images of all agents, of
-    every side, see `images_for`; what `memory` says holds for all of them, and the rest stays.
+    every side, see `images_for`; what `memory` says holds for all of them, and the rest stays. `level` is the number of
+    the computer's difficulty, from 1 to 10.
 
     Raises:
         ConfigError: a value does not fit.
@@ -112,11 +114,21 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
             for part in (fields, *fields["sides"], *agents):
                 if part["memory"] is not None:
                     part["memory"] |= rule
+        if "level" in given:
+            level = get_args(Difficulty)[given.pop("level") - 1]
+            given["opponent"] = _fields_of(given.get("opponent", fields["opponent"])) | {"difficulty": level}
         return TaskConfig.model_validate(fields | given)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
         raise ConfigError(f"{place}: {words_of(first)}", source="command line") from None
+
+
+def _fields_of(opponent: str | dict[str, Any]) -> dict[str, Any]:
+    try:
+        return opponent_of(opponent) if isinstance(opponent, str) else opponent
+    except ValueError as error:
+        raise ConfigError(f"opponent: {error}", source="command line") from None
 
 
 def new_run_name(task: str) -> str:

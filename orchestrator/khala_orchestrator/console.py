@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import AgentReport, AgentStatus, Clock
 
-OUTCOME = {"win": "bold green", "draw": "bold yellow", "loss": "bold red", "aborted": "bold red"}
+OUTCOME = {"win": "bold green", "draw": "bold yellow", "cut": "bold yellow", "loss": "bold red", "aborted": "bold red"}
 WIDEST = 10_000
 """Characters of a row in a pipe; no table has as many."""
 HEARTBEAT_S = 30.0
@@ -259,6 +259,9 @@ def table(result: Result, *, named: bool = False) -> Panel:
         f"{kd}  (killed {_losses(result.killed.units, result.killed.value)}, "
         f"lost {_losses(result.lost.units, result.lost.value)})",
     )
+    if held := result.holdings:
+        counts = f"{held.workers} worker(s), {held.bases} base(s), army of {held.army}"
+        rows.add_row("held", f"{counts}, supply {held.supply_used} of {held.supply_cap}")
     took = f"{clock(result.game_loop)} of game in {result.wall_s:.1f} s, {result.env_steps} calls of SC2Env.step"
     rows.add_row("steps", f"{result.steps}, {took}")
     if result.latency_p50_s is not None and result.latency_p95_s is not None:
@@ -278,8 +281,8 @@ def table(result: Result, *, named: bool = False) -> Panel:
     for agent in sorted(result.statuses.keys() | result.unasked.keys()):
         rows.add_row(agent, _steps_of(result, agent))
     whose = Text.assemble(side(result.side), ": ") if named else Text()
-    ending = (result.outcome, OUTCOME[result.outcome])
-    title = Text.assemble(whose, ending, f", {result.cause} (episode {result.episode})")
+    outcome, *cause = result.ending.partition(",")
+    title = Text.assemble(whose, (outcome, OUTCOME[result.outcome]), *cause, f" (episode {result.episode})")
     return Panel(rows, title=title, border_style=OUTCOME[result.outcome].removeprefix("bold "), box=box.ROUNDED)
 
 

@@ -1,7 +1,7 @@
 /** Who is winning, and why: the numbers of both sides at a moment, and a sentence about them. */
 
 import type { Match } from "./match";
-import { capital, whole } from "./words";
+import { capital, count, whole } from "./words";
 
 /** The state of one side; null is what nobody knows. */
 export interface Standing {
@@ -58,5 +58,6 @@ export function result(match: Match): { text: string; winner: number } | null {
   const cause = line.causes[side] ?? "";
   const winner = outcome === "win" ? 0 : outcome === "loss" ? 1 : -1;
   const name = capital(match.sides.value[winner] ?? "");
+  if (outcome === "cut") return { text: `Cut at ${count(line.steps, "step")}`, winner };
   return { text: `${winner >= 0 ? `${name} wins` : outcome === "draw" ? "Draw" : "Aborted"}${cause ? `: ${cause}` : ""}`, winner };
 }

@@ -82,7 +82,7 @@ export interface EpisodeLine {
   game_s: number;
   wall_s: number | null;
   /** By side; empty while it is played. */
-  outcomes: Record<string, "win" | "draw" | "loss" | "aborted">;
+  outcomes: Record<string, "win" | "draw" | "loss" | "cut" | "aborted">;
   causes: Record<string, string>;
   kd: Record<string, number | null>;
   invalid_because: string;
@@ -277,7 +277,7 @@ export interface RunLine {
   /** Seconds since 1970. */
   recorded_at_s: number;
   /** By side, of each episode that ended. */
-  outcomes: Record<string, ("win" | "draw" | "loss" | "aborted")[]>;
+  outcomes: Record<string, ("win" | "draw" | "loss" | "cut" | "aborted")[]>;
   valid: boolean;
   /** False for a recording that is torn, or still grows. */
   complete: boolean;

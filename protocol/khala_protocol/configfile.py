@@ -3,7 +3,7 @@
 One page for every package that is configured by files. It is no configuration system: it has no
 defaults (the model has them), no interpolation, no environment. A file may extend another file:
 
-    extends: pvz_task1_level1  # the file beside this one, or a path from here that ends in .yaml
+    extends: pvz_task1_level1  # the file beside this one, a shipped one, or a path from here that ends in .yaml
     map: pvz_task1_level2      # a given field replaces the whole field of the other file
     agents: [{name: Scout}]    # but an entry of a list takes what it leaves out from the entry of its name there
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -60,13 +61,18 @@ class UnknownName(ValueError):
         return f", did you mean '{close[0]}'?" if close else ""
 
 
-def load(path: Path | str, model: type[M]) -> M:
+def load(path: Path | str, model: type[M], *, shipped: Mapping[str, Path] = MappingProxyType({})) -> M:
     """Return the model that the YAML file at `path` describes.
+
+    Args:
+        path: of the file.
+        model: of its fields.
+        shipped: by name, files that any file may extend if there is none of this name beside it.
 
     Raises:
         ConfigError: the file cannot be read, is not YAML, or does not fit the model; the text says where.
     """
-    return _fit(_open(Path(path)), model)
+    return _fit(_open(Path(path), shipped), model)
 
 
 def loads(text: str, model: type[M], *, source: str) -> M:
@@ -85,14 +91,16 @@ def _fit(document: Document, model: type[M]) -> M:
         raise _explain(document, model, error) from None
 
 
-def _open(path: Path, *users: Path) -> Document:
+def _open(path: Path, shipped: Mapping[str, Path], *users: Path) -> Document:
     """Return the document at a path, over the one that it extends; `users` are the files that extend it."""
     document = Document(_text_of(path), str(path))
     if isinstance(document.data, dict) and isinstance(name := document.data.get(EXTENDS), str):
         other = path.parent / (name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
+        if name in shipped and not other.exists():
+            other = shipped[name]
         if fault := _unfit_to_extend(other, (*users, path)):
             raise ConfigError(fault, source=str(path), line=document.lines[(EXTENDS,)], field=EXTENDS)
-        document.lay_over(_open(other, *users, path), but=EXTENDS)
+        document.lay_over(_open(other, shipped, *users, path), but=EXTENDS)
     return document
 
 

@@ -210,7 +210,7 @@ def test_a_match_prints_one_json_object_and_leaves_a_recording(
     place, done = played
     told = json.loads(done.stdout)
     (result,) = told["results"]
-    assert (result["steps"], result["outcome"], result["cause"]) == (4, "draw", "step limit")
+    assert (result["steps"], result["outcome"], result["cause"]) == (4, "cut", "step limit")
     assert result["statuses"] == {"Stalkers": {"ok": 4}, "Zealots": {"ok": 4}}
     recording = Recording.open(place / told["recording"])
     assert recording.complete

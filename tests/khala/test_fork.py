@@ -325,6 +325,7 @@ def test_figures_count_valid_futures_and_say_how_sure_they_are() -> None:
     assert found.kd == pytest.approx(340 / 200)
     assert found.balance == pytest.approx(35)
     assert found.game_s == pytest.approx(5)
+    assert figures([result("cut")], from_loop=0).cut == 1
     assert rate(found) == "50 % (15 to 85)"  # Wilson's of 2 in 4
     assert rate(figures([], from_loop=0)) == "unknown"
 

@@ -114,7 +114,7 @@ async def test_a_client_observes_acts_and_reads_what_became_of_it_with_pictures(
         ended = await said(client, "act", reply="Actions:\n<Nonsense()>")
     assert moved == [(11, "episode 1, step 0, game loop 11")]
     assert "    refused: <Nonsense()>: There is no action Nonsense" in ended
-    assert "Episode 1 of 1 is over: draw (step limit) after 1 s of game time. Value killed 0, lost 0.\n" in ended
+    assert "Episode 1 of 1 is over: cut at 2 steps, after 1 s of game time. Value killed 0, lost 0.\n" in ended
     assert ended.endswith(f"The match is over. Its recording is {record}: the user can look at it with `khala view`.")
     recording = Recording.open(record)
     assert [one.text for one in recording.of(Message)] == ['Hold "here") <Stop()>']

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.commands.host import reasons_not_valid, until_interrupted, without_orders
+from khala.commands.host import reasons_not_valid, until_interrupted, win_rates, without_orders
+from khala.commands.run_options import MindOptions
 from khala.playing.local import _shares_of, spent_before
 from khala.playing.minds import Minds, minds_of, named_sides
 from khala.playing.spending import spent_usd
@@ -188,6 +189,28 @@ def test_agents_none_of_whose_orders_was_carried_out_are_named() -> None:
     assert without_orders([first, second]) == ["B"]
     assert without_orders([first, second.but(side="red")]) == ["blue/B", "red/A", "red/B"]
     assert without_orders([second.but(outcome="aborted")]) == []
+    assert without_orders([second], talkers={("blue", "B")}) == ["A"]
+
+
+def test_several_episodes_end_with_the_rate_of_wins() -> None:
+    won, drawn, not_valid = result("blue").but(outcome="win"), result("blue"), result("blue", "x")
+    assert list(win_rates([won])) == []
+    assert list(win_rates([won, drawn, won])) == ["won 2 of 3 episodes (67 %)"]
+    assert list(win_rates([won, not_valid])) == ["won 1 of 1 episodes (100 %), 1 not valid"]
+    assert list(win_rates([not_valid, not_valid])) == ["won 0 of 0 episodes, 2 not valid"]
+    red = [won.but(side="red")] * 2
+    assert list(win_rates([drawn, drawn, *red])) == [
+        "blue: won 0 of 2 episodes (0 %)",
+        "red: won 2 of 2 episodes (100 %)",
+    ]
+
+
+def test_a_match_without_any_order_says_so_in_its_last_line(capsys: pytest.CaptureFixture[str]) -> None:
+    async def play() -> list[Result]:
+        return [result("blue").but(statuses={"Stalkers": {"ok": 3}})]
+
+    until_interrupted(MatchConfig(task=load_task("2s3z_pair"), run="r"), as_json=False, play=lambda _: play())
+    assert capsys.readouterr().err.endswith("\nno order of Stalkers was carried out\n")
 
 
 def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
@@ -195,3 +218,28 @@ def test_why_a_match_is_not_valid_is_said_once_and_of_which_side() -> None:
     assert list(reasons_not_valid([result("blue"), result("red", "x"), result("red", "x")])) == ["red: x"]
     assert list(reasons_not_valid([result("blue", "x")])) == ["x"]
     assert list(reasons_not_valid([result("blue"), result("red")])) == []
+
+
+def test_a_file_says_how_single_agents_decide(tmp_path: Path) -> None:
+    file = tmp_path / "agents.yaml"
+    file.write_text("agents:\n  Stalkers: {policy: silent}\nbudget_usd: 2\n", encoding="utf-8")
+    minds = Minds(**MindOptions(agents=file).of_all())
+    assert [(mind.policy, mind.model, names) for mind, names in minds.groups(["Stalkers", "Zealots"])] == [
+        ("silent", "scripted", ["Stalkers"]), (None, "scripted", ["Zealots"]),
+    ]  # fmt: skip
+    assert minds.budget_usd == 2
+    assert MindOptions(agents=file, budget_usd=1).of_all()["budget_usd"] == 1
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("{model: scripted, memory: 1}", "A: here --memory holds for all agents: give it as an option"),
+        ("{policy: 'my_agent:decide'}", "say --trust"),
+    ],
+)
+def test_a_file_of_agents_that_a_match_cannot_follow_is_refused(spec: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "agents.yaml"
+    file.write_text(f"agents:\n  A: {spec}\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=words):
+        MindOptions(agents=file).of_all()

@@ -203,7 +203,7 @@ async def test_a_match_without_a_required_agent_ends_and_is_not_valid(
     assert Recording.open(path).results == tuple(results)
 
 
-@pytest.mark.parametrize(("rule", "steps", "outcome"), [("go_on", 5, "draw"), ("end", 2, "aborted")])
+@pytest.mark.parametrize(("rule", "steps", "outcome"), [("go_on", 5, "cut"), ("end", 2, "aborted")])
 async def test_the_task_says_what_becomes_of_a_match_without_an_agent(
     hall: Hall, config: MakeConfig, rule: str, steps: int, outcome: str
 ) -> None:

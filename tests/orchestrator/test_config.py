@@ -192,3 +192,22 @@ def test_the_name_of_a_run_can_stand_in_a_key(subtests: pytest.Subtests) -> None
     assert name.startswith(f"{'x' * 40}-")
     with pytest.raises(WrongKey, match="run 'a b-"):
         new_run_name("a b")
+
+
+def test_a_file_anywhere_extends_a_shipped_task_by_its_name(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("extends: pvz_task4_level2\nname: mine\n", encoding="utf-8")
+    assert load_task(str(mine)) == load_task("pvz_task4_level2").model_copy(update={"name": "mine"})
+    beside = "extends: 3s5z\nname: other\n"
+    (tmp_path / "pvz_task4_level2.yaml").write_text(beside, encoding="utf-8")
+    assert load_task(str(mine)).map == "3s5z"
+
+
+def test_a_level_is_the_difficulty_of_the_computer_by_its_number() -> None:
+    task = load_task("simple64_eceb")
+    changed = change(task, level=5)
+    assert changed.opponent == task.opponent.model_copy(update={"difficulty": "hard"})
+    assert change(task, level=10, opponent="computer").opponent.difficulty == "cheat_insane"
+    for refused in ({"opponent": "guest"}, {"opponent": "nobody"}):
+        with pytest.raises(ConfigError, match="opponent"):
+            change(task, level=5, **refused)

@@ -271,7 +271,7 @@ async def test_an_episode_ends_when_the_game_says_so(play: Play) -> None:
 async def test_an_episode_ends_after_the_steps_that_the_task_allows(play: Play) -> None:
     played = await play({}, max_steps=4, after={2: {"dead": [0x1]}})
     (result,) = played.results
-    assert (result.outcome, result.cause, result.steps) == ("draw", "step limit", 4)
+    assert (result.outcome, result.cause, result.steps) == ("cut", "step limit", 4)
     assert (result.lost.units, result.lost.value, result.kd) == (1, 0.0, None)
 
 

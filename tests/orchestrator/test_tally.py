@@ -80,7 +80,7 @@ def test_nothing_lost_has_no_ratio() -> None:
 @pytest.mark.parametrize(
     ("outcome", "told", "cause"),
     [("win", "win", "enemy defeated"), ("loss", "loss", "defeated"), ("draw", "draw", "time limit"),
-     (None, "draw", "step limit")],
+     (None, "cut", "step limit")],
 )  # fmt: skip
 def test_the_cause_goes_with_the_outcome(outcome: Outcome | None, told: str, cause: str) -> None:
     found = result(snapshot({1}, {11}, outcome=outcome))

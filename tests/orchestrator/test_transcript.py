@@ -158,7 +158,7 @@ def test_a_recording_is_told_step_by_step(path: Path, printed: Printed) -> None:
         "  Stalkers: fallback (http 500) after 3000 ms",
         "  Zealots: late (no reply before the deadline)",
     ]
-    assert rest[end] == "╭──────────────────────── draw, step limit (episode 0) ────────────────────────╮"
+    assert rest[end] == "╭───────────────────────── cut at 2 steps (episode 0) ─────────────────────────╮"
 
 
 def test_a_step_that_was_held_says_how_long(tmp_path: Path, printed: Printed) -> None:

@@ -64,10 +64,7 @@ def random_calls(situation: Situation, rng: random.Random) -> Iterator[str]:
 
 
 def focus_fire(observation: str, rng: random.Random) -> str:
-    """Fire with all teams on the weakest enemy in reach, one target for all that reach it; the others advance.
-
-    The default player.
-    """
+    """Fire with all teams on the weakest enemy in reach, one target for all that reach it; the others advance."""
     situation = read(observation)
     teams = list(situation.teams.values())
     target = _common_target(teams)

@@ -7,8 +7,9 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
 from khala_bridge.state import Alliance
+from khala_bridge.state.ground import land_of
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, Casualties, Report, Result, Usage, count_refusals
+from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, Holdings, Report, Result, Usage, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -122,6 +123,7 @@ class Tally:
             lost=lost,
             kd=killed.value / lost.value if lost.value else None,
             score=self._last.score.total,
+            holdings=self._holdings(),
             usage=dict(self._usage),
             statuses={name: dict(count) for name, count in self._deeds.statuses.items()},
             unasked={name: dict(count) for name, count in self._unasked.items()},
@@ -140,12 +142,25 @@ class Tally:
             latency_p95_s=_quantile(self._latencies_s, 0.95),
         )
 
+    def _holdings(self) -> Holdings | None:
+        """Return what the side has at the end; None if it began without a base."""
+        if not land_of(self._first).own_halls:
+            return None
+        player = self._last.player
+        return Holdings(
+            workers=player.food_workers,
+            bases=len(land_of(self._last).own_halls),
+            army=player.army_count,
+            supply_used=player.food_used,
+            supply_cap=player.food_cap,
+        )
+
     def _ending(self, lost: Mapping[Seat, str]) -> tuple[Ending, str]:
         if self._last.outcome is not None:
             died = self._last.outcome == "draw" and not self._last.own
             return self._last.outcome, self._last.forfeit or (BOTH_DEAD if died else CAUSES[self._last.outcome])
         if not lost:
-            return "draw", "step limit"
+            return "cut", STEP_LIMIT
         return "aborted", "agents gone" if AWAY in lost.values() else REFUSED
 
     def _note(self, snapshot: Snapshot) -> None:

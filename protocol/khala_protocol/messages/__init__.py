@@ -49,6 +49,7 @@ from khala_protocol.messages.to_agents import (
     refusals_by_reason,
 )
 from khala_protocol.messages.to_all import (
+    STEP_LIMIT,
     AgentCard,
     AgentReport,
     AgentStatus,
@@ -56,6 +57,7 @@ from khala_protocol.messages.to_all import (
     Ending,
     Fate,
     Forked,
+    Holdings,
     Message,
     Outcome,
     Report,
@@ -125,6 +127,7 @@ __all__ = [
     "MESSAGE_TYPES",
     "MOST",
     "SCHEMA_VERSION",
+    "STEP_LIMIT",
     "ActionCost",
     "ActionSpec",
     "Advice",
@@ -157,6 +160,7 @@ __all__ = [
     "Frames",
     "Frozen",
     "GridView",
+    "Holdings",
     "ImageRef",
     "Landmark",
     "MemoryRule",

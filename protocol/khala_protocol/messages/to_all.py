@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from khala_protocol.messages.base import Count, Frozen, Wire
 from khala_protocol.messages.to_agents import Clock, Received, Rejection
 from khala_protocol.messages.usage import Usage
 
 Outcome = Literal["win", "draw", "loss"]
-Ending = Literal["win", "draw", "loss", "aborted"]
-"""How an episode ended for one side; `aborted` if the host ended it, because it could not be played as it should be."""
+Ending = Literal["win", "draw", "loss", "cut", "aborted"]
+"""How an episode ended for one side: `cut` if the host ended it after the number of steps that it may take, so that it
+says nothing of who would have won; `aborted` if the host could not play it as it should be."""
+STEP_LIMIT = "step limit"
+"""Cause of an episode that was cut. Versions before 0.2 called its outcome a draw."""
 
 AgentStatus = Literal[
     "ok",  # the agent decided, in time
@@ -195,6 +198,18 @@ class Casualties(Frozen):
     value: float = 0.0
 
 
+class Holdings(Frozen):
+    """What a side has at the end of a game with bases."""
+
+    workers: int
+    bases: int
+    """Town halls, finished or not."""
+    army: int
+    """Units that the game counts as army."""
+    supply_used: int
+    supply_cap: int
+
+
 class Result(Wire):
     """Host → all: the result of an episode."""
 
@@ -222,6 +237,8 @@ class Result(Wire):
     kd: float | None
     """Value killed / value lost; None if nothing was lost."""
     score: float = 0.0
+    holdings: Holdings | None = None
+    """None if the side began without a base, and in recordings of versions that did not say."""
     usage: dict[str, Usage] = {}
     """By agent."""
     statuses: dict[str, dict[str, int]] = {}
@@ -250,3 +267,18 @@ class Result(Wire):
     accepted: int = 0
     latency_p50_s: float | None = None
     latency_p95_s: float | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _cut(cls, fields: Any) -> Any:
+        """Read an episode of an older recording that was cut as what it was."""
+        if isinstance(fields, dict) and (fields.get("outcome"), fields.get("cause")) == ("draw", STEP_LIMIT):
+            return fields | {"outcome": "cut"}
+        return fields
+
+    @property
+    def ending(self) -> str:
+        """How and why it ended, in words: `win, enemy defeated`, `cut at 120 steps`."""
+        if self.outcome != "cut":
+            return f"{self.outcome}, {self.cause}"
+        return f"cut at {self.steps} step{'' if self.steps == 1 else 's'}"

@@ -109,6 +109,17 @@ def test_the_nearly_dead_blink_out_of_reach_and_the_others_go_on() -> None:
     assert len(calls(page(*STALKERS, hurt, enemies=[roach], actions=BLINK, hit="0x9 -8"))) == 2
 
 
+def test_a_hurt_unit_that_cannot_be_ordered_alone_does_not_take_its_team_out_of_the_fight() -> None:
+    hurt = line(9, "Zealot", 13, 12, "shield 0/50", health="10/100")
+    whole = line(8, "Zealot", 13, 13, "shield 50/50")
+    actions = tuple(action for action in BASIC if not action.startswith("Select_"))
+    for own in ([hurt, whole], [hurt]):
+        assert calls(page(*own, enemies=[ZEALOT], actions=actions, hit="0x9 -16")) == ["Attack_Unit 0x10"]
+    first, second = calls(page(hurt, whole, enemies=[ZEALOT], actions=BASIC, hit="0x9 -16"))
+    assert first.startswith("Select_Unit_Move_Screen 0x9")
+    assert second == "Attack_Unit 0x10"
+
+
 def test_who_cannot_blink_again_yet_does_not_try() -> None:
     hurt = line(9, "Stalker", 13, 12, "shield 0/80", "weapon ready", "not ready Blink", health="30/80")
     said = names(page(*STALKERS, hurt, enemies=[ZEALOT], actions=BLINK, hit="0x9 -16"))

@@ -64,7 +64,7 @@ async def test_a_team_plays_over_a_websocket_what_the_host_recorded(serving: Ser
     assert all(view.briefing == [] for one in seen[1:] for view in one.agents.values())
     assert (last.agents, last.text, last.step) == ({}, "", 3)
     assert last.result is not None
-    assert (last.result.outcome, last.result.cause) == ("draw", "step limit")
+    assert (last.result.outcome, last.result.cause) == ("cut", "step limit")
     assert sum(one.elapsed_s for one in seen) == pytest.approx(last.result.game_s, abs=0.1)
     assert last.reward == pytest.approx(-0.1 * last.elapsed_s / 60)
     assert then.agents["Stalkers"].briefing

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import pytest
+from rich.console import Console
 
 from khala.playing.jobs import Ended
 from khala.playing.matches import new
@@ -16,6 +18,7 @@ from khala.playing.minds import Minds
 from khala.service import client
 from khala.service.book import KEPT, Limits
 from khala.service.client import NoService, Refused
+from khala.service.commands import table_of
 from khala.service.daemon import STARTS, Service
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.config import change, load_task
@@ -400,3 +403,14 @@ async def test_who_watches_sees_the_reports_until_the_match_is_over(stage: Stage
 async def test_without_a_service_the_client_says_so() -> None:
     with pytest.raises(NoService, match="no service answers here within 15 s: `khala serve` starts one"):
         await client.list_matches(MemoryBroker().session())
+
+
+def test_a_narrow_table_of_matches_keeps_the_names_of_tasks_whole() -> None:
+    task = "simple64_sceb_terran"
+    run = f"{task}-20260101-120000-ab12"
+    card = MatchCard(run=run, number="1", owner="someone", task=task, state="running", episodes=20, step=900)
+    console = Console(width=80, file=io.StringIO())
+    console.print(table_of([card]))
+    lines = console.file.getvalue().splitlines()
+    assert any(task in line.split() for line in lines[1:])
+    assert max(map(len, lines)) <= 80

@@ -174,7 +174,10 @@ def save_the_hurt(plan: ReplyPlan, foes: Sequence[TextUnit], keep: int = 1) -> N
         if plan.cast("Blink_Screen", unit, refuge):
             continue
         if unit.share < HURT / 2 and kind_of(unit).speed > 2.9:
-            plan.cast("Move_Screen", unit, refuge)
+            if kind_of(unit).melee:  # its team would lose the fight that it leaves
+                plan.give("Select_Unit_Move_Screen", unit.tag, refuge)
+            else:
+                plan.cast("Move_Screen", unit, refuge)
 
 
 def step_back(plan: ReplyPlan, foes: Sequence[TextUnit]) -> bool:
