@@ -66,7 +66,9 @@ def names_that_windows_lacks(code: str) -> list[str]:
                 found.append(f"{module}.{name}")
             case ast.Attribute(attr=name) if name in LOOP:
                 found.append(name)
-            case ast.Call(func=ast.Name(id="hasattr" | "getattr"), args=[ast.Name(id=module), ast.Constant(str(name)), *_]):
+            case ast.Call(
+                func=ast.Name(id="hasattr" | "getattr"), args=[ast.Name(id=module), ast.Constant(str(name)), *_]
+            ):
                 found += [f"{module}.{name}"] if name in LACKING.get(module, ()) else []
             case ast.Import(names=names):
                 found += [alias.name for alias in names if alias.name in MODULES]
