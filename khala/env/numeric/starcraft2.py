@@ -231,6 +231,16 @@ class StarCraft2Env(SmacNames):
         return reward, self._ended, info
 
     @property
+    def steps(self) -> int:
+        """Steps of the episode so far."""
+        return self._steps
+
+    @property
+    def over(self) -> bool:
+        """Whether the episode is over."""
+        return self._ended
+
+    @property
     def timed_out(self) -> bool:
         """Whether the episode ended at its limit, and not with the battle."""
         return self._ended and self._scene.fighters.ending() == GOES_ON
@@ -240,6 +250,12 @@ class StarCraft2Env(SmacNames):
     @property
     def _progress(self) -> float:
         return self._steps / self.episode_limit
+
+    def see(self, observations: Floats32, state: Floats32) -> None:
+        """Write [agents, size] what each agent sees, and [size] the state, into contiguous arrays of these sizes."""
+        progress = self._progress
+        self._scene.observe(observations, progress)
+        self._scene.describe(state, progress)
 
     def observations(self) -> Floats32:
         """Return [agents, size] what each agent sees."""
