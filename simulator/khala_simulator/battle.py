@@ -14,8 +14,8 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import commands
-from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api import vitals
+from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.game_info import known_structures, paths
 from khala_simulator.api.giving import carry_out

@@ -5,6 +5,8 @@
     env = CentralEnv("3m")                         Gymnasium, one player for all agents
     env = gymnasium.make("khala.env.numeric:khala-smac/3m-v0")
     envs = vector_env("3m", 64, threads=2)         Gymnasium, many at once
+    envs = PufferBattles("3m", 64, threads=2)       as PufferLib's native environments
+    envs = EnvPoolBattles("3m", 64, num_threads=2)  as EnvPool's
     env = StarCraft2Env("3m")                      SMAC's own interface
 
 All play the same game, and take SMAC's options (`khala.env.numeric.options`), such as `difficulty="A"`.
@@ -19,6 +21,7 @@ from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
 from khala.env.numeric.central import CentralEnv
+from khala.env.numeric.conventions import EnvPoolBattles, PufferBattles
 from khala.env.numeric.maps import MAPS
 from khala.env.numeric.options import Options
 from khala.env.numeric.parallel import NumericParallelEnv
@@ -33,9 +36,11 @@ if TYPE_CHECKING:
 __all__ = [
     "MAPS",
     "CentralEnv",
+    "EnvPoolBattles",
     "NumericParallelEnv",
     "NumericVectorEnv",
     "Options",
+    "PufferBattles",
     "StarCraft2Env",
     "env",
     "parallel_env",

@@ -1,7 +1,7 @@
 """A batch of battles that are stepped together, into arrays of the caller.
 
-Each battle is a `StarCraft2Env`, so that its numbers are SMAC's to the bit; a step makes no array and no object for each
-agent. Battles whose episode is over begin the next one by themselves. Above: `khala.env.numeric.workers`. Below:
+Each battle is a `StarCraft2Env`, so that its numbers are SMAC's to the bit; a step makes no array and no object for
+each agent. Battles whose episode is over begin the next one by themselves. Above: `khala.env.numeric.workers`. Below:
 `khala.env.numeric.starcraft2`.
 """
 
@@ -125,7 +125,7 @@ class Batch:
         ]
 
     def begin(self, seeds: Sequence[int | None]) -> None:
-        """Begin an episode of each battle: a new game where there is a seed, and the game goes on where there is none."""
+        """Begin an episode of each battle: in a new game where there is a seed, else in the game that goes on."""
         for row, (battle, seed) in enumerate(zip(self.battles, seeds, strict=True)):
             battle.begin(seed)
             self._ended[row] = False

@@ -11,7 +11,7 @@ Above: `khala.env.numeric.starcraft2`. Below: `khala.env.numeric.sizes`, `khala_
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 

@@ -31,9 +31,7 @@ def of_step(fighters: Fighters, ending: int, options: Options) -> float:
     ended = ending in {WON, LOST}
     if options.reward_sparse:
         return (1.0 if ending == WON else -1.0) if ended else 0.0
-    reward = fighters.reward(
-        options.reward_death_value, options.reward_negative_scale, options.reward_only_positive
-    )
+    reward = fighters.reward(options.reward_death_value, options.reward_negative_scale, options.reward_only_positive)
     if not ended:
         return reward
     return reward + (options.reward_win if ending == WON else options.reward_defeat)

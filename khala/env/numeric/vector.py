@@ -58,7 +58,9 @@ class NumericVectorEnv(VectorEnv[Any, Any, Any]):
         if num_envs < 1 or threads < 1:
             raise ConfigError(f"num_envs is {num_envs} and threads is {threads}: both are at least 1")
         if autoreset_mode is AutoresetMode.DISABLED:
-            raise ConfigError("autoreset_mode is DISABLED and can be NEXT_STEP or SAME_STEP: battles begin by themselves")
+            raise ConfigError(
+                "autoreset_mode is DISABLED and can be NEXT_STEP or SAME_STEP: battles begin by themselves"
+            )
         mode = SAME_STEP if autoreset_mode is AutoresetMode.SAME_STEP else NEXT_STEP
         spec = BatchSpec(map_name, mode, max_cycles, options)
         self._buffers = None if buffers is None else arrays_for(spec, num_envs, buffers)
@@ -87,8 +89,7 @@ class NumericVectorEnv(VectorEnv[Any, Any, Any]):
             raise ValueError(f"there are {len(seeds)} seeds for {self.num_envs} environments")
         for rows, share in self.shares.parts:
             share.begin(seeds[rows])
-        for _, share in self.shares.parts:
-            share.wait()
+        self.wait()
         told = self._told()
         return told["observation"], self._info(told)
 
@@ -106,10 +107,14 @@ class NumericVectorEnv(VectorEnv[Any, Any, Any]):
 
     def receive(self) -> Stepped:
         """Wait for the end of a step, and return what `step` returns."""
-        for _, share in self.shares.parts:
-            share.wait()
+        self.wait()
         told = self._told()
         return told["observation"], told["reward"], told["terminated"], told["truncated"], self._info(told)
+
+    def wait(self) -> None:
+        """Wait for the end of a step; its numbers are in the arrays of `shares`."""
+        for _, share in self.shares.parts:
+            share.wait()
 
     def close_extras(self, **kwargs: Any) -> None:
         """Forget the games, and end the worker processes."""

@@ -148,7 +148,7 @@ class Shares:
             there.close()
             self.parts.append((rows, RemoteShare(process, here)))
 
-    def wait_any(self, waiting: Sequence[int]) -> int:
+    def first_done(self, waiting: Sequence[int]) -> int:
         """Return which of some shares has done first what was asked; it still has to be waited for."""
         channels = [self.parts[part][1].channel for part in waiting]
         if None in channels:
