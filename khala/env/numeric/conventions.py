@@ -29,7 +29,7 @@ class PufferBattles:
     """Battles as PufferLib's native environments are: a row for each agent, written into buffers of the trainer.
 
     An episode begins in the step in which the one before ends. PufferLib has no masks of actions: `action_masks` has
-    them, and an action that is not available is replaced by stop. What a step gives to the team, each of its agents gets.
+    them, and an action that is not available is replaced by stop. Each agent gets the reward of its team.
 
     Attributes:
         observations: [rows, size] float32.

@@ -12,6 +12,7 @@ import multiprocessing
 import pickle
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from multiprocessing import connection
 from multiprocessing.sharedctypes import RawArray
 from typing import TYPE_CHECKING, Any, Final
@@ -138,7 +139,7 @@ class Shares:
         }
         self.arrays = _view(spec, memory, count)
         edges = np.linspace(0, count, min(workers, count) + 1).astype(int).tolist()
-        for first, last in zip(edges, edges[1:], strict=False):
+        for first, last in pairwise(edges):
             rows = slice(first, last)
             here, there = multiprocessing.Pipe()
             process = multiprocessing.get_context().Process(

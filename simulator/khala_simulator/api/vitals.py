@@ -1,7 +1,7 @@
 """Vitals: what an observation says of chosen units in numbers, rounded to the 32 bits that a message has for each.
 
-A table of vitals has a row for each number, see `vital_rows`, and a column for each unit. Above: `khala_simulator.battle`,
-`khala_simulator.smac`. Below: the world's columns.
+A table of vitals has a row for each number, see `vital_rows`, and a column for each unit. Above:
+`khala_simulator.battle`, `khala_simulator.smac`. Below: the world's columns.
 """
 
 from __future__ import annotations

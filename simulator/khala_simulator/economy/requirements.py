@@ -44,10 +44,7 @@ def met(world: World, slot: int, need: Need | None) -> bool:
 
 def missing_to_all(world: World, slot: int, ability: Ability) -> bool:
     """Return whether an ability's condition fails for a unit for a reason that all units of its owner share."""
-    for need in _shared_needs(world.catalog, ability.id):
-        if not met(world, slot, need):  # a generator costs more than the question
-            return True
-    return False
+    return any(not met(world, slot, need) for need in _shared_needs(world.catalog, ability.id))
 
 
 @lru_cache(maxsize=4096)

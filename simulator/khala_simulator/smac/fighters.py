@@ -1,8 +1,8 @@
 """The units of a battle as SMAC counts them, and what a step is worth.
 
-Agents come first and enemies after them, in the same rows for a whole episode. A dead unit has life 0 and keeps its last
-place. Sums are taken in the order of the units, as SMAC takes them: numbers with fractions have another sum in another
-order. Above: `scene`. Below: `khala_simulator.api.vitals`.
+Agents come first and enemies after them, in the same rows for a whole episode. A dead unit has life 0 and keeps its
+last place. Sums are taken in the order of the units, as SMAC takes them: numbers with fractions have another sum in
+another order. Above: `scene`. Below: `khala_simulator.api.vitals`.
 """
 
 from __future__ import annotations

@@ -118,9 +118,9 @@ def test_results_are_written_into_buffers_of_the_caller() -> None:
     assert seen is buffers["observation"]
     np.testing.assert_array_equal(buffers["observation"], expected)
     kept = expected.copy()
-    east = np.full((2, 3), 4)
-    vector.step(east)
-    after, _, _, _, _ = alone.step(east)
+    apart = np.array([[4, 1, 1], [4, 1, 1]])
+    vector.step(apart)
+    after, _, _, _, _ = alone.step(apart)
     np.testing.assert_array_equal(buffers["observation"], after)
     np.testing.assert_array_equal(expected, kept)  # without buffers, a step changes nothing that was returned before
     assert not np.array_equal(after, kept)
@@ -200,7 +200,7 @@ def test_pufferlibs_convention_has_a_row_for_each_agent_in_buffers_of_the_traine
 def test_envpools_convention_returns_the_batch_that_is_done_and_says_which() -> None:
     pool = numeric.EnvPoolBattles("3m", 4, num_threads=2, seed=6)
     vector = numeric.vector_env("3m", 4)
-    expected, info = vector.reset(seed=6)
+    expected, _ = vector.reset(seed=6)
     pool.async_reset()
     with pytest.raises(ValueError, match="whole batches"):
         pool.send(np.ones((1, 3)), np.array([1]))
@@ -226,7 +226,7 @@ def test_envpools_step_is_that_of_the_vector() -> None:
     np.testing.assert_array_equal(pool.reset()[0], vector.reset(seed=6)[0])
     actions = np.full((3, 3), 4)
     for _ in range(3):
-        (*ours, _), (*theirs, info) = pool.step(actions), vector.step(actions)
+        (*ours, _), (*theirs, _) = pool.step(actions), vector.step(actions)
         for own, told in zip(ours, theirs, strict=True):
             np.testing.assert_array_equal(own, told)
     np.testing.assert_array_equal(pool.step(actions)[4]["action_mask"], vector.step(actions)[4]["action_mask"])
