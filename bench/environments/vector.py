@@ -6,7 +6,7 @@
 
 The kinds play in turn in each round, since machines are not idle; medians of the rounds count. `single` is one
 `StarCraft2Env` after the other with a list for each agent, as training loops without a batch have them. Processor time
-is that of all processes of a kind, and so is memory, without what a process with one battle takes.
+is that of all processes of a kind, and so is memory.
 """
 
 from __future__ import annotations

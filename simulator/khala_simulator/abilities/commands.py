@@ -236,7 +236,7 @@ def _soon(world: World, slot: int) -> UnitType:
         if row is not None:
             return world.catalog.units[row]
     units: tuple[UnitType, ...] = world.catalog.units
-    return units[c.type[slot]]
+    return units[int(c.type[slot])]
 
 
 def can_move(world: World, slot: int) -> bool:
