@@ -7,13 +7,14 @@ player sees all units at any time. Environments for reinforcement learning are a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import commands
+from khala_simulator.api import vitals
 from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.game_info import known_structures, paths
@@ -21,15 +22,19 @@ from khala_simulator.api.giving import carry_out
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import look
+from khala_simulator.api.vital_rows import ROWS
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tables.versions import DEFAULT_VERSION
 from khala_simulator.tick import advance
-from khala_simulator.world.world import INDEX_SHIFT, NO_TAG, NOBODY
+from khala_simulator.world.world import INDEX_SHIFT, NO_TAG
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
+
+    from khala_simulator.api.types import Types
+    from khala_simulator.world.world import World
 
     Bools = NDArray[np.bool_]
     Ints = NDArray[np.int64]
@@ -106,6 +111,13 @@ class Units(NamedTuple):
 def _row(numbers: Floats, number: int) -> Floats:
     row: Floats = numbers[number]
     return row
+
+
+class Watcher(Protocol):
+    """What keeps in step with a battle; see `Battle.see`."""
+
+    def look(self, world: World, types: Types) -> None:
+        """Take in what has become of its units."""
 
 
 class Battle:
@@ -197,19 +209,15 @@ class Battle:
     def look(self, tags: Ints) -> tuple[Bools, Units]:
         """Return which of these units are in the world, and all of them; of the others, the numbers mean nothing."""
         world = self._world
-        slots = tags >> INDEX_SHIFT & _SLOT
-        there: Bools = (world.tag[slots] == tags) & (world.carrier[slots] == NOBODY)
-        owner, row = world.owner[slots], world.type[slots]
-        types, stats = self._game.types, world.stats
-        numbers = np.empty((8, len(tags)), dtype=np.float32)
-        numbers[:2] = world.pos[slots].T
-        numbers[2] = world.life[slots]
-        numbers[3] = stats.life_max[owner, row]
-        numbers[4] = world.shields[slots]
-        numbers[5] = stats.shields_max[owner, row]
-        numbers[6] = world.energy[slots]
-        numbers[7] = np.maximum(world.cooldown[slots], 0.0) * types.armed[row]
-        return there, Units(tags, types.id[row], numbers.astype(np.float64))
+        there = np.empty(len(tags), dtype=np.bool_)
+        numbers = np.zeros((ROWS, len(tags)))
+        vitals.look(world, self._game.types, np.ascontiguousarray(tags), there, numbers)
+        rows = world.type[tags >> INDEX_SHIFT & _SLOT]
+        return there, Units(tags, self._game.types.id[rows], numbers)
+
+    def see(self, watcher: Watcher) -> None:
+        """Have a watcher take in what has become of its units."""
+        watcher.look(self._world, self._game.types)
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Return a picture of the playable part of the map, [height, width, 3] RGB, as a client has it rendered."""

@@ -4,7 +4,9 @@
     env = env("3m")                                PettingZoo, one agent after the other
     env = CentralEnv("3m")                         Gymnasium, one player for all agents
     env = gymnasium.make("khala.env.numeric:khala-smac/3m-v0")
-    envs = vector_env("3m", 8, processes=True)     Gymnasium, several at once
+    envs = vector_env("3m", 64, threads=2)         Gymnasium, many at once
+    envs = PufferBattles("3m", 64, threads=2)       as PufferLib's native environments
+    envs = EnvPoolBattles("3m", 64, num_threads=2)  as EnvPool's
     env = StarCraft2Env("3m")                      SMAC's own interface
 
 All play the same game, and take SMAC's options (`khala.env.numeric.options`), such as `difficulty="A"`.
@@ -12,24 +14,38 @@ All play the same game, and take SMAC's options (`khala.env.numeric.options`), s
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
-from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
 from khala.env.numeric.central import CentralEnv
+from khala.env.numeric.conventions import EnvPoolBattles, PufferBattles
 from khala.env.numeric.maps import MAPS
 from khala.env.numeric.options import Options
 from khala.env.numeric.parallel import NumericParallelEnv
 from khala.env.numeric.starcraft2 import StarCraft2Env
+from khala.env.numeric.vector import NumericVectorEnv
 
 if TYPE_CHECKING:
-    from gymnasium.vector import VectorEnv
+    from collections.abc import Mapping
+
     from pettingzoo import AECEnv
 
-__all__ = ["MAPS", "CentralEnv", "NumericParallelEnv", "Options", "StarCraft2Env", "env", "parallel_env", "vector_env"]
+__all__ = [
+    "MAPS",
+    "CentralEnv",
+    "EnvPoolBattles",
+    "NumericParallelEnv",
+    "NumericVectorEnv",
+    "Options",
+    "PufferBattles",
+    "StarCraft2Env",
+    "env",
+    "parallel_env",
+    "vector_env",
+]
 
 for _name in MAPS:
     gymnasium.register(f"khala-smac/{_name}-v0", entry_point="khala.env.numeric:CentralEnv", kwargs={"map_name": _name})
@@ -58,15 +74,38 @@ def env(map_name: str = "3m", **options: Any) -> AECEnv[str, Any, Any]:
 
 
 def vector_env(
-    map_name: str = "3m", num_envs: int = 8, *, processes: bool = False, **options: Any
-) -> VectorEnv[Any, Any, Any]:
-    """Return several `CentralEnv` at once. `reset(seed=1)` seeds the first with 1, the next with 2, and so on.
+    map_name: str = "3m",
+    num_envs: int = 8,
+    *,
+    threads: int = 1,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    buffers: Mapping[str, Any] | None = None,
+    max_cycles: int | None = None,
+    **options: Any,
+) -> NumericVectorEnv:
+    """Return several battles at once. `reset(seed=1)` seeds the first with 1, the next with 2, and so on.
 
     Args:
         map_name: one of SMAC's 23 maps.
         num_envs: how many.
-        processes: whether each has a process of its own; otherwise they play in turn.
-        **options: as in `parallel_env`.
+        threads: how many battles play at the same time. More than one: each of these is a process of its own, because
+            the engine holds Python's lock; then the memory of all of them is shared, and no number goes through a pipe.
+        autoreset_mode: when an episode begins whose predecessor is over, in Gymnasium's words.
+        buffers: arrays of the caller that are written in each step, by the names of `khala.env.numeric.batch.shapes`:
+            `{"observation": array, "reward": array}`. NumPy's, or what shares its memory with NumPy, such as a tensor
+            of torch. Without them, each step returns new arrays.
+        max_cycles: steps of an episode; None: as many as in SMAC.
+        **options: see `khala.env.numeric.options.Options`.
+
+    Raises:
+        ConfigError: there is no such map, an option or a buffer is wrong.
     """
-    make = [partial(CentralEnv, map_name, **options)] * num_envs
-    return AsyncVectorEnv(make) if processes else SyncVectorEnv(make)
+    return NumericVectorEnv(
+        map_name,
+        num_envs,
+        threads=threads,
+        autoreset_mode=autoreset_mode,
+        buffers=buffers,
+        max_cycles=max_cycles,
+        options=options,
+    )

@@ -50,7 +50,7 @@ class CentralEnv(gymnasium.Env[Any, Any]):
 
     def step(self, action: Actions) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Play a step."""
-        reward, over, info = self.battles.step(self.battles.possible(np.asarray(action)))
+        reward, over, info = self.battles.play(np.asarray(action, dtype=np.int64))
         timed_out = self.battles.timed_out
         return self._seen(), reward, over and not timed_out, timed_out, info
 

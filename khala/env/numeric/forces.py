@@ -1,6 +1,6 @@
-"""The two sides of a battle as SMAC counts them: the same rows for the whole episode, with life 0 once they are dead.
+"""The units of a battle as an episode begins: in SMAC's order, with SMAC's codes of their types.
 
-Above: `khala.env.numeric.features`, `khala.env.numeric.rewards`. Below: `khala_simulator.battle`.
+Above: `khala.env.numeric.starcraft2`. Below: `khala_simulator.battle`, `khala_simulator.smac`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_simulator.battle import ENEMY, PLAYER
+from khala_simulator.smac.fighters import Fighters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from khala.env.numeric.maps import Kind, SmacMap
     from khala_simulator.battle import Battle, Units
 
-    Bools = NDArray[np.bool_]
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
 
@@ -40,6 +40,8 @@ _MOST_COOLDOWN = {
     "zergling": 11, "baneling": 1,
 }  # fmt: skip
 """What SMAC divides a unit's cooldown by; a Medivac's is its energy."""
+OTHER_COOLDOWN = 15
+"""What SMAC divides the cooldown of all others by."""
 _MOST_SHIELDS = {"stalker": 80, "zealot": 50, "colossus": 150}
 _ENEMY_CODES: dict[Kind, tuple[int, ...]] = {
     "stalkers_and_zealots": (ZEALOT, STALKER),
@@ -48,94 +50,51 @@ _ENEMY_CODES: dict[Kind, tuple[int, ...]] = {
     "MMM": (MARAUDER, MARINE, MEDIVAC),
 }
 """By kind of map, which enemy type has which place in the one-hot code; all others have the last one."""
-_ENEMY_SHIELDS = {STALKER: 80, ZEALOT: 50, COLOSSUS: 150}
+_ENEMIES = {STALKER: "stalker", ZEALOT: "zealot", COLOSSUS: "colossus", MEDIVAC: "medivac"}
+"""Types of enemies of which SMAC tells shields or Medivacs."""
 
 
-class Force:
-    """One side. Columns have an entry for each unit of the beginning; a dead one keeps its last place.
+def fighters_of(battle: Battle, spec: SmacMap) -> Fighters | None:
+    """Return the units of both sides as they are now; None while some are not there yet.
 
-    Attributes:
-        now: the units as they were last seen, as `Units` has their numbers.
-        alive: which of them live.
-        life: their life; 0 of the dead.
-        types: [n, bits] SMAC's one-hot code of their types.
-        most_shields: what SMAC divides their shields by.
-        before: life and shields of each before the last step.
-        died: those that died in the last step.
+    The agents' stand in the order of their types and places, the enemies in the order of observations.
     """
-
-    def __init__(self, units: Units, types: Floats, most_shields: Floats) -> None:
-        self.now, self.types, self.most_shields = units, types, most_shields
-        self.alive: Bools = np.ones(len(units.tag), dtype=np.bool_)
-        self.life: Floats = units.life.copy()
-        self.before: Floats = units.life + units.shields
-        self.died: Bools = ~self.alive
-
-    def __len__(self) -> int:
-        return len(self.alive)
-
-    def take(self, there: Bools, numbers: Floats) -> None:
-        """Take in which units are in the world now, and what they are like."""
-        self.before = self.life + self.now.shields
-        there = self.alive & there
-        self.died = self.alive & ~there
-        np.copyto(self.now.numbers, numbers, where=there)
-        self.alive = there
-        self.life = self.now.life * there
-
-    def one_medivac(self, own: OwnForce) -> bool:
-        """Return whether one Medivac is all that is left of these enemies, against a side that has some, too."""
-        return bool(own.heals.any()) and self.now.type_id[self.alive].tolist() == [MEDIVAC]
+    own, enemy = battle.tags_of(PLAYER), battle.tags_of(ENEMY)
+    if (len(own), len(enemy)) != (spec.agents, spec.enemies):
+        return None
+    _, mine = battle.look(own)
+    order = np.lexsort((mine.y, mine.x, mine.type_id))
+    _, units = battle.look(np.concatenate((own[order], enemy)))
+    names = _names(units, spec)
+    shields = [_MOST_SHIELDS.get(name, 0) for name in names]
+    charges = [_MOST_COOLDOWN.get(name, OTHER_COOLDOWN) for name in names[: spec.agents]]
+    charges += [OTHER_COOLDOWN] * spec.enemies
+    return Fighters(
+        spec.agents,
+        units.tag,
+        units.type_id,
+        units.numbers,
+        _one_hot(_places(units, spec), spec),
+        np.array(shields, dtype=np.float64),
+        np.array(charges, dtype=np.float64),
+        np.array([name == "medivac" for name in names]),
+    )
 
 
-class OwnForce(Force):
-    """The agents' units, in the order of their types and places.
-
-    Attributes:
-        heals: which of them are Medivacs.
-        most_cooldown: what SMAC divides their cooldown, or a Medivac's energy, by.
-    """
-
-    def __init__(self, units: Units, spec: SmacMap) -> None:
-        first = int(units.type_id.min())
-        names = dict(enumerate(_OWN_TYPES[spec.kind], start=first))
-        kinds = [names.get(number, "") for number in units.type_id.tolist()]
-        shields = np.array([_MOST_SHIELDS.get(name, 0) for name in kinds], dtype=np.float64)
-        super().__init__(units, _one_hot(units.type_id - first, spec), shields)
-        self.heals: Bools = np.array([name == "medivac" for name in kinds])
-        self.most_cooldown: Floats = np.array([_MOST_COOLDOWN.get(name, 15) for name in kinds], dtype=np.float64)
-
-    @property
-    def charge(self) -> Floats:
-        """Energy of the Medivacs, the cooldown of all others."""
-        charge: Floats = np.where(self.heals, self.now.energy, self.now.cooldown)
-        return charge
+def _names(units: Units, spec: SmacMap) -> list[str]:
+    """Return what SMAC calls the type of each unit; empty if it has no name for it."""
+    numbers = units.type_id.tolist()
+    own = numbers[: spec.agents]
+    names = dict(enumerate(_OWN_TYPES[spec.kind], start=min(own)))
+    return [names.get(number, "") for number in own] + [_ENEMIES.get(n, "") for n in numbers[spec.agents :]]
 
 
-def own_force(battle: Battle, spec: SmacMap) -> OwnForce:
-    """Return the agents' units as they are now."""
-    _, units = battle.look(battle.tags_of(PLAYER))
-    order = np.lexsort((units.y, units.x, units.type_id))
-    return OwnForce(battle.look(units.tag[order])[1], spec)
-
-
-def enemy_force(battle: Battle, spec: SmacMap) -> Force:
-    """Return the enemies as they are now, in the order of observations."""
-    _, units = battle.look(battle.tags_of(ENEMY))
+def _places(units: Units, spec: SmacMap) -> Ints:
+    """Return the place of each unit's type in the one-hot code."""
+    own, enemy = units.type_id[: spec.agents], units.type_id[spec.agents :]
     codes = _ENEMY_CODES.get(spec.kind, ())
-    places = [codes.index(number) if number in codes else len(codes) for number in units.type_id.tolist()]
-    shields = np.array([_ENEMY_SHIELDS.get(number, 0) for number in units.type_id.tolist()], dtype=np.float64)
-    return Force(units, _one_hot(np.array(places, dtype=np.int64), spec), shields)
-
-
-def look(battle: Battle, *forces: Force) -> None:
-    """Have forces take in what has become of their units."""
-    there, units = battle.look(np.concatenate([force.now.tag for force in forces]))
-    first = 0
-    for force in forces:
-        last = first + len(force)
-        force.take(there[first:last], units.numbers[:, first:last])
-        first = last
+    others = [codes.index(number) if number in codes else len(codes) for number in enemy.tolist()]
+    return np.concatenate((own - own.min(), np.array(others, dtype=np.int64)))
 
 
 def _one_hot(places: Ints, spec: SmacMap) -> Floats:

@@ -5,18 +5,19 @@ Left out are names that speak with StarCraft II (`full_restart`, `save_replay`, 
 `reward_battle`, `previous_ally_units`, `previous_enemy_units`, `win_counted`, `defeat_counted`), that SMAC never sets
 (`last_stats`), and the numbers of types (`marine_id`): `get_unit_type_id` tells types apart.
 
-Above: `khala.env.numeric.starcraft2`. Below: `khala.env.numeric.features`, `khala.env.numeric.sizes`.
+Above: `khala.env.numeric.starcraft2`. Below: `khala.env.numeric.sizes`, `khala_simulator.smac`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from khala.env.numeric import sizes
-from khala.env.numeric.features import (
+from khala_simulator.battle import ENEMY, PLAYER
+from khala_simulator.smac.rules import (
     FIRST_TARGET,
     HEIGHT_POINTS,
     MOVES,
@@ -24,23 +25,19 @@ from khala.env.numeric.features import (
     SHOOT_RANGE,
     SIGHT_RANGE,
 )
-from khala.env.numeric.forces import Force, OwnForce
-from khala_simulator.battle import ENEMY, PLAYER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from khala.env.numeric.features import Board
     from khala.env.numeric.maps import SmacMap
     from khala.env.numeric.options import Options
+    from khala_simulator.smac.board import Board
+    from khala_simulator.smac.fighters import Fighters
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
-
-_OTHER_COOLDOWN: Final = 15
-"""What SMAC divides the cooldown of enemies by."""
 
 
 class UnitPlace(NamedTuple):
@@ -83,7 +80,6 @@ class SmacNames:
     reward: float = 0
     """Of the last step."""
     _spec: SmacMap
-    _last_action: Floats
 
     def __getattr__(self, name: str) -> Any:
         """Return an option by its name."""
@@ -91,10 +87,13 @@ class SmacNames:
             return getattr(self.options, name)
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
-    def _sides(self) -> tuple[OwnForce, Force]:
+    def _units(self) -> Fighters:
         raise NotImplementedError
 
     def _map(self) -> Board:
+        raise NotImplementedError
+
+    def _last(self) -> NDArray[np.int64]:
         raise NotImplementedError
 
     # settings and sizes -------------------------------------------------------------------------------------------
@@ -167,58 +166,55 @@ class SmacNames:
 
     @property
     def last_action(self) -> Floats:
-        """[agents, actions] one-hot."""
-        return self._last_action
+        """[agents, actions] one-hot; zeros before the first action."""
+        return (self._last()[:, None] == np.arange(self.n_actions)).astype(np.float64)
 
     @property
     def agents(self) -> dict[int, SmacUnit]:
         """The agents' units by their numbers."""
-        return dict(enumerate(_units(self._sides()[0], PLAYER)))
+        return dict(enumerate(_records(self._units(), PLAYER)))
 
     @property
     def enemies(self) -> dict[int, SmacUnit]:
         """The enemies by their numbers."""
-        return dict(enumerate(_units(self._sides()[1], ENEMY)))
+        return dict(enumerate(_records(self._units(), ENEMY)))
 
     @property
     def death_tracker_ally(self) -> Floats:
         """[agents] 1 for the dead."""
-        return (~self._sides()[0].alive).astype(np.float64)
+        return (~self._units().alive[: self.n_agents]).astype(np.float64)
 
     @property
     def death_tracker_enemy(self) -> Floats:
         """[enemies] 1 for the dead."""
-        return (~self._sides()[1].alive).astype(np.float64)
+        return (~self._units().alive[self.n_agents :]).astype(np.float64)
 
     def get_unit_by_id(self, a_id: int) -> SmacUnit:
         """Return an agent's unit."""
         return self.agents[a_id]
 
-    def get_unit_type_id(self, unit: SmacUnit, ally: bool) -> int:  # as SMAC has it
+    def get_unit_type_id(self, unit: SmacUnit, ally: bool) -> int:  # noqa: ARG002  # as SMAC has it
         """Return the place of a unit in the one-hot code of types."""
-        force, row = self._find(unit, ally=ally)
-        return int(force.types[row].argmax()) if self.unit_type_bits else 0
+        return int(self._units().types[self._find(unit)].argmax()) if self.unit_type_bits else 0
 
     def unit_max_shield(self, unit: SmacUnit) -> int | None:
         """Return what SMAC divides a unit's shields by; None if its type has none."""
-        force, row = self._find(unit, ally=unit.owner == PLAYER)
-        return int(force.most_shields[row]) or None
+        return int(self._units().most_shields[self._find(unit)]) or None
 
     def unit_max_cooldown(self, unit: SmacUnit) -> int:
         """Return what SMAC divides a unit's cooldown by, or a Medivac's energy."""
-        force, row = self._find(unit, ally=unit.owner == PLAYER)
-        return int(force.most_cooldown[row]) if isinstance(force, OwnForce) else _OTHER_COOLDOWN
+        return int(self._units().most_charge[self._find(unit)])
 
-    def _find(self, unit: SmacUnit, *, ally: bool) -> tuple[Force, int]:
-        force = self._sides()[not ally]
-        return force, force.now.tag.tolist().index(unit.tag)
+    def _find(self, unit: SmacUnit) -> int:
+        return self._units().tag.tolist().index(unit.tag)
 
     def only_medivac_left(self, ally: bool) -> bool:  # as SMAC has it
         """Return whether nobody of a side can fight on; of the enemy, one Medivac must be left."""
-        own, enemy = self._sides()
-        if ally:
-            return bool(own.heals.any()) and not (own.alive & ~own.heals).any()
-        return enemy.one_medivac(own)
+        fighters = self._units()
+        if not fighters.heal():
+            return False
+        own = slice(self.n_agents)
+        return not (fighters.alive[own] & ~fighters.medivac[own]).any() if ally else fighters.one_medivac()
 
     def unit_shoot_range(self, agent_id: int) -> int:  # noqa: ARG002  # as SMAC has it
         """Return how far an agent can shoot, in world units: SMAC has one range for all."""
@@ -296,13 +292,15 @@ class SmacNames:
         return math.hypot(x2 - x1, y2 - y1)
 
 
-def _units(force: Force, owner: int) -> list[SmacUnit]:
+def _records(fighters: Fighters, owner: int) -> list[SmacUnit]:
+    rows = range(fighters.agents) if owner == PLAYER else range(fighters.agents, fighters.count)
     units = []
-    for row, (tag, number, life) in enumerate(zip(force.now.tag, force.now.type_id, force.life, strict=True)):
-        x, y, _, life_max, shields, shields_max, energy, cooldown = force.now.numbers[:, row].tolist()
+    for row in rows:
+        x, y, _, life_max, shields, shields_max, energy, cooldown = fighters.numbers[:, row].tolist()
         told = cooldown if owner == PLAYER else 0.0
-        vitals = (float(life), life_max, shields, shields_max, energy, told)
-        units.append(SmacUnit(int(tag), int(number), owner, UnitPlace(x, y), *vitals))
+        vitals = (float(fighters.life[row]), life_max, shields, shields_max, energy, told)
+        tag, number = int(fighters.tag[row]), int(fighters.type_id[row])
+        units.append(SmacUnit(tag, number, owner, UnitPlace(x, y), *vitals))
     return units
 
 

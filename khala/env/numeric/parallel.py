@@ -70,7 +70,7 @@ class NumericParallelEnv(ParallelEnv[str, Any, int]):  # type: ignore[misc]  # P
         if not self.agents:
             return {}, {}, {}, {}, {}
         numbers = np.array([int(actions.get(agent, 0)) for agent in self.agents])
-        reward, over, info = self.battles.step(self.battles.possible(numbers))
+        reward, over, info = self.battles.play(numbers)
         timed_out, agents = self.battles.timed_out, self.agents
         seen = self._seen()
         self.agents = [] if over else agents

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala.env.numeric.features import FIRST_TARGET, HEIGHT_POINTS, MOVES, PATHING_POINTS
+from khala_simulator.smac.rules import FIRST_TARGET, HEIGHT_POINTS, MOVES, PATHING_POINTS
 
 if TYPE_CHECKING:
     from khala.env.numeric.maps import SmacMap
@@ -39,6 +39,16 @@ def observation(spec: SmacMap, options: Options) -> int:
     """Return the length of an observation."""
     moves, enemy, ally, own = parts(spec, options)
     return moves + spec.enemies * enemy + (spec.agents - 1) * ally + own
+
+
+def seen(spec: SmacMap, options: Options) -> int:
+    """Return the length of an observation as it is: SMAC does not count the time at its end."""
+    return observation(spec, options) + options.obs_timestep_number
+
+
+def described(spec: SmacMap, options: Options) -> int:
+    """Return the length of a state as it is."""
+    return seen(spec, options) * spec.agents if options.obs_instead_of_state else state(spec, options)
 
 
 def state(spec: SmacMap, options: Options) -> int:

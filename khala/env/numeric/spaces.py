@@ -29,14 +29,15 @@ def joint_space(env: StarCraft2Env) -> spaces.Dict:
 
 def state_space(env: StarCraft2Env) -> spaces.Box:
     """Return the space of the state."""
-    return _values(env.get_state_size())
+    return values(env.get_state_size())
 
 
 def _observation(env: StarCraft2Env, agents: tuple[int, ...]) -> dict[str, spaces.Space[Any]]:
-    return {"observation": _values(*agents, env.get_obs_size() + env.options.obs_timestep_number)}
+    return {"observation": values(*agents, env.get_obs_size() + env.options.obs_timestep_number)}
 
 
-def _values(*shape: int) -> spaces.Box:
+def values(*shape: int) -> spaces.Box:
+    """Return the space of an array of observations or of a state."""
     return spaces.Box(LEAST, MOST, shape, np.float32)
 
 

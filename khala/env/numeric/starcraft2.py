@@ -6,7 +6,7 @@
 
 The order of what happens is SMAC's own, down to the game loops in which an episode begins, so that the same seed and
 actions make the same worlds as SMAC's package on the simulator's server. Above: the environments of other interfaces.
-Below: `khala.env.numeric.features`, `khala.env.numeric.rewards`, `khala_simulator.battle`.
+Below: `khala.env.numeric.forces`, `khala.env.numeric.rewards`, `khala_simulator.smac`, `khala_simulator.battle`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from khala.env.numeric import rewards, sizes
-from khala.env.numeric.features import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP, STOP, BattleScene, Board
-from khala.env.numeric.forces import enemy_force, look, own_force
+from khala.env.numeric.forces import fighters_of
 from khala.env.numeric.maps import smac_map
 from khala.env.numeric.names import SmacNames
 from khala.env.numeric.options import options_of
 from khala_simulator.battle import Battle
+from khala_simulator.smac.board import Board
+from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, GOES_ON, MOVES, NO_OP, NOTHING, STOP, WON
+from khala_simulator.smac.scene import BattleScene, SceneLayout
 from khala_simulator.tables.versions import DEFAULT_VERSION
 
 if TYPE_CHECKING:
@@ -30,7 +32,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from khala.env.numeric.forces import Force, OwnForce
+    from khala.env.numeric.maps import SmacMap
+    from khala.env.numeric.options import Options
+    from khala_simulator.smac.fighters import Fighters
 
     Bools = NDArray[np.bool_]
     Floats32 = NDArray[np.float32]
@@ -38,6 +42,7 @@ if TYPE_CHECKING:
 ATTACK, MOVE, STOP_ORDER, HEAL = 23, 16, 4, 386
 _RESTART_LOOPS: Final = 2
 _MOST_SEED = 2**31
+_OVER: Final = "the episode is over: call reset() first"
 PICTURE_PX: Final = (512, 512)
 
 
@@ -73,11 +78,8 @@ class StarCraft2Env(SmacNames):
         self._battle: Battle | None = None
         self._ended = False
         self._steps = 0
-        self._last_action = np.zeros((self.n_agents, self.n_actions))
-        self._codes = np.eye(self.n_actions)
+        self._layout = _layout(self._spec, self.options, self.n_actions)
         self._board: Board
-        self._own: OwnForce
-        self._enemy: Force
         self._scene: BattleScene
 
     @property
@@ -89,13 +91,17 @@ class StarCraft2Env(SmacNames):
         """
         return self._require_battle()
 
-    def _sides(self) -> tuple[OwnForce, Force]:
+    def _units(self) -> Fighters:
         self._require_battle()
-        return self._own, self._enemy
+        return self._scene.fighters
 
     def _map(self) -> Board:
         self._require_battle()
         return self._board
+
+    def _last(self) -> NDArray[np.int64]:
+        nothing = np.full(self.n_agents, NOTHING, dtype=np.int64)
+        return nothing if self._battle is None else self._scene.last
 
     def _require_battle(self) -> Battle:
         if self._battle is None:
@@ -105,7 +111,12 @@ class StarCraft2Env(SmacNames):
     # playing ------------------------------------------------------------------------------------------------------
 
     def reset(self, *, seed: int | None = None) -> tuple[list[Floats32], Floats32]:
-        """Begin an episode, and return `get_obs()` and `get_state()`.
+        """Begin an episode as `begin` does, and return `get_obs()` and `get_state()`."""
+        self.begin(seed)
+        return self.get_obs(), self.get_state()
+
+    def begin(self, seed: int | None = None) -> None:
+        """Begin an episode.
 
         The game goes on from the episode before, over or not, and so does its chance. With a seed it is a new game.
         SMAC's package does so too, except before its first episode is over: then it starts another game from the seed.
@@ -117,15 +128,15 @@ class StarCraft2Env(SmacNames):
         if self._battle is None:
             self._launch()
         else:
-            self.battle.kill(np.concatenate([f.now.tag[f.alive] for f in (self._own, self._enemy)]).tolist())
+            fighters = self._scene.fighters
+            self.battle.kill(fighters.tag[fighters.alive].tolist())
             self.battle.advance(_RESTART_LOOPS)
             self.battle.forget_past()
         self._ended = False
-        self._last_action = np.zeros_like(self._last_action)
-        self._own, self._enemy = self._arrivals()
-        self.max_reward = rewards.most_reward(self._enemy, self.options)
-        self._look()
-        return self.get_obs(), self.get_state()
+        fighters = self._arrivals()
+        self.max_reward = rewards.most_reward(fighters, self.options)
+        self._scene = BattleScene(self._layout, self._board, fighters)
+        self._scene.look()
 
     def _launch(self) -> None:
         seed = secrets.randbelow(_MOST_SEED) if self._seed is None else self._seed
@@ -134,14 +145,11 @@ class StarCraft2Env(SmacNames):
         self._battle = Battle(name, seed=seed, difficulty=self.options.level, version=version)
         self._board = Board.of(self._battle.ground(), self.options.move_amount)
 
-    def _arrivals(self) -> tuple[OwnForce, Force]:
+    def _arrivals(self) -> Fighters:
         """Return both sides, once all units are there."""
-        while True:
-            own = own_force(self.battle, self._spec)
-            enemy = enemy_force(self.battle, self._spec)
-            if (len(own), len(enemy)) == (self.n_agents, self.n_enemies):
-                return own, enemy
+        while (fighters := fighters_of(self.battle, self._spec)) is None:
             self.battle.advance(1)
+        return fighters
 
     def step(self, actions: Sequence[int] | NDArray[np.integer[Any]]) -> tuple[float, bool, dict[str, Any]]:
         """Play a step, and return the team's reward, whether the episode is over, and what happened in it.
@@ -155,18 +163,25 @@ class StarCraft2Env(SmacNames):
         """
         numbers = [int(action) for action in actions]
         self._check(numbers)
-        self._last_action = self._codes[numbers]
-        for agent, action in enumerate(numbers):
+        return self.play(np.array(numbers))
+
+    def play(self, actions: NDArray[np.int64]) -> tuple[float, bool, dict[str, Any]]:
+        """Play a step as `step` does; a unit stops in place of an action that is not available."""
+        if self._battle is None or self._ended:
+            raise ValueError(_OVER)
+        scene = self._scene
+        scene.take(actions)
+        for agent, action in enumerate(scene.last.tolist()):
             self._order(agent, action)
         self.battle.advance(self.options.step_mul)
         self._steps += 1
-        look(self.battle, self._own, self._enemy)
-        self._look()
+        self.battle.see(scene.fighters)
+        scene.look()
         return self._outcome()
 
     def _check(self, actions: Sequence[int]) -> None:
         if self._battle is None or self._ended:
-            raise ValueError("the episode is over: call reset() first")
+            raise ValueError(_OVER)
         if len(actions) != self.n_agents:
             raise ValueError(f"there are {len(actions)} actions for {self.n_agents} agents")
         for agent, action in enumerate(actions):
@@ -175,8 +190,8 @@ class StarCraft2Env(SmacNames):
                 raise ValueError(f"agent {agent} cannot perform action {action}: it can perform {can}")
 
     def _order(self, agent: int, action: int) -> None:
-        own = self._own
-        tag = int(self._own.now.tag[agent])
+        fighters = self._scene.fighters
+        tag = int(fighters.tag[agent])
         if action == NO_OP:
             return
         if action == STOP:
@@ -184,43 +199,51 @@ class StarCraft2Env(SmacNames):
         elif action < FIRST_TARGET:
             dx, dy = MOVES[action - FIRST_MOVE]
             far = self.options.move_amount
-            point = float(own.now.x[agent]) + dx * far, float(own.now.y[agent]) + dy * far
-            self.battle.order(MOVE, tag, point=point)
-        elif own.heals[agent]:
-            self.battle.order(HEAL, tag, target=int(own.now.tag[action - FIRST_TARGET]))
+            x, y = fighters.numbers[:2, agent].tolist()
+            self.battle.order(MOVE, tag, point=(x + dx * far, y + dy * far))
+        elif fighters.medivac[agent]:
+            self.battle.order(HEAL, tag, target=int(fighters.tag[action - FIRST_TARGET]))
         else:
-            self.battle.order(ATTACK, tag, target=int(self._enemy.now.tag[action - FIRST_TARGET]))
-
-    def _look(self) -> None:
-        self._scene = BattleScene(self._spec, self.options, self._board, self._own, self._enemy)
+            self.battle.order(ATTACK, tag, target=int(fighters.tag[self.n_agents + action - FIRST_TARGET]))
 
     def _outcome(self) -> tuple[float, bool, dict[str, Any]]:
         """Return what `step` returns, and count the battle if it is over."""
-        own, enemy = self._own, self._enemy
-        ending = rewards.ending_of(own, enemy)
+        fighters = self._scene.fighters
+        ending = fighters.ending()
+        dead_allies, dead_enemies = fighters.counts()
         info: dict[str, Any] = {
-            "battle_won": ending == "won",
-            "dead_allies": int((~own.alive).sum()),
-            "dead_enemies": int((~enemy.alive).sum()),
+            "battle_won": ending == WON,
+            "dead_allies": dead_allies,
+            "dead_enemies": dead_enemies,
         }
-        self.battles_won += ending == "won"
-        timeout = ending is None and self._steps >= self.episode_limit
+        self.battles_won += ending == WON
+        timeout = ending == GOES_ON and self._steps >= self.episode_limit
         if timeout:
             self.timeouts += 1
             if self.options.continuing_episode:
                 info["episode_limit"] = True
-        self._ended = timeout or ending is not None
+        self._ended = timeout or ending != GOES_ON
         self.battles_game += self._ended
-        reward = rewards.of_end(ending, self.options, rewards.of_battle(own, enemy, self.options))
+        reward = rewards.of_step(fighters, ending, self.options)
         if self.options.reward_scale:
             reward /= self.max_reward / self.options.reward_scale_rate
         self.reward = reward
         return reward, self._ended, info
 
     @property
+    def steps(self) -> int:
+        """Steps of the episode so far."""
+        return self._steps
+
+    @property
+    def over(self) -> bool:
+        """Whether the episode is over."""
+        return self._ended
+
+    @property
     def timed_out(self) -> bool:
         """Whether the episode ended at its limit, and not with the battle."""
-        return self._ended and rewards.ending_of(self._own, self._enemy) is None
+        return self._ended and self._scene.fighters.ending() == GOES_ON
 
     # seeing -------------------------------------------------------------------------------------------------------
 
@@ -228,19 +251,21 @@ class StarCraft2Env(SmacNames):
     def _progress(self) -> float:
         return self._steps / self.episode_limit
 
+    def see(self, observations: Floats32, state: Floats32) -> None:
+        """Write [agents, size] what each agent sees, and [size] the state, into contiguous arrays of these sizes."""
+        progress = self._progress
+        self._scene.observe(observations, progress)
+        self._scene.describe(state, progress)
+
     def observations(self) -> Floats32:
         """Return [agents, size] what each agent sees."""
-        return self._scene.observations(self._last_action, self._progress)
+        seen = np.empty((self.n_agents, sizes.seen(self._spec, self.options)), dtype=np.float32)
+        self._scene.observe(seen, self._progress)
+        return seen
 
     def masks(self) -> Bools:
         """Return [agents, actions] which actions are available."""
         return self._scene.masks
-
-    def possible(self, actions: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-        """Return the actions, with stop in place of each that is not available, and nothing for the dead."""
-        available = self.masks()
-        chosen: NDArray[np.int64] = np.where(available[np.arange(self.n_agents), actions], actions, STOP)
-        return np.where(available[:, NO_OP], NO_OP, chosen)
 
     def get_obs(self) -> list[Floats32]:
         """Return what each agent sees."""
@@ -257,7 +282,9 @@ class StarCraft2Env(SmacNames):
 
     def get_state(self) -> Floats32:
         """Return the state, for training alone."""
-        return self._scene.state(self._last_action, self._progress)
+        state = np.empty(sizes.described(self._spec, self.options), dtype=np.float32)
+        self._scene.describe(state, self._progress)
+        return state
 
     def get_state_size(self) -> int:
         """Return the length of the state."""
@@ -265,10 +292,10 @@ class StarCraft2Env(SmacNames):
 
     def get_state_dict(self) -> dict[str, Any]:
         """Return the parts of the state by name."""
-        allies, enemies = self._scene.state_parts()
+        allies, enemies = self._scene.units()
         parts: dict[str, Any] = {"allies": allies, "enemies": enemies}
         if self.options.state_last_action:
-            parts["last_action"] = self._last_action
+            parts["last_action"] = self.last_action
         if self.options.state_timestep_number:
             parts["timestep"] = self._progress
         return parts
@@ -288,11 +315,15 @@ class StarCraft2Env(SmacNames):
 
     def get_visibility_matrix(self) -> Bools:
         """Return [agents, agents + enemies] which units each agent sees; nobody sees itself."""
-        return self._scene.in_sight()
+        scene = self._scene
+        seen: Bools = scene.seen & scene.fighters.alive[: self.n_agents, None]
+        np.fill_diagonal(seen, val=False)
+        return seen
 
     def get_unit_types(self) -> list[int]:
         """Return the game's type of each unit, agents first."""
-        return [*self._own.now.type_id.tolist(), *self._enemy.now.type_id.tolist()]
+        types: list[int] = self._units().type_id.tolist()
+        return types
 
     # about --------------------------------------------------------------------------------------------------------
 
@@ -337,3 +368,23 @@ class StarCraft2Env(SmacNames):
     def close(self) -> None:
         """Forget the game."""
         self._battle = None
+
+
+def _layout(spec: SmacMap, options: Options, actions: int) -> SceneLayout:
+    """Return what observations and states consist of."""
+    own_shields, enemy_shields = (race == "P" for race in spec.races)
+    return SceneLayout(
+        actions=actions,
+        move_amount=options.move_amount,
+        own_shields=own_shields,
+        enemy_shields=enemy_shields,
+        obs_all_health=options.obs_all_health,
+        obs_own_health=options.own_health,
+        obs_last_action=options.obs_last_action,
+        obs_pathing_grid=options.obs_pathing_grid,
+        obs_terrain_height=options.obs_terrain_height,
+        obs_timestep_number=options.obs_timestep_number,
+        obs_instead_of_state=options.obs_instead_of_state,
+        state_last_action=options.state_last_action,
+        state_timestep_number=options.state_timestep_number,
+    )

@@ -17,6 +17,7 @@ from khala_simulator.abilities.registry import SKILLS, SMARTS
 from khala_simulator.abilities.skill import touching
 from khala_simulator.economy import payments, supply
 from khala_simulator.economy.requirements import met
+from khala_simulator.native import columns
 from khala_simulator.tables import prices
 from khala_simulator.tables.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
@@ -50,7 +51,8 @@ def is_modelled(ability: Ability) -> bool:
 
 def as_is(world: World, slot: int, ability: Ability) -> Ability:
     """Return the ability as a unit has it now, with the changes of its owner's upgrades."""
-    return world.stats.ability(int(world.owner[slot]), ability)
+    c = columns.columns_of(world)
+    return world.stats.ability(c.owner[slot], ability)
 
 
 def prep_loops(world: World, slot: int, ability: Ability) -> float:
@@ -89,7 +91,8 @@ def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
 
 
 def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
-    if world.build_progress[slot] < 1.0:
+    c = columns.columns_of(world)
+    if c.build_progress[slot] < 1.0:
         return ActionResult.BUILDING_IS_UNDER_CONSTRUCTION
     stuck = ability.effect in WALKS and not commands.can_move(world, slot)
     return ActionResult.UNIT_CANT_MOVE if stuck else ActionResult.SUCCESS

@@ -7,15 +7,14 @@ left alone; the functions return the slots that took the order.
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat import lifecycle
-from khala_simulator.combat.targets import disengage, engage, weapon_for
+from khala_simulator.combat import lifecycle, targets
 from khala_simulator.combat.traits import refresh
 from khala_simulator.economy import harvesting
+from khala_simulator.native import columns, memory
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import (
     ATTACK,
@@ -40,6 +39,9 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 QUEUE_LIMIT = 32
+IDLE: Final = OrderKind.IDLE.value
+IDLENESS: Final = Order(OrderKind.IDLE, 0)
+"""The order of a unit without one."""
 
 Point = tuple[float, float]
 
@@ -228,30 +230,36 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
 
 def _soon(world: World, slot: int) -> UnitType:
     """Return the type of a unit, or the type that it is morphing into."""
-    if world.bound[slot] and world.casts[slot]:
+    c = columns.columns_of(world)
+    if c.bound[slot] and c.casts[slot]:
         row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
         if row is not None:
             return world.catalog.units[row]
-    return world.unit_type(slot)
+    units: tuple[UnitType, ...] = world.catalog.units
+    return units[int(c.type[slot])]
 
 
 def can_move(world: World, slot: int) -> bool:
     """Return whether a unit takes movement orders: its type, or the next one, has a speed or gets one by upgrade."""
+    c = columns.columns_of(world)
     unit = _soon(world, slot)
-    return bool(world.stats.step[world.owner[slot], unit.row] > 0.0) and _commandable(unit)
+    stats = world.stats
+    step = memory.floats(stats.step)[c.owner[slot] * stats.types + unit.row]
+    return step > 0.0 and _commandable(unit)
 
 
 def can_attack(world: World, slot: int) -> bool:
     """Return whether the unit has a weapon that it can aim now."""
-    armed = world.ground_weapon[slot] >= 0 or world.air_weapon[slot] >= 0
-    return bool(armed) and _commandable(world.unit_type(slot))
+    c = columns.columns_of(world)
+    armed = c.ground_weapon[slot] >= 0 or c.air_weapon[slot] >= 0
+    return armed and _commandable(world.unit_type(slot))
 
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
     """Return whether the unit has a weapon that it can aim at ``victim`` now."""
     if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
         return False
-    return weapon_for(world, slot, victim) >= 0
+    return targets.weapon_for(world, slot, victim) >= 0
 
 
 def is_enemy(world: World, player: int, other: int) -> bool:
@@ -270,23 +278,26 @@ def _inside(world: World, point: Point) -> Point:
 
 def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
     """Make an order the units' current one, or append it to their queues; return the slots that took it."""
-    taken = []
-    wanted = order
-    for slot in slots:
-        if world.carrier[slot] != NOBODY:
-            continue  # a passenger takes no orders
-        order = _of_its_own(world, slot, wanted)
-        if queue and int(world.order_kind[slot]) != OrderKind.IDLE:
-            if len(world.queue[slot]) >= QUEUE_LIMIT:
-                continue
-            world.queue[slot].append(order)
-        elif world.bound[slot]:
-            world.queue[slot] = [order]
-        else:
-            world.queue[slot] = []
-            begin(world, slot, order)
-        taken.append(slot)
-    return taken
+    return [slot for slot in slots if _give(world, slot, order, queue)]
+
+
+def _give(world: World, slot: int, wanted: Order, queue: bool) -> bool:
+    """Give one unit an order; return whether it took it."""
+    c = columns.columns_of(world)
+    if c.carrier[slot] != NOBODY:
+        return False  # a passenger takes no orders
+    order = _of_its_own(world, c.type[slot], wanted)
+    waiting = world.queue
+    if queue and c.order_kind[slot] != IDLE:
+        if len(waiting[slot]) >= QUEUE_LIMIT:
+            return False
+        waiting[slot].append(order)
+    elif c.bound[slot]:
+        waiting[slot] = [order]
+    else:
+        waiting[slot] = []
+        begin(world, slot, order)
+    return True
 
 
 ORDINARY = {
@@ -303,11 +314,11 @@ ORDINARY = {
 GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
 
 
-def _of_its_own(world: World, slot: int, order: Order) -> Order:
-    """Return the order with the ability id of the unit's own type; a Battlecruiser has its own move."""
+def _of_its_own(world: World, row: int, order: Order) -> Order:
+    """Return the order with the ability id of a type of units; a Battlecruiser has its own move."""
     effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
-    own = None if effect is None else world.catalog.ordinary[int(world.type[slot])].get(effect)
-    return order if own in (None, order.ability) else dataclasses.replace(order, ability=own or order.ability)
+    own = None if effect is None else world.catalog.ordinary[row].get(effect)
+    return order if own in (None, order.ability) else order._replace(ability=own or order.ability)
 
 
 def begin(world: World, slot: int, order: Order | None) -> None:
@@ -316,37 +327,54 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     An order to seek fights leaves a unit in the one that it has found by itself: an attack-move that is given again
     and again interrupts nothing.
     """
-    order = order or Order(OrderKind.IDLE, 0)
+    order = order or IDLENESS
+    kind = order.kind
     target = world.slot_of(order.target)
-    opponent = int(world.target[slot])
-    fights_on = order.kind in SEEKS_FIGHTS and int(world.order_kind[slot]) in LOOKS_AROUND
-    if world.harvest[slot]:
+    c = columns.columns_of(world)
+    opponent = c.target[slot]
+    fights_on = kind in SEEKS_FIGHTS and c.order_kind[slot] in LOOKS_AROUND
+    if c.harvest[slot]:
         _end_harvest(world, slot)
-    world.order_kind[slot] = order.kind
-    world.on_guard[slot] = False
-    world.order_ability[slot] = order.ability
-    world.order_target[slot] = target
-    world.order_point[slot] = world.pos[slot] if order.point is None else order.point
-    world.order_aimed[slot] = order.point is not None
-    world.order_origin[slot] = world.pos[slot] if order.origin is None else order.origin
-    attacks = order.kind is OrderKind.ATTACK_UNIT and target != NOBODY and engage(world, slot, target)
+    c.order_kind[slot] = kind
+    c.on_guard[slot] = False
+    c.order_ability[slot] = order.ability
+    c.order_target[slot] = target
+    c.order_point[slot] = _point(order.point, c.pos[slot])
+    c.order_aimed[slot] = order.point is not None
+    c.order_origin[slot] = _point(order.origin, c.pos[slot])
+    attacks = kind is OrderKind.ATTACK_UNIT and target != NOBODY and targets.engage(world, slot, target)
     if not (attacks or fights_on):
-        disengage(world, slot)
-    world.walks[slot] = order.kind in WALKS
-    world.looks_around[slot] = order.kind in LOOKS_AROUND
-    world.holds[slot] = order.kind is OrderKind.HOLD
-    world.needs_target[slot] = order.kind in NEEDS_TARGET or (order.kind is OrderKind.CAST and target != NOBODY)
-    world.casts[slot] = order.kind is OrderKind.CAST
-    world.cast_at[slot] = -1.0
-    world.channels[slot] = world.bound[slot] = False
-    world.scan_now = world.orders_changed = True
-    world.guard[slot] = world.pos[slot]
-    if opponent == NOBODY or world.target[slot] != opponent:
-        world.backswing[slot] = 0.0
-    world.returning[slot] = world.nav_end[slot] = False
-    world.nav_loop[slot] = world.blocked[slot] = world.detour[slot] = world.scan_loop[slot] = 0
-    if order.kind in (OrderKind.GATHER, OrderKind.RETURN):
-        _begin_harvest(world, slot, order.kind, target)
+        targets.disengage(world, slot)
+    casts = kind is OrderKind.CAST
+    c.walks[slot] = kind in WALKS
+    c.looks_around[slot] = kind in LOOKS_AROUND
+    c.holds[slot] = kind is OrderKind.HOLD
+    c.needs_target[slot] = kind in NEEDS_TARGET or (casts and target != NOBODY)
+    c.casts[slot] = casts
+    c.cast_at[slot] = -1.0
+    c.channels[slot] = False
+    c.bound[slot] = False
+    world.scan_now = True
+    world.orders_changed = True
+    c.guard[slot] = c.pos[slot]
+    if opponent == NOBODY or c.target[slot] != opponent:
+        c.backswing[slot] = 0.0
+    c.returning[slot] = False
+    c.nav_end[slot] = False
+    c.nav_loop[slot] = 0
+    c.blocked[slot] = 0
+    c.detour[slot] = 0
+    c.scan_loop[slot] = 0
+    if kind is OrderKind.GATHER or kind is OrderKind.RETURN:
+        _begin_harvest(world, slot, kind, target)
+
+
+def _point(given: Point | None, place: memory.Point) -> memory.Point:
+    """Return a given point, or the place of the unit if there is none."""
+    if given is None:
+        return place
+    x, y = given
+    return memory.point(x, y)
 
 
 def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> None:

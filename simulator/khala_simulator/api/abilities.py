@@ -10,15 +10,15 @@ Above: `giving.py`, `actions.py`, `query.py`, `observation.py`. Below: `commands
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from s2clientprotocol import error_pb2
 
 from khala_simulator.abilities import casting, commands
 from khala_simulator.economy import requirements
+from khala_simulator.native import columns
 from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
@@ -33,9 +33,11 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
     Result: TypeAlias = error_pb2.ActionResult.ValueType
 
+SUCCESS: Final = error_pb2.Success
+UNIT: Final = int(AbilityAim.UNIT)
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class UnitCommand:
+
+class UnitCommand(NamedTuple):
     """What a player asked for: an ability id of either kind, for units by tag, at a unit, a point or nothing."""
 
     ability: int
@@ -53,8 +55,7 @@ class UnitCommand:
         return AbilityAim.NONE if self.point is None else AbilityAim.POINT
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class OrderPlan:
+class OrderPlan(NamedTuple):
     """A judged command: its result, and what to do if that is a success.
 
     Args:
@@ -90,7 +91,7 @@ def meant(world: World, slot: int, requested: int) -> Ability | None:
 
 def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
     """Return the result of ``meant``, and whether the unit can use it now; None where that was not checked."""
-    exact, forms = _forms(world.catalog, int(world.type[slot]), requested)
+    exact, forms = _forms(world.catalog, columns.columns_of(world).type[slot], requested)
     if exact is not None:
         return exact, None
     first: tuple[Ability | None, ActionResult | None] = None, None
@@ -156,7 +157,7 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
     """Judge how a command would go now and what it would do; nothing is done yet."""
     slots = [slot for slot in dict.fromkeys(map(world.slot_of, command.tags)) if slot != NOBODY]
     all_obey = "control_enemy" in world.players[player].cheats
-    own = [slot for slot in slots if world.owner[slot] == player or (all_obey and world.owner[slot] > 0)]
+    own = [slot for slot in slots if _obeys(world, slot, player, all_obey)]
     if not own:
         return _refuse(command, ActionResult.YOU_CANT_CONTROL_THAT_UNIT if slots else ActionResult.ERROR)
     aimed = _without_snapshot(world, player, command)
@@ -168,7 +169,7 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
         return _refuse(command, ActionResult.NOT_SUPPORTED)
     parts: list[tuple[Ability, tuple[Cast, ...]]] = []
     why = ActionResult.ERROR
-    target = world.slot_of(aimed.target) if aimed.aim is AbilityAim.UNIT else NOBODY
+    target = NOBODY if aimed.target == NO_TAG else world.slot_of(aimed.target)
     for ability, some in groups:
         result = _aim_result(world, player, ability, aimed, target)
         casts: list[Cast] = []
@@ -182,7 +183,12 @@ def judge(world: World, player: int, command: UnitCommand) -> OrderPlan:
             why = result
     if not parts:
         return _refuse(command, why)
-    return OrderPlan(command, error_pb2.Success, _reported_id(parts), aimed.target, aimed.point, tuple(parts))
+    return OrderPlan(command, SUCCESS, _reported_id(parts), aimed.target, aimed.point, tuple(parts))
+
+
+def _obeys(world: World, slot: int, player: int, all_obey: bool) -> bool:
+    owner = columns.columns_of(world).owner[slot]
+    return owner == player or (all_obey and owner > 0)
 
 
 def _refuse(command: UnitCommand, why: ActionResult) -> OrderPlan:
@@ -195,8 +201,8 @@ def _without_snapshot(world: World, player: int, command: UnitCommand) -> UnitCo
     if snapshot is None:
         return command
     if world.catalog.units[snapshot.row].resource and world.slot_of(snapshot.unit) != NOBODY:
-        return dataclasses.replace(command, target=snapshot.unit)
-    return dataclasses.replace(command, target=NO_TAG, point=snapshot.pos)
+        return command._replace(target=snapshot.unit)
+    return command._replace(target=NO_TAG, point=snapshot.pos)
 
 
 def _on_the_map(world: World, command: UnitCommand) -> UnitCommand:
@@ -205,11 +211,13 @@ def _on_the_map(world: World, command: UnitCommand) -> UnitCommand:
         return command
     (x, y), (width, height) = command.point, world.map.terrain.size
     point = min(max(x, 0.0), float(width)), min(max(y, 0.0), float(height))
-    return command if point == command.point else dataclasses.replace(command, point=point)
+    return command if point == command.point else command._replace(point=point)
 
 
 def _reported_id(parts: list[tuple[Ability, tuple[Cast, ...]]]) -> int:
     """Return the id that reports a command of several kinds: a fight's before a walk's."""
+    if len(parts) == 1:
+        return parts[0][0].id
     return max(parts, key=lambda part: (part[0].effect == "attack", -part[0].id))[0].id
 
 
@@ -230,14 +238,17 @@ def _groups(
 
 def _aim_result(world: World, player: int, ability: Ability, command: UnitCommand, target: int) -> ActionResult:
     """Return why an ability can't be aimed like this by any unit, or success; ``target`` is the slot of the target."""
-    if not command.aim & ability.aim:
+    aim = command.aim
+    allowed = ability.aim
+    if not aim & allowed:
         aimless = AbilityAim.POINT not in ability.aim
         return ActionResult.MUST_TARGET_UNIT if aimless and AbilityAim.UNIT in ability.aim else (
             ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
         )  # fmt: skip
-    if command.aim is AbilityAim.UNIT:
+    if aim == UNIT:
         remembered = target != NOBODY and command.target in world.memories[player].of_unit
-        if target == NOBODY or not (remembered or world.visible[player, target]):
+        c = columns.columns_of(world)
+        if target == NOBODY or not (remembered or c.visible[player * c.capacity + target]):
             return ActionResult.MUST_TARGET_VISIBLE_UNIT
     return ActionResult.SUCCESS
 

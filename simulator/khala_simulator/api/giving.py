@@ -5,8 +5,7 @@ Above: `actions.py`. Below: `abilities.py` (which judges), `commands.py` (moves 
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from s2clientprotocol import error_pb2
 
@@ -21,8 +20,10 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class CommandOutcome:
+SUCCESS: Final = error_pb2.Success
+
+
+class CommandOutcome(NamedTuple):
     """The outcome of a command: its result, the specific ability, and the units that took it."""
 
     result: Result
@@ -32,7 +33,7 @@ class CommandOutcome:
 
 def carry_out(world: World, plan: OrderPlan) -> CommandOutcome:
     """Give a command to the units that can take it, as judged in the present world."""
-    if plan.result != error_pb2.Success:
+    if plan.result != SUCCESS:
         return CommandOutcome(plan.result)
     taken: list[int] = []
     queue = plan.asked.queue
@@ -46,7 +47,7 @@ def carry_out(world: World, plan: OrderPlan) -> CommandOutcome:
             taken += casting.order(world, casts, ability, queue=queue)
     if not taken:
         return CommandOutcome(result_of(ActionResult.ORDER_QUEUE_IS_FULL if queue else ActionResult.ERROR))
-    return CommandOutcome(error_pb2.Success, plan.ability, tuple(taken))
+    return CommandOutcome(SUCCESS, plan.ability, tuple(taken))
 
 
 def _move(world: World, slots: list[int], plan: OrderPlan) -> list[int]:

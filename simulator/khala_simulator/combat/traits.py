@@ -9,6 +9,7 @@ import numpy as np
 
 from khala_simulator.combat.targets import disengage, engage, measure_reach, weapon_for
 from khala_simulator.combat.weapon_choice import weapon_traits
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.layers import ONE_CELL, Layer, inner_body, layer_of
 from khala_simulator.tables.mechanics import MECHANICS
@@ -45,47 +46,54 @@ def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:
 
 def body_traits(world: World, slot: int) -> None:
     """Write all traits of a slot; see the traits of ``columns``."""
+    c = columns.columns_of(world)
     unit = world.unit_type(slot)
     kinds = kinds_on(world, slot)
-    at = (int(world.owner[slot]), unit.row)
-    world.radius[slot] = unit.radius
-    world.separation[slot] = unit.separation
-    world.lightness[slot] = ORDINARY_PUSH / unit.push
-    layer = world.layer[slot] = layer_of(unit)
-    world.clearance[slot] = min(inner_body(unit) - ONE_CELL * (layer is Layer.WIDE), MECHANICS.body_clearance)
-    world.layer_bits[slot] = 0 if world.harvest[slot] or unit.underfoot else world.stats.layer_bits[unit.row]
-    world.plane_bits[slot] = world.stats.plane_bits[unit.row]
-    world.step_max[slot] = world.stats.step[at]
-    world.step_gain[slot] = world.stats.step_gain[at]
-    world.life_max[slot], world.life_regen[slot] = world.stats.life_max[at], world.stats.life_regen[at]
-    world.shields_max[slot], world.shield_regen[slot] = world.stats.shields_max[at], world.stats.shield_regen[at]
-    world.energy_max[slot], world.energy_regen[slot] = world.stats.energy_max[at], world.stats.energy_regen[at]
-    world.life_delay[slot] = unit.life_regen_delay_n * LOOPS_PER_NORMAL_SECOND
-    world.shield_delay[slot] = unit.shield_regen_delay_n * LOOPS_PER_NORMAL_SECOND
+    stats = world.stats
+    row = unit.row
+    at = c.owner[slot] * stats.types + row
+    c.radius[slot] = unit.radius
+    c.separation[slot] = unit.separation
+    c.lightness[slot] = ORDINARY_PUSH / unit.push
+    layer = layer_of(unit)
+    c.layer[slot] = layer
+    c.clearance[slot] = min(inner_body(unit) - ONE_CELL * (layer is Layer.WIDE), MECHANICS.body_clearance)
+    c.layer_bits[slot] = 0 if c.harvest[slot] or unit.underfoot else memory.ints(stats.layer_bits)[row]
+    c.plane_bits[slot] = memory.ints(stats.plane_bits)[row]
+    c.step_max[slot] = memory.floats(stats.step)[at]
+    c.step_gain[slot] = memory.floats(stats.step_gain)[at]
+    c.life_max[slot] = memory.floats(stats.life_max)[at]
+    c.life_regen[slot] = memory.floats(stats.life_regen)[at]
+    c.shields_max[slot] = memory.floats(stats.shields_max)[at]
+    c.shield_regen[slot] = memory.floats(stats.shield_regen)[at]
+    c.energy_max[slot] = memory.floats(stats.energy_max)[at]
+    c.energy_regen[slot] = memory.floats(stats.energy_regen)[at]
+    c.life_delay[slot] = unit.life_regen_delay_n * LOOPS_PER_NORMAL_SECOND
+    c.shield_delay[slot] = unit.shield_regen_delay_n * LOOPS_PER_NORMAL_SECOND
     _turning(world, slot, unit)
-    world.step_loss[slot] = _braking(unit)
-    world.glides[slot] = unit.flying and math.isfinite(world.step_loss[slot])
-    world.creep_factor[slot] = world.stats.creep_factor[at]
+    c.step_loss[slot] = _braking(unit)
+    c.glides[slot] = unit.flying and math.isfinite(c.step_loss[slot])
+    c.creep_factor[slot] = memory.floats(stats.creep_factor)[at]
     cells = world.footprint_cells(slot)
-    world.walled[slot] = len(cells) > 0
+    c.walled[slot] = len(cells) > 0
     world.walls[slot] = (np.ptp(cells, axis=0) + 1) / 2.0 if len(cells) else 0.0
-    world.priority[slot] = unit.priority
-    world.targetable[slot] = not (unit.invulnerable or (unit.untargetable and not unit.weapons))
-    world.cloaked[slot] = unit.cloaked
-    world.sight[slot] = world.stats.sight[at]
-    world.detects[slot] = unit.detect
+    c.priority[slot] = unit.priority
+    c.targetable[slot] = not (unit.invulnerable or (unit.untargetable and not unit.weapons))
+    c.cloaked[slot] = unit.cloaked
+    c.sight[slot] = memory.floats(stats.sight)[at]
+    c.detects[slot] = unit.detect
     weapon_traits(world, slot, unit, kinds)
     _plain(world, slot)
     for kind in kinds:
         _change(world, slot, kind)
-    if kinds or world.build_progress[slot] < 1.0 or not world.powered[slot]:
-        _restrain(world, slot, frozenset().union(*(kind.flags for kind in kinds)))
+    if kinds or c.build_progress[slot] < 1.0 or not c.powered[slot]:
+        _restrain(world, slot, frozenset().union(*[kind.flags for kind in kinds]))
     if unit.name.startswith(DISGUISE):
-        world.can_attack[slot] = world.acquires[slot] = False
-    if world.carrier[slot] != NOBODY:
+        c.can_attack[slot] = c.acquires[slot] = False
+    if c.carrier[slot] != NOBODY:
         _shelter(world, slot)
-    if world.target[slot] != NOBODY:
-        _rearm(world, slot, int(world.target[slot]))
+    if c.target[slot] != NOBODY:
+        _rearm(world, slot, int(c.target[slot]))
 
 
 def _rearm(world: World, slot: int, target: int) -> None:
@@ -101,22 +109,26 @@ def _rearm(world: World, slot: int, target: int) -> None:
 
 def _shelter(world: World, slot: int) -> None:
     """Make a unit in a Bunker fire from its edge, one farther; no other passenger fires."""
-    carrier = int(world.carrier[slot])
+    c = columns.columns_of(world)
+    carrier = int(c.carrier[slot])
     if world.unit_type(carrier).name == BUNKER:
-        world.radius[slot] = world.radius[carrier]
-        world.range_add[slot] += MECHANICS.bunker_range
+        c.radius[slot] = c.radius[carrier]
+        c.range_add[slot] += MECHANICS.bunker_range
         for scan in (world.ground_scan, world.air_scan):
             scan[slot] += MECHANICS.bunker_range * (scan[slot] >= 0.0)
     else:
-        world.can_attack[slot] = world.acquires[slot] = False
+        c.can_attack[slot] = c.acquires[slot] = False
 
 
 def _turning(world: World, slot: int, unit: UnitType) -> None:
+    c = columns.columns_of(world)
     walking_deg = min(unit.turn_deg_n / LOOPS_PER_NORMAL_SECOND, INSTANT_TURN_DEG)
     still_deg = min((unit.turn_still_deg_n or unit.turn_deg_n) / LOOPS_PER_NORMAL_SECOND, INSTANT_TURN_DEG)
     walking, still = math.radians(walking_deg), math.radians(still_deg)
-    world.turn_cos[slot], world.turn_sin[slot] = math.cos(walking), math.sin(walking)
-    world.turn_still_cos[slot], world.turn_still_sin[slot] = math.cos(still), math.sin(still)
+    c.turn_cos[slot] = math.cos(walking)
+    c.turn_sin[slot] = math.sin(walking)
+    c.turn_still_cos[slot] = math.cos(still)
+    c.turn_still_sin[slot] = math.sin(still)
 
 
 def _braking(unit: UnitType) -> float:
@@ -137,20 +149,19 @@ def kinds_on(world: World, slot: int) -> list[Buff]:
 
 def _plain(world: World, slot: int) -> None:
     """Write the traits of a unit without any buff."""
-    world.attack_rate[slot] = world.taken_factor[slot] = world.dealt_factor[slot] = world.air_taken_factor[slot] = 1.0
-    for column in (
-        world.range_add, world.armor_add, world.shield_armor_add, world.ranged_add, world.melee_add,
-    ):  # fmt: skip
-        column[slot] = 0.0
-    world.work_rate[slot] = 1.0
-    if "god" in world.players[int(world.owner[slot])].cheats:
-        world.taken_factor[slot] = 0.0
-    world.can_act[slot] = world.can_attack[slot] = world.can_cast[slot] = True
-    world.bonus_bits[slot], world.bonus_add[slot] = 0, 0.0
-    if world.hallucination[slot]:
-        at = (int(world.owner[slot]), int(world.type[slot]))
-        world.dealt_factor[slot] = 0.0
-        world.armor_add[slot], world.shield_armor_add[slot] = -world.stats.armor[at], -world.stats.shield_armor[at]
+    c = columns.columns_of(world)
+    c.attack_rate[slot] = c.taken_factor[slot] = c.dealt_factor[slot] = c.air_taken_factor[slot] = 1.0
+    c.range_add[slot] = c.armor_add[slot] = c.shield_armor_add[slot] = c.ranged_add[slot] = c.melee_add[slot] = 0.0
+    c.work_rate[slot] = 1.0
+    if "god" in world.players[int(c.owner[slot])].cheats:
+        c.taken_factor[slot] = 0.0
+    c.can_act[slot] = c.can_attack[slot] = c.can_cast[slot] = True
+    c.bonus_bits[slot] = 0
+    c.bonus_add[slot] = 0.0
+    if c.hallucination[slot]:
+        at = (int(c.owner[slot]), int(c.type[slot]))
+        c.dealt_factor[slot] = 0.0
+        c.armor_add[slot], c.shield_armor_add[slot] = -world.stats.armor[at], -world.stats.shield_armor[at]
 
 
 def _change(world: World, slot: int, buff: Buff) -> None:

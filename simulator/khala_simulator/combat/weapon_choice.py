@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
 
@@ -41,27 +42,46 @@ def usable_weapons(world: World, slot: int, kinds: Iterable[Buff] = ()) -> list[
 
 def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]) -> None:
     """Write the weapon traits of a slot; see ``columns``."""
+    c = columns.columns_of(world)
     weapons = usable_weapons(world, slot, kinds)
-    owner = int(world.owner[slot])
-    ground = next((w for w in weapons if w.reaches("ground")), None)
-    air = next((w for w in weapons if w.reaches("air")), None)
-    close = next((w for w in weapons if w.hidden and ground is not None and w.range < ground.range), None)
-    world.ground_weapon[slot] = NO_WEAPON if ground is None else ground.row
-    world.air_weapon[slot] = NO_WEAPON if air is None else air.row
-    world.close_weapon[slot] = NO_WEAPON if close is None else close.row
-    world.close_range[slot] = 0.0 if close is None else close.range
-    world.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
-    world.ground_scan[slot] = NO_SCAN if ground is None else world.stats.scan[owner, ground.row]
-    world.air_scan[slot] = NO_SCAN if air is None else world.stats.scan[owner, air.row]
-    world.acquires[slot] = bool(weapons) and not (unit.passive or unit.uncommandable) and owner != 0
+    owner = c.owner[slot]
+    stats = world.stats
+    scan = memory.floats(stats.scan)
+    first = owner * stats.weapons
+    ground = _first_that_reaches(weapons, "ground")
+    air = _first_that_reaches(weapons, "air")
+    close = None if ground is None else _closer_weapon(weapons, ground)
+    c.ground_weapon[slot] = NO_WEAPON if ground is None else ground.row
+    c.air_weapon[slot] = NO_WEAPON if air is None else air.row
+    c.close_weapon[slot] = NO_WEAPON if close is None else close.row
+    c.close_range[slot] = 0.0 if close is None else close.range
+    c.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
+    c.ground_scan[slot] = NO_SCAN if ground is None else scan[first + ground.row]
+    c.air_scan[slot] = NO_SCAN if air is None else scan[first + air.row]
+    c.acquires[slot] = bool(weapons) and not (unit.passive or unit.uncommandable) and owner != 0
     planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
-    world.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
-    world.defensive[slot] = unit.defensive or (unit.passive and not unit.always_threatens)
-    world.flees[slot] = unit.flees and not unit.passive
-    world.guns_walking[slot] = any(w.fires_moving and w.moves == "moving" for w in weapons)
-    world.spares_structures[slot] = bool(weapons) and all(
-        w.acquires == "unit" or w.excluding == "structure" for w in weapons
-    )
-    turret = next((w.turret_deg_n for w in weapons if w.turret_deg_n is not None), 0.0)
-    turn = math.radians(min(turret / LOOPS_PER_NORMAL_SECOND, WIDEST_TURN_DEG))
-    world.turret_cos[slot], world.turret_sin[slot] = math.cos(turn), math.sin(turn)
+    c.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
+    c.defensive[slot] = unit.defensive or (unit.passive and not unit.always_threatens)
+    c.flees[slot] = unit.flees and not unit.passive
+    c.guns_walking[slot] = bool([w for w in weapons if w.fires_moving and w.moves == "moving"])
+    aimed_at_all = [w for w in weapons if w.acquires != "unit" and w.excluding != "structure"]
+    c.spares_structures[slot] = bool(weapons) and not aimed_at_all
+    turrets = [w.turret_deg_n for w in weapons if w.turret_deg_n is not None]
+    turn = math.radians(min((turrets[0] if turrets else 0.0) / LOOPS_PER_NORMAL_SECOND, WIDEST_TURN_DEG))
+    c.turret_cos[slot] = math.cos(turn)
+    c.turret_sin[slot] = math.sin(turn)
+
+
+def _first_that_reaches(weapons: list[Weapon], plane: str) -> Weapon | None:
+    for weapon in weapons:
+        if weapon.reaches(plane):
+            return weapon
+    return None
+
+
+def _closer_weapon(weapons: list[Weapon], ground: Weapon) -> Weapon | None:
+    """Return the hidden weapon that takes over when the target stands close."""
+    for weapon in weapons:
+        if weapon.hidden and weapon.range < ground.range:
+            return weapon
+    return None

@@ -44,13 +44,16 @@ def met(world: World, slot: int, need: Need | None) -> bool:
 
 def missing_to_all(world: World, slot: int, ability: Ability) -> bool:
     """Return whether an ability's condition fails for a unit for a reason that all units of its owner share."""
-    return any(
-        need is not None and _of_the_player(need) and not met(world, slot, need)
-        for need in (ability.requires, ability.shown_if)
-    )
+    return any(not met(world, slot, need) for need in _shared_needs(world.catalog, ability.id))
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=4096)
+def _shared_needs(catalog: Catalog, ability: int) -> tuple[Need, ...]:
+    """Return the conditions of an ability that all units of a player share."""
+    found = catalog.ability(ability)
+    return tuple(need for need in (found.requires, found.shown_if) if need is not None and _of_the_player(need))
+
+
 def _of_the_player(need: Need) -> bool:
     """Return whether a condition has the same value for all units of a player: no part looks at the unit itself."""
     itself = need.kind == "behavior" or (need.kind == "unit" and need.state.endswith("_here"))

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from khala_simulator.movement import pathfinding
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.layers import Layer, layer_of
 from khala_simulator.tables.stats import LAYERS, bit_set
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.native.columns import Columns
+    from khala_simulator.native.memory import Cells, Points
     from khala_simulator.numeric.geometry import Floats
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.columns import Bools
@@ -47,15 +50,10 @@ def free_places(world: World, unit: UnitType, point: tuple[float, float], count:
 def _places_within(
     world: World, unit: UnitType, point: tuple[float, float], count: int, radius: float
 ) -> list[tuple[float, float]]:
-    at = candidates(world, unit, point, radius)
-    bits = bit_set(unit.collide, LAYERS)
-    places: list[tuple[float, float]] = []
-    own = (2.0 * unit.radius - ROUNDING) ** 2
-    while len(at) and len(places) < count:
-        x, y = at[0].tolist()
-        places.append((x, y))
-        at = at[1:] if bits == 0 else at[(at[:, 0] - x) ** 2 + (at[:, 1] - y) ** 2 >= own]
-    return places
+    bodiless = bit_set(unit.collide, LAYERS) == 0
+    apart = 0.0 if bodiless else 2.0 * unit.radius - ROUNDING
+    at, found = _search(world, unit, point, radius, NOBODY, count, apart)
+    return [(x, y) for x, y in at[found].tolist()]
 
 
 def candidates(
@@ -65,15 +63,67 @@ def candidates(
 
     The body of the unit in the slot ``ignoring`` does not count.
     """
-    at = np.array(point) + _offsets(radius)
-    at = at[_on_surface(world, unit, at)]
+    at, found = _search(world, unit, point, radius, ignoring, -1, 0.0)
+    free: Floats = at[found]
+    return free
+
+
+def _search(
+    world: World, unit: UnitType, point: tuple[float, float], radius: float, ignoring: int, most: int, apart: float
+) -> tuple[Floats, list[int]]:
+    """Return (k, 2) places around a point, nearest first, and which of them are free for one more unit.
+
+    Args:
+        world: The world.
+        unit: Its type.
+        point: The point.
+        radius: How far from the point.
+        ignoring: Slot of a unit whose body does not count, or ``NOBODY``.
+        most: How many to find, -1 for all.
+        apart: How far from each other they have to be.
+    """
+    array = np.array(point) + _offsets(radius)
+    on_surface = _on_surface(world, unit, array)
     bits = bit_set(unit.collide, LAYERS)
     bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
     bodies = bodies[bodies != ignoring]
-    apart = world.radius[bodies] + unit.radius - ROUNDING
-    offset = at[:, None, :] - world.pos[bodies]
-    free: Floats = at[(offset[..., 0] ** 2 + offset[..., 1] ** 2 >= apart**2).all(axis=1)]
-    return free
+    at = memory.points(array)
+    inside = memory.bools(on_surface)
+    slots = memory.ints(bodies)
+    c = columns.columns_of(world)
+    reach = unit.radius - ROUNDING
+    n = len(bodies)
+    found: list[int] = []
+    for i in range(len(array)):
+        if len(found) == most:
+            break
+        if inside[i] and _is_clear(c, slots, n, at[i], reach) and _is_apart(at, found, i, apart):
+            found.append(i)
+    return array, found
+
+
+def _is_clear(c: Columns, slots: Cells, n: int, at: memory.Point, reach: float) -> bool:
+    """Return whether a body of some size touches none of n others at a point."""
+    for i in range(n):
+        slot = slots[i]
+        x = at.x - c.pos[slot].x
+        y = at.y - c.pos[slot].y
+        apart = c.radius[slot] + reach
+        if x * x + y * y < apart * apart:
+            return False
+    return True
+
+
+def _is_apart(at: Points, found: list[int], i: int, apart: float) -> bool:
+    """Return whether a place is far enough from all that were found."""
+    if apart <= 0.0:
+        return True
+    for other in found:
+        x = at[i].x - at[other].x
+        y = at[i].y - at[other].y
+        if x * x + y * y < apart * apart:
+            return False
+    return True
 
 
 def snap(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:

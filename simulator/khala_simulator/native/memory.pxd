@@ -1,6 +1,6 @@
 """Numbers in arrays, and points, for compiled rules; `memory.py` has the same for interpreted ones, and says what."""
 cimport numpy as cnp
-from libc.math cimport sqrt
+from libc.math cimport hypot, sqrt
 from libc.stdint cimport int16_t, int32_t, int64_t, uint8_t, uint16_t
 from libc.string cimport memcpy, memset
 
@@ -37,6 +37,9 @@ cdef inline int16_t* int16s(object array):
 cdef inline int32_t* int32s(object array):
     return <int32_t*>cnp.PyArray_DATA(<cnp.ndarray>array)
 
+cdef inline float* float32s(object array):
+    return <float*>cnp.PyArray_DATA(<cnp.ndarray>array)
+
 cdef inline Point* points(object array):
     return <Point*>cnp.PyArray_DATA(<cnp.ndarray>array)
 
@@ -49,6 +52,12 @@ cdef cnp.ndarray new_points(Py_ssize_t n)
 
 cdef inline double length(double x, double y) noexcept nogil:
     return sqrt(x * x + y * y)
+
+cdef inline double distance(double x, double y) noexcept nogil:
+    return hypot(x, y)
+
+cdef inline double single(double number) noexcept nogil:
+    return <float>number
 
 cdef double pairwise_sum(double* numbers, Py_ssize_t n) noexcept nogil
 

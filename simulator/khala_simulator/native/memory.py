@@ -83,6 +83,11 @@ def int32s(array: NDArray[np.int32]) -> Cells:
     return array.reshape(-1).data
 
 
+def float32s(array: NDArray[np.float32]) -> Cells:
+    """Return the numbers of an array whose memory is contiguous, row by row; what is written is rounded to 32 bits."""
+    return array.reshape(-1).data
+
+
 def points(array: NDArray[np.float64]) -> Points:
     """Return the points of an array (n, 2) whose memory is contiguous."""
     return Points(array)
@@ -121,6 +126,16 @@ def new_points(n: int) -> NDArray[np.float64]:
 def length(x: float, y: float) -> float:
     """Return the length of a vector, rounded as everywhere."""
     return math.sqrt(x * x + y * y)
+
+
+def distance(x: float, y: float) -> float:
+    """Return the length of a vector as numpy's and C's `hypot` round it."""
+    return float(np.hypot(x, y))
+
+
+def single(number: float) -> float:
+    """Return a number rounded to 32 bits."""
+    return float(np.float32(number))
 
 
 def pairwise_sum(numbers: Cells, n: int) -> float:

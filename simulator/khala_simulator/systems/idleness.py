@@ -30,12 +30,14 @@ def count(world: World) -> None:
     if world.loop % LOOPS_PER_NORMAL_SECOND:
         return
     works, trains = _rows(world.catalog)
-    live = world.live
-    rows = world.type[live]
-    idle = works[rows] | trains[rows]
-    if not idle.any():
+    if world.hands_at != world.population:
+        rows = world.type[world.live]
+        world.hands = world.live[works[rows] | trains[rows]]
+        world.hands_at = world.population
+    hands = world.hands
+    if not hands.size:
         return
-    slots = live[idle & (world.order_kind[live] == IDLE) & (world.build_progress[live] >= 1.0)]
+    slots = hands[(world.order_kind[hands] == IDLE) & (world.build_progress[hands] >= 1.0)]
     for slot in slots.tolist():
         score = world.players[int(world.owner[slot])].score
         if works[world.type[slot]]:

@@ -88,6 +88,7 @@ class Stats:
     def __init__(self, catalog: Catalog, players: int) -> None:
         self.catalog = catalog
         self.weapons = len(catalog.weapons)
+        self.types = len(catalog.units)
         shape_u = (players, len(catalog.units))
         shape_w = (players, self.weapons)
         self.life_max: Floats = np.zeros(shape_u)

@@ -34,6 +34,8 @@ class WorldCaches:
         self.hiding = False  # whether any unit is cloaked or burrowed
         self.passive_units: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
         self.passive_units_at = -1  # the population for which this was written
+        self.hands: Ints = np.zeros(0, dtype=np.int64)  # slots of workers and of structures that train
+        self.hands_at = -1  # the population for which this was written
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
         self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
         self.eyes: object | None = None  # with what the players saw last, for ``vision``

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_simulator.world.columns import NOBODY
 
@@ -13,8 +12,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Cast:
+class Cast(NamedTuple):
     """A unit (slot) uses an ability on a unit (slot), at a point (world), or on nothing.
 
     ``begun`` is the loop in which it takes effect; a channel goes on from there. ``was`` is the row of the caster's

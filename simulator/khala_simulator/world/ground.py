@@ -32,6 +32,8 @@ class BuiltGround:
 
     def block(self, slot: int, cells: Ints) -> None:
         """Put a structure's cells ``(x, y)`` (k, 2) on the ground; cells off the map are left out."""
+        if not len(cells):
+            return
         height, width = self.terrain.walk.shape
         inside = (cells >= 0).all(axis=1) & (cells[:, 0] < width) & (cells[:, 1] < height)
         if inside.any():

@@ -6,9 +6,8 @@ creates them from a player's commands, ``systems.orders`` carries them out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 
 class OrderKind(IntEnum):
@@ -41,8 +40,7 @@ SCAN_MOVE: Final = 19
 ATTACK: Final = 23
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class Order(NamedTuple):
     """One order: its kind, the specific ability id the API reports, and its target.
 
     ``target`` is a unit tag or 0, ``point`` world coordinates or None. ``origin`` is the other end of a patrol,

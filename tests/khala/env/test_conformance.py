@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 
 import gymnasium
-import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
@@ -48,21 +47,3 @@ def test_numeric_env_passes_the_seed_test() -> None:
 def test_central_env_passes_gymnasiums_check(name: str) -> None:
     made = gymnasium.make(f"khala.env.numeric:khala-smac/{name}-v0", render_mode="rgb_array")
     check_env(made.unwrapped)
-
-
-@pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_several_envs_are_seeded_one_by_one_and_begin_again_by_themselves(*, processes: bool) -> None:
-    envs = numeric.vector_env("3m", 2, processes=processes, max_cycles=3)
-    alone = numeric.CentralEnv("3m", max_cycles=3)
-    seen, _ = envs.reset(seed=4)
-    expected, _ = alone.reset(seed=5)
-    stop = np.ones((2, 3), dtype=np.int64)
-    for step in range(1, 4):
-        np.testing.assert_array_equal(seen["state"][1], expected["state"])
-        seen, _, _, truncated, _ = envs.step(stop)
-        expected, *_ = alone.step(stop[1])
-        assert truncated.tolist() == [step == 3] * 2
-    seen, reward, *_ = envs.step(stop)  # the step after the end begins an episode
-    assert reward.tolist() == [0.0, 0.0]
-    np.testing.assert_array_equal(seen["state"][1], alone.reset()[0]["state"])
-    envs.close()

@@ -409,8 +409,8 @@ def test_a_narrow_table_of_matches_keeps_the_names_of_tasks_whole() -> None:
     task = "simple64_sceb_terran"
     run = f"{task}-20260101-120000-ab12"
     card = MatchCard(run=run, number="1", owner="someone", task=task, state="running", episodes=20, step=900)
-    console = Console(width=80, file=io.StringIO())
-    console.print(table_of([card]))
-    lines = console.file.getvalue().splitlines()
+    printed = io.StringIO()
+    Console(width=80, file=printed).print(table_of([card]))
+    lines = printed.getvalue().splitlines()
     assert any(task in line.split() for line in lines[1:])
     assert max(map(len, lines)) <= 80

@@ -1,0 +1,16 @@
+cimport cython
+from libc.stdint cimport int64_t
+
+from khala_simulator.abilities cimport commands
+from khala_simulator.native cimport columns
+from khala_simulator.native.columns cimport Columns
+
+cdef int64_t NOBODY
+
+
+cpdef bint is_modelled(object ability) except -1
+cpdef as_is(object world, int64_t slot, object ability)
+cdef _unready(object world, int64_t slot, object ability)
+@cython.locals(c=Columns)
+cdef _ordinary_refusal(object world, int64_t slot, object ability)
+cdef _unaffordable(object world, int64_t slot, object ability)
