@@ -515,7 +515,7 @@ def _watch(_: Path) -> None:
 def _replay(directory: Path) -> None:
     _write_recording(directory / "a.mcap", {}, words=EVIL)
     options: dict[str, Any] = {"agent": None, "steps": None, "text": True, "images": None, "new": None, "pace": False}
-    replay(directory / "a.mcap", **options, as_json=False)
+    replay([directory / "a.mcap"], **options, as_json=False)
 
 
 def _compare(directory: Path) -> None:

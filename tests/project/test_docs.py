@@ -222,6 +222,8 @@ def test_a_command_can_be_given(subtests: pytest.Subtests, monkeypatch: pytest.M
                     assert re.search(rf"^{words[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), (
                         f"make {words[0]}"
                     )
+                elif program == "python" and words[0] == "-m":
+                    assert importlib.util.find_spec(words[1]), f"python -m {words[1]}"
                 elif program == "python":
                     assert (ROOT / words[0]).is_file(), f"python {words[0]}"
                 else:
