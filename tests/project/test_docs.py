@@ -7,6 +7,7 @@ scenario` is played.
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
 import itertools
 import json
