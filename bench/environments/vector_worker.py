@@ -135,7 +135,7 @@ def memory_mb(processes: list[int]) -> float:
     return total / 1024
 
 
-def main() -> None:
+def work() -> None:
     """Answer each line of input, the seconds of a round, with what was played in it."""
     kind, map_name, envs = sys.argv[1:4]
     said, sys.stdout = sys.stdout, sys.stderr
@@ -157,4 +157,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    work()
