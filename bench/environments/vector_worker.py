@@ -74,10 +74,10 @@ class Smax(Single):
     STEPS = 32
 
     def __init__(self, map_name: str, envs: int) -> None:
-        import jax  # noqa: PLC0415  # see above
-        import jax.numpy as jnp  # noqa: PLC0415
-        from jaxmarl import make  # noqa: PLC0415
-        from jaxmarl.environments.smax import map_name_to_scenario  # noqa: PLC0415
+        import jax  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        import jax.numpy as jnp  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        from jaxmarl import make  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        from jaxmarl.environments.smax import map_name_to_scenario  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
 
         env = make("HeuristicEnemySMAX", scenario=map_name_to_scenario(map_name))
 
@@ -135,7 +135,7 @@ def memory_mb(processes: list[int]) -> float:
     return total / 1024
 
 
-def main() -> None:
+def work() -> None:
     """Answer each line of input, the seconds of a round, with what was played in it."""
     kind, map_name, envs = sys.argv[1:4]
     said, sys.stdout = sys.stdout, sys.stderr
@@ -157,4 +157,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    work()

@@ -113,7 +113,7 @@ def _row(numbers: Floats, number: int) -> Floats:
     return row
 
 
-class Watcher(Protocol):
+class BattleWatcher(Protocol):
     """What keeps in step with a battle; see `Battle.see`."""
 
     def look(self, world: World, types: Types) -> None:
@@ -215,7 +215,7 @@ class Battle:
         rows = world.type[tags >> INDEX_SHIFT & _SLOT]
         return there, Units(tags, self._game.types.id[rows], numbers)
 
-    def see(self, watcher: Watcher) -> None:
+    def see(self, watcher: BattleWatcher) -> None:
         """Have a watcher take in what has become of its units."""
         watcher.look(self._world, self._game.types)
 

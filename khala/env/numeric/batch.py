@@ -53,9 +53,10 @@ def shapes(spec: BatchSpec) -> dict[str, tuple[tuple[int, ...], type[np.generic]
     """
     game = smac_map(spec.map_name)
     options = options_of(spec.options)
-    agents, actions = game.agents, sizes.actions(game)
+    agents = game.agents
+    actions = sizes.actions(game)
     seen = sizes.seen(game, options)
-    state = sizes.described(game, options)
+    state = sizes.whole_state(game, options)
     rows: dict[str, tuple[tuple[int, ...], type[np.generic]]] = {
         "action": ((agents,), np.int64),
         "observation": ((agents, seen), np.float32),
@@ -91,12 +92,12 @@ def arrays_for(spec: BatchSpec, count: int, given: Mapping[str, Any] | None = No
         if name not in rows:
             raise ConfigError(f"there is no buffer {name!r}: give some of {', '.join(rows)}")
     return {
-        name: _checked(name, given[name], (count, *shape), dtype) if name in given else np.zeros((count, *shape), dtype)
+        name: _check(name, given[name], (count, *shape), dtype) if name in given else np.zeros((count, *shape), dtype)
         for name, (shape, dtype) in rows.items()
     }
 
 
-def _checked(name: str, buffer: Any, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:
+def _check(name: str, buffer: Any, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:
     array = np.asarray(buffer)
     if array.shape != shape or array.dtype != dtype:
         wanted = f"{list(shape)} {np.dtype(dtype).name}"

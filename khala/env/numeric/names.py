@@ -167,7 +167,8 @@ class SmacNames:
     @property
     def last_action(self) -> Floats:
         """[agents, actions] one-hot; zeros before the first action."""
-        return (self._last()[:, None] == np.arange(self.n_actions)).astype(np.float64)
+        codes: Floats = (self._last()[:, None] == np.arange(self.n_actions)).astype(np.float64)
+        return codes
 
     @property
     def agents(self) -> dict[int, SmacUnit]:
@@ -206,7 +207,8 @@ class SmacNames:
         return int(self._units().most_charge[self._find(unit)])
 
     def _find(self, unit: SmacUnit) -> int:
-        return self._units().tag.tolist().index(unit.tag)
+        tags: list[int] = self._units().tag.tolist()
+        return tags.index(unit.tag)
 
     def only_medivac_left(self, ally: bool) -> bool:  # as SMAC has it
         """Return whether nobody of a side can fight on; of the enemy, one Medivac must be left."""

@@ -46,7 +46,7 @@ def seen(spec: SmacMap, options: Options) -> int:
     return observation(spec, options) + options.obs_timestep_number
 
 
-def described(spec: SmacMap, options: Options) -> int:
+def whole_state(spec: SmacMap, options: Options) -> int:
     """Return the length of a state as it is."""
     return seen(spec, options) * spec.agents if options.obs_instead_of_state else state(spec, options)
 

@@ -282,7 +282,7 @@ class StarCraft2Env(SmacNames):
 
     def get_state(self) -> Floats32:
         """Return the state, for training alone."""
-        state = np.empty(sizes.described(self._spec, self.options), dtype=np.float32)
+        state = np.empty(sizes.whole_state(self._spec, self.options), dtype=np.float32)
         self._scene.describe(state, self._progress)
         return state
 

@@ -41,7 +41,6 @@ class LocalShare:
 
     def __init__(self, spec: BatchSpec, arrays: Arrays) -> None:
         self.batch = Batch(spec, arrays)
-        self.channel = None
         self._seeds: Sequence[int | None] | None = None
 
     def begin(self, seeds: Sequence[int | None]) -> None:
@@ -151,11 +150,9 @@ class Shares:
 
     def first_done(self, waiting: Sequence[int]) -> int:
         """Return which of some shares has done first what was asked; it still has to be waited for."""
-        channels = [self.parts[part][1].channel for part in waiting]
-        if None in channels:
-            return waiting[0]
-        ready = connection.wait(channels)
-        return waiting[channels.index(ready[0])]  # type: ignore[arg-type]  # of those that were given
+        shares = {part: self.parts[part][1] for part in waiting}
+        channels = {share.channel: part for part, share in shares.items() if isinstance(share, RemoteShare)}
+        return channels[connection.wait(channels)[0]] if channels else waiting[0]  # type: ignore[index]  # one of them
 
     def close(self) -> None:
         """End all."""

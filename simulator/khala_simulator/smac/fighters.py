@@ -60,7 +60,7 @@ class Fighters:
         """Take units as they are at the begin of an episode, all alive; the arrays become its own."""
         self.agents = agents
         self.count = len(tag)
-        self.bits = types.shape[1]
+        self.bits: int = types.shape[1]
         self.tag, self.type_id = np.ascontiguousarray(tag), np.ascontiguousarray(type_id)
         self.numbers, self.types = np.ascontiguousarray(numbers), np.ascontiguousarray(types)
         self.most_shields, self.most_charge = most_shields, most_charge

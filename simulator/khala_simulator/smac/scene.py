@@ -81,8 +81,8 @@ class BattleScene:
         self.agents = fighters.agents
         self.actions = layout.actions
         self.move_amount = layout.move_amount
-        self.margin = board.margin
-        self.rows = board.open.shape[1]
+        self.margin: int = board.margin
+        self.rows: int = board.open.shape[1]
         self.own_shields = layout.own_shields
         self.enemy_shields = layout.enemy_shields
         self.all_health = layout.obs_all_health
