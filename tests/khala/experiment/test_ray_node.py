@@ -34,7 +34,7 @@ def test_a_machine_whose_node_dies_joins_again_and_ends_with_the_head(monkeypatc
     pytest.importorskip("ray")
     head = socket.create_server(("127.0.0.1", 0))
     port = head.getsockname()[1]
-    started: list[tuple[str, str, int]] = []
+    started: list[tuple[object, ...]] = []
 
     def start(*words: str, own: str, matches: int) -> subprocess.Popen[bytes]:
         started.append((*words, own, matches))
