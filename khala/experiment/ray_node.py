@@ -33,13 +33,6 @@ _PATIENT = {
     "RAY_agent_register_timeout_ms": "300000",
     "RAY_raylet_start_wait_time_s": "300",
 }
-_PORTS = (
-    "--dashboard-agent-grpc-port",
-    "--dashboard-agent-listen-port",
-    "--runtime-env-agent-port",
-    "--metrics-export-port",
-)
-"""Ports that a node is told: where it has to find them out, it dies if its agent has not said them within 30 s."""
 
 
 @contextlib.asynccontextmanager
@@ -111,7 +104,6 @@ def _start(*words: str, own: str, matches: int) -> subprocess.Popen[bytes]:
         sys.executable, "-m", "ray.scripts.scripts", "start", *words, "--block", f"--node-ip-address={own}",
         f"--num-cpus={matches}", f"--memory={max(matches, 1) * MATCH_MB * 2**20}",
         f"--object-store-memory={OBJECTS_BYTES}", "--disable-usage-stats",
-        *(f"{option}={_free_port(own)}" for option in _PORTS),
     ]  # fmt: skip
     return subprocess.Popen(command, env=_PATIENT | os.environ, stdout=subprocess.DEVNULL)  # noqa: S603  # our own words
 
@@ -138,11 +130,6 @@ def _own_address(host: str, port: int) -> str:
     """Return this machine's address as the host sees it."""
     with socket.create_connection((host, port)) as connection:
         return str(connection.getsockname()[0])
-
-
-def _free_port(host: str) -> int:
-    with socket.create_server((host, 0)) as server:
-        return int(server.getsockname()[1])
 
 
 def _interrupt(*_: object) -> None:
