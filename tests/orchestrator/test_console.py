@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from khala_orchestrator.console import Progress, card, clock, print_table, rule, stderr_console, stdout_console, table
-from khala_protocol.messages import AgentReport, Casualties, Clock, Holdings, Rejection, Report, Result, Usage
+from khala_protocol.messages import AgentReport, Casualties, Clock, EndState, Rejection, Report, Result, Usage
 from khala_protocol.visible import visible
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def test_a_result(printed: Printed) -> None:
 
 
 def test_the_result_of_a_game_with_bases_says_what_the_side_has_at_the_end(printed: Printed) -> None:
-    held = Holdings(workers=22, bases=2, army=15, supply_used=54, supply_cap=62)
+    held = EndState(workers=22, bases=2, army=15, supply_used=54, supply_cap=62)
     lines = printed(table(make_result(holdings=held)), width=80)
     held_line = next(line for line in lines if "held" in line)
     assert held_line.strip("│ ") == "held      22 worker(s), 2 base(s), army of 15, supply 54 of 62"

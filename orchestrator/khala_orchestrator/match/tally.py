@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, Holdings, Report, Result, Usage, count_refusals
+from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, EndState, Report, Result, Usage, count_refusals
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -142,12 +142,12 @@ class Tally:
             latency_p95_s=_quantile(self._latencies_s, 0.95),
         )
 
-    def _holdings(self) -> Holdings | None:
+    def _holdings(self) -> EndState | None:
         """Return what the side has at the end; None if it began without a base."""
         if not land_of(self._first).own_halls:
             return None
         player = self._last.player
-        return Holdings(
+        return EndState(
             workers=player.food_workers,
             bases=len(land_of(self._last).own_halls),
             army=player.army_count,

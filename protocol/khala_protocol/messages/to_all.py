@@ -198,7 +198,7 @@ class Casualties(Frozen):
     value: float = 0.0
 
 
-class Holdings(Frozen):
+class EndState(Frozen):
     """What a side has at the end of a game with bases."""
 
     workers: int
@@ -237,7 +237,7 @@ class Result(Wire):
     kd: float | None
     """Value killed / value lost; None if nothing was lost."""
     score: float = 0.0
-    holdings: Holdings | None = None
+    holdings: EndState | None = None
     """None if the side began without a base, and in recordings of versions that did not say."""
     usage: dict[str, Usage] = {}
     """By agent."""
