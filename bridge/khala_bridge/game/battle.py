@@ -25,7 +25,7 @@ class Battle:
         """Remember the units of an episode that begins."""
         self._units = frozenset(first.units)
 
-    def ended(self, now: Snapshot) -> Snapshot:
+    def judge(self, now: Snapshot) -> Snapshot:
         """Return the snapshot with the outcome of the battle; the same one while both sides fight on.
 
         If both died at once, the map has brought them back by now: units of another battle, which are taken out.

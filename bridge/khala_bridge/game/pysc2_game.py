@@ -189,7 +189,7 @@ class PySC2Game:
             )
             self._creep[index] = made[-1].creep
         if self._battle:
-            made[0] = self._battle.ended(made[0])
+            made[0] = self._battle.judge(made[0])
         self._ended = made[0].ended
         if made[0].outcome == "win" and self._env.forfeit:
             made[0] = dataclasses.replace(made[0], forfeit=self._env.forfeit)

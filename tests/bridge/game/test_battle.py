@@ -40,10 +40,10 @@ BATTLE = Battle(snapshot({1: MARINE, 2: MEDIVAC}, {11: MARINE, 12: MEDIVAC}))
 def test_a_side_loses_when_none_of_its_units_can_fight(
     own: dict[int, int], enemy: dict[int, int], outcome: str | None
 ) -> None:
-    now = BATTLE.ended(snapshot(own, enemy))
+    now = BATTLE.judge(snapshot(own, enemy))
     assert (now.outcome, now.ended) == (outcome, outcome is not None)
 
 
 def test_units_that_come_back_belong_to_another_battle() -> None:
-    now = BATTLE.ended(snapshot({21: MARINE}, {31: MARINE}))
+    now = BATTLE.judge(snapshot({21: MARINE}, {31: MARINE}))
     assert (now.outcome, now.own, now.units, now.known) == ("draw", (), {}, {})
