@@ -30,6 +30,7 @@ TAKEN = {
         "model_name",
         "base_url",
         "policy",
+        "agents",
         "fallback",
         "rethink",
         "answer",
