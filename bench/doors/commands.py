@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 WITHOUT_ROWS: Final[dict[str, str]] = {
     "khala actions": "prints the catalogue that is installed",
+    "khala experiment join": "takes an address and a number; matches come over Ray's own connection",
+    "khala arena run": "reads files as `khala experiment run` does, and prints as `khala arena show` does",
+    "khala arena export": "reads results as `khala arena show` does, and writes pages as `khala view` does",
     "khala tasks": "lists the tasks that are installed",
     "khala experiment list": "lists the experiments that are installed",
     "khala knowledge show": "prints the tables that are installed",

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, Final, Self
 from unittest import mock
 
 from bench.doors.rows import Row, Skipped
+from bench.paths import ROOT
+from khala.arena import commands as arena
 from khala.dataset.card import Recipe
 from khala.dataset.choose import RowChoice, Split
 from khala.dataset.export import export
@@ -525,6 +527,14 @@ def _compare(directory: Path) -> None:
     )
 
 
+def _arena(directory: Path) -> None:
+    """Show the results of an arena whose player has such a name."""
+    shipped = (ROOT / "results" / "first.json").read_text(encoding="utf-8")
+    name = json.dumps(EVIL)[1:-1]
+    (directory / "results.json").write_text(shipped.replace("focus-fire", f"focus{name}"), encoding="utf-8")
+    arena.show([directory / "results.json"], as_json=False)
+
+
 def _missing_file(directory: Path) -> None:
     Recording.open(directory / EVIL)
 
@@ -585,6 +595,7 @@ PRINTING: Final[dict[str, Callable[[Path], object]]] = {
     "experiment show": partial(_status, shows=True),
     "experiment status": partial(_status, shows=False),
     "experiment compare": _compare,
+    "arena show": _arena,
     "matches": _list,
     "stop": _end,
     "watch": _watch,

@@ -60,6 +60,7 @@ DOORS: Final[dict[str, tuple[str, ...]]] = {
         "khala agent",
         "khala experiment show",
         "khala experiment status",
+        "khala arena show",
         "khala experiment compare",
         "khala matches",
         "khala stop",

@@ -216,6 +216,7 @@ def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[St
     game._env, game._ended, game._asks = env, False, False
     game._maps = (EpisodeInfo(), EpisodeInfo())
     game._creep = [NO_GRID, NO_GRID]
+    game._battle = None
     return env, game.act([plan(steps) for steps in plans])
 
 

@@ -50,6 +50,7 @@ class CellSummary:
     won: Interval
     """Share of games won."""
     draws: int
+    """Games without a winner, those cut at their limit of steps among them."""
     decided: float | None
     """Share of decisions that the agents made themselves."""
     kd: Interval
@@ -147,7 +148,7 @@ def summary(cell: Cell) -> CellSummary:
         where=cell.where,
         games=games,
         won=statistics.wilson(wins, games),
-        draws=sum(row["outcome"] == "draw" for row in rows),
+        draws=sum(row["outcome"] in ("draw", "cut") for row in rows),
         decided=_decided_share(rows),
         kd=statistics.ratio_of_sums(*values),
         kd_variation=statistics.variation_of_ratio(*values),
