@@ -125,6 +125,7 @@ def system_text(briefing: Briefing, form: AnswerForm = "text") -> str:
     """Return the part of a prompt that says everything except what the agent sees."""
     most = briefing.standing_orders
     in_text = form in ("text", "grammar")
+    can_stand = most and in_text and briefing.teams
     sections = (
         ("Who you are", _identity(briefing)),
         ("Your task", briefing.task),
@@ -135,7 +136,7 @@ def system_text(briefing: Briefing, form: AnswerForm = "text") -> str:
         ("Arguments", _arguments(briefing.actions, briefing.frames)),
         ("Communication", _communication(briefing.correspondents, briefing.channels, in_text=in_text)),
         ("Memory", _memory(briefing.memory, in_text=in_text)),
-        ("Standing orders", manual.standing_orders(briefing.actions, most) if most and in_text else ""),
+        ("Standing orders", manual.standing_orders(briefing.actions, most) if can_stand else ""),
         ("How to answer", _HOW_TO_ANSWER[form](briefing)),
     )
     return "\n\n".join(f"# {title}\n{text}" for title, text in sections if text)

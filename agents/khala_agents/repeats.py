@@ -73,7 +73,7 @@ class PromptRepeats:
                 yield from (f"{INDENT}{heading}", *(f"{INDENT * 2}{line}" for line in new))
             elif new:
                 name = heading.partition(":")[0]
-                yield f"{INDENT}{name}: {'; '.join(new)}"
+                yield f"{INDENT}{name} now: {'; '.join(new)}"
 
 
 def say_again(system: str, observation: str) -> str:

@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from khala_protocol.messages import ActionSpec
 
@@ -54,10 +54,21 @@ def _way(action: ActionSpec) -> str:
 
 def standing_orders(actions: Iterable[ActionSpec], most: int) -> str:
     """Return how to give a standing order, with actions of the agent's own as examples."""
-    plain = [action.name for action in actions if not action.args]
-    trained = next((name.removeprefix("Train_") for name in plain if name.startswith("Train_")), "")
+    actions = list(actions)
+    trained = next((a.name.removeprefix("Train_") for a in actions if a.name.startswith("Train_") and not a.args), "")
     made = MADE.format(kind=trained) if trained else ""
-    return STANDING.format(call=f"{plain[0]}()" if plain else "Action(arguments)", most=most, made=made)
+    return STANDING.format(call=_worth_repeating(actions), most=most, made=made)
+
+
+def _worth_repeating(actions: Sequence[ActionSpec]) -> str:
+    """Return a call that makes sense again and again, of an agent's own actions: no skill, which would use units up."""
+    for action in actions:
+        if not action.args and action.name.startswith(("Train_", "Warp_", "All_Units_")):
+            return f"{action.name}()"
+    for action in actions:
+        if action.args in (("minimap",), ("screen",)) and action.name.startswith(("Attack_", "Move_")):
+            return f"{action.name}({'[32, 32]' if action.args[0] == 'minimap' else '[12, 12]'})"
+    return "Action(arguments)"
 
 
 def manual(actions: tuple[ActionSpec, ...]) -> str:

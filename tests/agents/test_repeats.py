@@ -57,7 +57,7 @@ def told(briefing: Callable[..., Briefing]) -> Briefing:
 
 def test_what_the_system_message_says_is_left_out_and_what_is_new_stays(told: Briefing) -> None:
     assert PromptRepeats(told).without(OBSERVATION) == (
-        "Unit knowledge\n    Stalker: beaten by Zergling; Blink: Jumps.\n    Zergling: Fast.\n        health 35\n\n"
+        "Unit knowledge\n    Stalker now: beaten by Zergling; Blink: Jumps.\n    Zergling: Fast.\n        health 35\n\n"
         "Game\n    Time: 0:01.0\n\n"
         "Task\n    Team Stalker-1: Go to [3, 4].\n\n"
         'Answer\n    Now answer in the parts "Analysis:" and "Actions:".\n'

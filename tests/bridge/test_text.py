@@ -73,7 +73,7 @@ def test_a_first_page_has_no_section_without_content(page: Any, unit: Make) -> N
     units = [unit(1, "Stalker", 16, 16), unit(2, "Zealot", 20, 16, alliance="enemy")]
     text = page("3s_vs_3z", "CombatGroupSmac", units)
     headings = [line for line in text.splitlines() if line and not line.startswith(" ")]
-    assert headings == ["Unit knowledge", "Valid actions", "Game", "Team Stalker-1", "Task", "Answer"]
+    assert headings == ["Unit knowledge", "Arguments", "Valid actions", "Game", "Team Stalker-1", "Task", "Answer"]
 
 
 def test_a_unit_line_can_be_read_by_a_program(page: Any, battle: list[raw_pb2.Unit]) -> None:

@@ -450,8 +450,9 @@ def _read_armies(situation: Situation, body: str) -> None:
     own = body.partition("The enemy's")[0]
     for x, y, units, doing in _ARMY_PART.findall(own):
         counts = {kind: int(number) for number, kind in _COUNT.findall(units)}
-        goal = next(iter(points(doing)), None)
-        situation.army.append(ArmyGroup(counts, (float(x), float(y)), doing == "idle", goal))
+        most = doing.partition("; ")[0]
+        goal = next(iter(points(most)), None)
+        situation.army.append(ArmyGroup(counts, (float(x), float(y)), most == "idle", goal))
 
 
 def _read_warping(situation: Situation, body: str) -> None:

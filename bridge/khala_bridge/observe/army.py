@@ -128,9 +128,9 @@ def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
 
 
 def _doing(scene: SideScene, units: Sequence[Unit]) -> str:
-    """Return what most of some own units do."""
-    said = Counter(_order(scene, unit) for unit in units if unit.is_own)
-    return said.most_common(1)[0][0] if said else ""
+    """Return what most of some own units do, and how many do something else: `idle; 3 of them Attack to [4, 7]`."""
+    said = Counter(_order(scene, unit) for unit in units if unit.is_own).most_common(2)
+    return "; ".join(order if not place else f"{count} of them {order}" for place, (order, count) in enumerate(said))
 
 
 def _order(scene: SideScene, unit: Unit) -> str:

@@ -96,10 +96,11 @@ def structures(scene: SideScene) -> Iterator[Landmark]:
 
 
 def _queue(orders: Sequence[OrderView]) -> str:
-    """Return the order at work of a structure, and the queued orders by name."""
-    first, *waiting = orders
-    begun = f"{first.name} {100 * first.progress:.0f}%" if first.progress else first.name
-    return " then ".join([begun, *(f"{count} {name}" for name, count in Counter(o.name for o in waiting).items())])
+    """Return the orders at work of a structure, two with a Reactor, and the queued orders by name."""
+    working = [order for place, order in enumerate(orders) if not place or order.progress]
+    waiting = Counter(order.name for place, order in enumerate(orders) if place and not order.progress)
+    begun = " and ".join(f"{o.name} {100 * o.progress:.0f}%" if o.progress else o.name for o in working)
+    return " then ".join([begun, *(f"{count} {name}" for name, count in waiting.items())])
 
 
 def _busy(body: Body) -> str:
@@ -110,7 +111,7 @@ def _busy(body: Body) -> str:
     if details := view.details:
         parts += ["no power"] if details.unpowered else []
         parts += [f"{details.harvesters[0]} of {details.harvesters[1]} workers"] if details.harvesters else []
-    parts += [f"{view.energy:.0f} energy"] if view.energy_max else []
+    parts += [f"{int(view.energy)} energy"] if view.energy_max else []
     return ", ".join(parts)
 
 

@@ -166,7 +166,7 @@ def test_others_of_the_own_side_are_told_by_type_place_and_what_is_left_of_them(
         "    Allied units by type:\n"
         "        9 Marine around [16, 11]\n"
         "        2 Probe at [8, 12], [9, 10]\n"
-        "        1 Zealot at [10, 12] | 83% left | effects GravitonBeam on 1\n"
+        "        1 Zealot at [10, 12] | 83% of health and shield | effects GravitonBeam on 1\n"
     ) in text
 
 
@@ -174,7 +174,7 @@ def test_of_many_own_units_the_weakest_are_told_one_by_one(unit: Any, snapshot: 
     units = [unit(number, "Stalker", 16, 16, health=80 - number) for number in range(1, MOST + 4)]
     text = Observer(task("3s_vs_3z")).observe(snapshot(units)).agents["CombatGroupSmac"].text
     assert [int(tag, 16) for tag in re.findall(r"Stalker \| tag (\w+)", text)] == list(range(4, MOST + 4))
-    assert "        3 Stalker at [12, 12], [12, 12], [12, 12] | 99% left\n" in text
+    assert "        3 Stalker at [12, 12], [12, 12], [12, 12] | 99% of health and shield\n" in text
 
 
 def test_the_nearest_enemies_are_told_one_by_one_and_under_the_next_team_their_places(
@@ -234,8 +234,8 @@ def test_a_screen_stands_around_the_middle_of_a_team_whatever_one_unit_does(
     assert "Stalker | tag 0x1 | screen [-9, 26] (off screen)" in text
 
 
-def test_agents_that_name_places_of_the_map_are_told_its_scale(pages: Any) -> None:
-    assert (
-        "as wide as 1 of the screen; distances, ranges and speeds are in cells of the screen\n" in pages({})["Builder"]
-    )
-    assert "Arguments" not in pages({})["CombatGroup1"]
+def test_agents_are_told_the_scale_of_the_map_and_its_end_if_they_name_places_of_it(pages: Any) -> None:
+    told = pages({})
+    for text in told.values():
+        assert "as wide as 1 of the screen; distances, ranges and speeds are in cells of the screen\n" in text
+    assert "    minimap: the playable map is x" not in told["CombatGroup1"]

@@ -167,7 +167,10 @@ def test_a_duel_needs_the_name_of_a_side(made: HandMade) -> None:
     assert (found.a.value, found.b.value, found.paired) == (1, 0, True)
 
 
-def test_the_command_prints_a_table_or_json_and_fails_when_runs_are_unlike(made: HandMade) -> None:
+def test_the_command_prints_a_table_or_json_and_fails_when_runs_are_unlike(
+    made: HandMade, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)  # a row is whole where nothing says how wide the terminal is
     made.fill({"skilled": EARLY}, 20)
     made.fill({"focus": LATE}, 20, card={"code": "d" * 64})
     command = ["experiment", "compare", "made:player=skilled", "made:player=focus"]

@@ -103,10 +103,10 @@ def _lacks_maker(barred: UnavailableAction) -> bool:
 def _together(names: Sequence[str]) -> str:
     """Return names with a common beginning together: `Train_(Zealot, Stalker, Adept), Build_Forge`."""
     words: list[str] = []
-    for verb, likes in groupby(names, lambda name: name.partition("_")[0]):
+    for verb, likes in groupby(names, lambda name: name.partition("_")[0]):  # All_Units_Attack is no verb
         alike = list(likes)
         ends = ", ".join(name.removeprefix(f"{verb}_") for name in alike)
-        words += [f"{verb}_({ends})"] if len(alike) > 2 else alike  # two are shorter by themselves
+        words += [f"{verb}_({ends})"] if len(alike) > 2 and verb not in ("All", "Select") else alike
     return ", ".join(words)
 
 
@@ -128,13 +128,11 @@ def _reasons(team: TeamView) -> dict[str, list[str]]:
 
 @section("arguments")
 def arguments(page: Page) -> Iterator[str]:
-    """Show the scale of the minimap and where the playable map ends, for agents with actions that take its points."""
-    specs = page.observation.agent.specs()
-    if not any("minimap" in action.args for action in specs):
-        return
+    """Show the scale of the minimap, and where the playable map ends for agents with actions that take its points."""
     yield "Arguments"
     yield f"{INDENT}{_scale(page)}"
-    if not page.view.places and (words := _playable(page)):
+    takes_points = any("minimap" in action.args for action in page.observation.agent.specs())
+    if takes_points and not page.view.places and (words := _playable(page)):
         yield f"{INDENT}minimap: {words}"
 
 

@@ -139,7 +139,7 @@ def _fight(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     reply = _fighting(kind, can if len(own) > 1 else can - {"Select_Unit_Move_Screen"}, foe)
     if reply is None:
         return None
-    said = _first_contact(task, agent, f"2 {plural(foe)} at [30, 22] of the minimap.")
+    said = _first_contact(task, agent, f"2 {plural(foe)} near [30, 22] of the minimap.")
     calls = reply.calls[: task.max_actions_of(agent)]
     return view, ("game", "teams"), reply._replace(team=_team_name(team), calls=calls, message=said)
 
@@ -154,7 +154,7 @@ def _fighting(kind: str, can: frozenset[str], foe: str) -> _Reply | None:
         calls = [f"<Attack_Unit({_FOE_TAGS[1]})>", *([back] if "Select_Unit_Move_Screen" in can else [])]
         saved = f" My {kind} {_OWN_TAGS[1]} has a quarter of its life left and steps back." if len(calls) > 1 else ""
         return _Reply(
-            f"Two {plural(foe)} are in reach; {_FOE_TAGS[1]} is nearly dead, so all attack it first.{saved}", calls
+            f"Two {plural(foe)} are near; {_FOE_TAGS[1]} has less life left, so all attack it first.{saved}", calls
         )
     if "Move_Screen" in can:
         analysis = f"Two {plural(foe)} come nearer, and a {kind} cannot fight them: away from here."
@@ -190,9 +190,10 @@ def _economy(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     if not calls:
         return None
     supply = f"One supply is left, so {names.supply} comes first. " if names.supply in can else ""
+    cost = 100 * (names.supply in can) + 50 * (train in can)
     analysis = (
-        f"{supply}The {names.hall} is idle: another {names.worker}. That costs 150 of 210 minerals; the rest is saved "
-        f"for a {names.production}."
+        f"{supply}The {names.hall} is idle: another {names.worker}. That costs {cost} of 210 minerals; the rest is "
+        f"saved for a {names.production}."
     )
     view = View(
         time_s=40,

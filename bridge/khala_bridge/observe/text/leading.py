@@ -100,7 +100,7 @@ def _enemies(found: Army) -> Iterator[str]:
 
 
 def _enemy_part(part: ArmyPart) -> str:
-    away = "" if part.away is None else f", {part.away:.0f} from your nearest base"
+    away = "" if part.away is None else f", the nearest {part.away:.0f} from your nearest base"
     when = "in sight" if not part.unseen_s else f"seen {ago(part.unseen_s)}"
     return f"{_where(part)}{away}: {count_words(part.units)}, {when}"
 

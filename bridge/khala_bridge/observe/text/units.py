@@ -170,7 +170,9 @@ def _group_line(name: str, group: Sequence[UnitView]) -> str:
         where = f"around {point((x, y))}"
     distances = [unit.distance for unit in group if unit.distance is not None]
     away = f" | the nearest {tenth(min(distances))} away" if distances else ""
-    left = f" | {percent(_share(group))} left" if _share(group) < 1 else ""
+    left = f" | {percent(_share(group))} of health and shield" if _share(group) < 1 else ""
+    unfinished = sum(unit.build_progress < 1 for unit in group)
+    left += f" | {unfinished} unfinished" if unfinished else ""
     buffs = Counter(buff for unit in group for buff in unit.buffs if not buff.startswith(_CARRYING))
     under = f" | effects {', '.join(f'{buff} on {count}' for buff, count in buffs.items())}" if buffs else ""
     return f"{INDENT2}{len(group)} {name} {where}{away}{left}{under}"
@@ -223,7 +225,7 @@ def _condition(unit: UnitView) -> str:
     if unit.shield_max:
         fields.append(f"shield {whole(unit.shield)}/{whole(unit.shield_max)}")
     if unit.energy_max:
-        fields.append(f"energy {whole(unit.energy)}/{whole(unit.energy_max)}")
+        fields.append(f"energy {int(unit.energy)}/{whole(unit.energy_max)}")
     if unit.build_progress < 1:
         fields.append(f"built {percent(unit.build_progress)}")
     if unit.weapon_cooldown_s:
@@ -256,11 +258,14 @@ def _skills(details: UnitDetails) -> str:
 
 
 def orders(queue: Sequence[OrderView]) -> str:
-    """Return the orders of a unit: `Train_Marine 83%, then 4 Train_Marine`."""
+    """Return the orders of a unit: `Train_Marine 83%, then 4 Train_Marine`; a Reactor has two at work."""
     if not queue:
         return ""
-    waiting = [(words, len(list(same))) for words, same in groupby(map(_order, queue[1:]))]
-    return ", then ".join([_order(queue[0]), *(f"{count} {words}" if count > 1 else words for words, count in waiting)])
+    working = [order for place, order in enumerate(queue) if not place or order.progress]
+    waiting = [order for place, order in enumerate(queue) if place and not order.progress]
+    later = [(words, len(list(same))) for words, same in groupby(map(_order, waiting))]
+    begun = " and ".join(map(_order, working))
+    return ", then ".join([begun, *(f"{count} {words}" if count > 1 else words for words, count in later)])
 
 
 def _order(order: OrderView) -> str:
@@ -270,11 +275,17 @@ def _order(order: OrderView) -> str:
 
 
 def _effect_lines(effects: Sequence[EffectView]) -> list[str]:
+    """Return a line for all effects of a kind."""
     lines = []
-    for effect in effects:
-        wide = f", radius {n(effect.radius)}" if effect.radius else ""
-        lines.append(f"{INDENT2}{effect.alliance} {effect.name} at {', '.join(map(point, effect.screen))}{wide}")
+    for (alliance, name, radius), alike in groupby(effects, lambda e: (e.alliance, e.name, e.radius)):
+        places = ", ".join(point(place) for effect in alike for place in effect.screen)
+        wide = f", radius {n(radius)}" if radius else ""
+        lines.append(f"{INDENT2}{alliance} {name} at {places}{wide}{_MEANING.get(name, '')}")
     return lines
+
+
+_MEANING = {"ForceField": ": of ground units, only massive ones pass"}
+"""What no other part of a page says of an effect."""
 
 
 def _resource_lines(resources: Sequence[UnitView]) -> list[str]:
