@@ -22,6 +22,12 @@ import numpy as np
 from khala.env.numeric.batch import Arrays, Batch, BatchSpec, shapes
 
 if TYPE_CHECKING:
+    import sys
+
+    if sys.platform == "win32":
+        from multiprocessing.connection import PipeConnection as Channel
+    else:
+        from multiprocessing.connection import Connection as Channel
     from collections.abc import Sequence
     from multiprocessing.process import BaseProcess
 
@@ -73,7 +79,7 @@ class RemoteShare:
     """
 
     process: BaseProcess
-    channel: connection.Connection
+    channel: Channel
 
     def begin(self, seeds: Sequence[int | None]) -> None:
         """Ask for new episodes."""
@@ -167,7 +173,7 @@ def _view(spec: BatchSpec, memory: Any, count: int) -> Arrays:
     }
 
 
-def _work(spec: BatchSpec, memory: Any, count: int, rows: slice, channel: connection.Connection) -> None:
+def _work(spec: BatchSpec, memory: Any, count: int, rows: slice, channel: Channel) -> None:
     """Play some rows as the pipe says, until it closes."""
     try:
         batch = Batch(spec, {name: array[rows] for name, array in _view(spec, memory, count).items()})
