@@ -235,6 +235,9 @@ def card(run: Run) -> Panel:
         sides.setdefault(agent.side, []).append(f"{agent.name} ({', '.join(agent.teams)})")
     for name, agents in sides.items():
         rows.add_row(side(name) if two_sides(run) else "agents", ", ".join(agents))
+    seeing = {", ".join(agent.pictures): None for agent in run.agents if agent.pictures}
+    if seeing:
+        rows.add_row("pictures", f"{'; '.join(seeing)}: they show more than the texts say")
     return Panel(rows, title=Text(run.run), border_style="dim", box=box.ROUNDED)
 
 

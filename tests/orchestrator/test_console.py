@@ -93,6 +93,14 @@ def test_a_run_card(printed: Printed, card_of_run: Run) -> None:
     ]
 
 
+def test_a_run_card_says_that_pictures_show_more_than_texts(printed: Printed, card_of_run: Run) -> None:
+    first, *others = card_of_run.agents
+    seeing = first.model_copy(update={"pictures": ("screen", "minimap")})
+    lines = printed(card(card_of_run.model_copy(update={"agents": (seeing, *others)})), width=80)
+    assert any("pictures  screen, minimap: they show more than the texts say" in line for line in lines)
+    assert not any("pictures" in line for line in printed(card(card_of_run), width=80))
+
+
 def test_a_run_card_without_a_deadline(printed: Printed, make_run: MakeRun) -> None:
     lines = printed(card(make_run(clock=Clock(max_wait_s=None))), width=80)
     assert lines[3] == "│ clock   frozen: 8 loops a step, waits as long as it takes                    │"

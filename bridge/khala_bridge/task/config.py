@@ -475,7 +475,13 @@ class TaskConfig(Frozen):
     def cards(self) -> tuple[AgentCard, ...]:
         """Return the agents of all sides as the run card lists them."""
         return tuple(
-            AgentCard(name=a.name, side=task.side, teams=tuple(t.name for t in a.teams), required=a.required)
+            AgentCard(
+                name=a.name,
+                side=task.side,
+                teams=tuple(t.name for t in a.teams),
+                required=a.required,
+                pictures=tuple(dict.fromkeys(image.what for image in a.images)),
+            )
             for task in self.per_side()
             for a in task.agents
         )

@@ -49,6 +49,9 @@ class AgentCard(Frozen):
     side: str
     teams: tuple[str, ...]
     required: bool = True
+    pictures: tuple[str, ...] = ()
+    """Kinds of its pictures. They show what its text does not: all that its side sees on a minimap, the ground, and what
+    reaches into a screen from outside."""
 
 
 class Forked(Frozen):
