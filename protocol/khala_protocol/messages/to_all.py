@@ -50,8 +50,8 @@ class AgentCard(Frozen):
     teams: tuple[str, ...]
     required: bool = True
     pictures: tuple[str, ...] = ()
-    """Kinds of its pictures. They show what its text does not: all that its side sees on a minimap, the ground, and what
-    reaches into a screen from outside."""
+    """Kinds of its pictures. They show what its text does not: all that its side sees on a minimap, the ground, and
+    what reaches into a screen from outside."""
 
 
 class Forked(Frozen):
