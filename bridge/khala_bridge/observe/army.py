@@ -123,6 +123,7 @@ def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
         units=_counts(seen.unit.name for seen in group),
         doing=_doing(scene, [seen.unit for seen in group]),
         value=round(sum(_value(seen.unit) for seen in group)),
+        in_sight=sum(not seen.unseen_s for seen in group),
         unseen_s=round(min(seen.unseen_s for seen in group), 1),
     )
 

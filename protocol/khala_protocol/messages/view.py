@@ -304,6 +304,8 @@ class ArmyPart(Frozen):
     """What most of them do: `idle`, `attack at [40, 46]`; "" for enemies."""
     value: int = 0
     """Minerals and vespene that they cost."""
+    in_sight: int = 0
+    """How many of the enemies are; of the others it tells where they were seen."""
     unseen_s: float = 0.0
     """Seconds since any of these enemies was in sight."""
     away: float | None = None

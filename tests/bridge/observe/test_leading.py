@@ -89,9 +89,17 @@ def test_enemies_are_remembered_where_they_were_seen_for_three_minutes(unit: Any
         "Commander", look([home, roach], loop=2240), look([home], loop=3360), look([home], loop=6720)
     )
     (part,) = seen.army.enemies
-    assert part == ArmyPart(minimap=(40, 24), units={"Roach": 1}, value=100, away=36)
-    assert gone.army.enemies == (part.but(unseen_s=50.0),)
+    assert part == ArmyPart(minimap=(40, 24), units={"Roach": 1}, value=100, away=36, in_sight=1)
+    assert gone.army.enemies == (part.but(unseen_s=50.0, in_sight=0),)
     assert forgotten.army.enemies == ()
+
+
+def test_of_enemies_of_whom_only_some_are_in_sight_it_says_how_many(base_task: Any, unit: Any, look: Any) -> None:
+    home, near, gone = unit(1, "Nexus", 11.5, 17.5), unit(2, "Roach", 40, 40, alliance="enemy"), (3, "Roach", 41, 40)
+    observer = Observer(base_task)
+    observer.observe(look([home, near, unit(*gone, alliance="enemy")], loop=2240))
+    text = observer.observe(look([home, near], loop=2464)).agents["Commander"].text
+    assert "the nearest 36 from your nearest base: 2 Roach, 1 of them in sight\n" in text
 
 
 def test_what_an_order_cost_is_counted_from_the_last_one(unit: Any, look: Any, views: Any) -> None:

@@ -101,7 +101,9 @@ def _enemies(found: Army) -> Iterator[str]:
 
 def _enemy_part(part: ArmyPart) -> str:
     away = "" if part.away is None else f", the nearest {part.away:.0f} from your nearest base"
-    when = "in sight" if not part.unseen_s else f"seen {ago(part.unseen_s)}"
+    when = f"seen {ago(part.unseen_s)}" if part.unseen_s else "in sight"
+    if 0 < part.in_sight < sum(part.units.values()):
+        when = f"{part.in_sight} of them in sight"
     return f"{_where(part)}{away}: {count_words(part.units)}, {when}"
 
 
