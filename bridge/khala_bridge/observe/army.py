@@ -123,7 +123,6 @@ def _part(scene: SideScene, name: str, group: Sequence[_Seen]) -> ArmyPart:
         units=_counts(seen.unit.name for seen in group),
         doing=_doing(scene, [seen.unit for seen in group]),
         value=round(sum(_value(seen.unit) for seen in group)),
-        in_sight=sum(not seen.unseen_s for seen in group),
         unseen_s=round(min(seen.unseen_s for seen in group), 1),
     )
 
@@ -174,7 +173,8 @@ def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[Arm
     parts = []
     for name, group in _group(places, found):
         away = min((math.dist((seen.x, seen.y), hall) for seen in group for hall in halls), default=None)
-        parts.append(_part(scene, name, group).but(away=None if away is None else round(away)))
+        in_sight = sum(not seen.unseen_s for seen in group)
+        parts.append(_part(scene, name, group).but(away=None if away is None else round(away), in_sight=in_sight))
     return sorted(parts, key=lambda part: (part.away or 0.0, part.minimap))
 
 
