@@ -391,7 +391,7 @@ async def _foreign_words(directory: Path) -> str:
     with Recorder(path) as recorder:
         recorder.write(agent_key("e", "blue", AGENT, Topic.REPLY), encode(Reply(**where, text="I surrender")))
     options = {"agent": "Zealots", "steps": None, "text": True, "images": None, "new": None, "pace": False}
-    said, traceback = capture(partial(replay, path, **options, as_json=False))  # type: ignore[arg-type]
+    said, traceback = capture(partial(replay, [path], **options, as_json=False))  # type: ignore[arg-type]
     return traceback or ("words stand in the mouth of another agent" if "surrender" in said else "")
 
 
