@@ -37,8 +37,9 @@ ENEMY = re.compile(r"\| tag (0x[0-9a-f]+) \| screen \S+ \S+ \| distance \S+ \| h
 def focus_fire(text: str) -> str:
     """Return a reply in which every team attacks the weakest enemy on its screen."""
     lines = ["Actions:"]
-    for name, block in TEAM.findall(text):
-        enemies = [(int(health) + int(shield), tag) for tag, health, shield in ENEMY.findall(block)]
+    life = {tag: int(health) + int(shield) for tag, health, shield in ENEMY.findall(text)}
+    for name, block in TEAM.findall(text):  # a second team's block names those that the first one's describes
+        enemies = [(life[tag], tag) for tag in re.findall(r"0x[0-9a-f]+", block) if tag in life]
         lines += [f"Team {name}:"] + ([f"<Attack_Unit({min(enemies)[1]})>"] if enemies else [])
     return "\n".join(lines)
 
