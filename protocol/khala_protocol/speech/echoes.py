@@ -122,13 +122,17 @@ class ShownText:
             yield from self._earlier.words_around(call)
 
     def _is_in_list(self, text: str, start: int, end: int, *, ordered: bool) -> bool:
-        """Return whether the line around a call is a list of calls that was shown."""
+        """Return whether the line around a call is a list of calls that was shown, or its beginning in a cut reply."""
         line_start, line_end = _line_around(text, start, end)
         if line_end - line_start > self._longest_list:
             return False
         line = text[line_start:line_end]
         calls = line.count("<")
-        return calls > 1 and (calls >= MANY or not ordered) and _plain(line) in self.lists
+        described = _says_much(_plain(line[line.rfind(">") + 1 :]))
+        if calls <= 1 or (calls < MANY and ordered and not described):
+            return False
+        said = _plain(line)
+        return said in self.lists or (line_end == len(text) and any(shown.startswith(said) for shown in self.lists))
 
 
 NOTHING_SHOWN: Final = ShownText()
