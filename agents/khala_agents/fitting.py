@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from khala_agents.llm.client import RequestRefused, estimated_tokens
+from khala_agents.repeats import chapters_of, sections_of
 from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def _section(heading: str, reason: str) -> Cut:
     """Return the cut of a section of an observation, whose heading stands at the beginning of a line."""
 
     def shorten(draft: DraftPrompt) -> DraftPrompt:
-        kept = [section for section in _SECTIONS.split(draft.observation) if not _has_heading(section, heading)]
+        kept = [section for section in sections_of(draft.observation) if not _has_heading(section, heading)]
         return replace(draft, observation="\n\n".join(kept))
 
     return Cut(heading, reason, shorten)
@@ -170,7 +171,7 @@ def _manual(heading: str, reason: str) -> Cut:
     """Return the cut of a section of the system message."""
 
     def shorten(draft: DraftPrompt) -> DraftPrompt:
-        kept = [section for section in _CHAPTERS.split(draft.system) if not section.startswith(f"# {heading}\n")]
+        kept = [section for section in chapters_of(draft.system) if not section.startswith(f"# {heading}\n")]
         return replace(draft, system="\n\n".join(kept))
 
     return Cut(f"{heading} (instructions)", reason, shorten)
@@ -180,8 +181,6 @@ def _has_heading(section: str, heading: str) -> bool:
     return section.partition("\n")[0].rstrip(":").strip() == heading
 
 
-_SECTIONS = re.compile(r"\n\n(?=\S)")
-_CHAPTERS = re.compile(r"\n\n(?=# )")
 _UNITS = re.compile(r"(?:^ +\S.* \| tag 0x.*(?:\n|\Z))+", re.MULTILINE)
 _DISTANCE = re.compile(r"\| distance (\d+(?:\.\d+)?)")
 _DESCRIPTIONS = re.compile(r"^(- <[^>\n]*>): .*$", re.MULTILINE)

@@ -26,6 +26,16 @@ _CONTACT = re.compile(r"- ([^\s:<]+)(?!: a channel)(?::.*)?$")
 INDENT = "    "
 
 
+def sections_of(observation: str) -> list[str]:
+    """Return the sections of an observation, each with its heading as the first line."""
+    return _SECTION.split(observation)
+
+
+def chapters_of(system: str) -> list[str]:
+    """Return the chapters of a system message, each with its heading as the first line."""
+    return _CHAPTER.split(system)
+
+
 class PromptRepeats:
     """What the prompts of an agent say in each step.
 
@@ -50,7 +60,7 @@ class PromptRepeats:
         """Return an observation without its repeats."""
         sections = []
         whole = observation.rstrip("\n")
-        for section in _SECTION.split(whole):
+        for section in sections_of(whole):
             heading, _, body = section.partition("\n")
             writer = self._writers.get(heading)
             if writer is None:
@@ -78,13 +88,13 @@ class PromptRepeats:
 
 def say_again(system: str, observation: str) -> str:
     """Return the observation of a prompt with what its system message says of the task and of whom to write to."""
-    chapters = dict(chapter.partition("\n")[::2] for chapter in _CHAPTER.split(system))
+    chapters = dict(chapter.partition("\n")[::2] for chapter in chapters_of(system))
     task = chapters.get("# Your task", "").splitlines()
     task += [f"Team {name}: {said}" for name, said in _TEAM_TASK.findall(chapters.get("# Your teams", ""))]
     contacts = [
         found[1] for line in chapters.get("# Communication", "").splitlines() if (found := _CONTACT.match(line))
     ]
-    sections = _SECTION.split(observation.rstrip("\n"))
+    sections = sections_of(observation.rstrip("\n"))
     if task:
         again = "\n".join(["Task", *(f"{INDENT}{line}" for line in task)])
         stage = next((section for section in sections if section.startswith("Task\n")), "Task")

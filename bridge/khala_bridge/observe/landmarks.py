@@ -95,12 +95,18 @@ def structures(scene: SideScene) -> Iterator[Landmark]:
         yield _landmark("structure", body, None, _busy(body))
 
 
+def at_work(orders: Sequence[OrderView]) -> tuple[list[OrderView], list[OrderView]]:
+    """Return the orders that a unit carries out, the first one and those that have begun beside it, and the others."""
+    later = orders[1:]
+    working = [*orders[:1], *(order for order in later if order.progress)]
+    return working, [order for order in later if not order.progress]
+
+
 def _queue(orders: Sequence[OrderView]) -> str:
     """Return the orders at work of a structure, two with a Reactor, and the queued orders by name."""
-    working = [order for place, order in enumerate(orders) if not place or order.progress]
-    waiting = Counter(order.name for place, order in enumerate(orders) if place and not order.progress)
+    working, waiting = at_work(orders)
     begun = " and ".join(f"{o.name} {100 * o.progress:.0f}%" if o.progress else o.name for o in working)
-    return " then ".join([begun, *(f"{count} {name}" for name, count in waiting.items())])
+    return " then ".join([begun, *(f"{count} {name}" for name, count in Counter(o.name for o in waiting).items())])
 
 
 def _busy(body: Body) -> str:

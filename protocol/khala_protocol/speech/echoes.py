@@ -128,8 +128,9 @@ class ShownText:
             return False
         line = text[line_start:line_end]
         calls = line.count("<")
-        described = _says_much(_plain(line[line.rfind(">") + 1 :]))
-        if calls <= 1 or (calls < MANY and ordered and not described):
+        if calls <= 1:
+            return False
+        if calls < MANY and ordered and not _says_much(_plain(line[line.rfind(">") + 1 :])):
             return False
         said = _plain(line)
         return said in self.lists or (line_end == len(text) and any(shown.startswith(said) for shown in self.lists))

@@ -16,6 +16,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from khala_bridge.knowledge import is_structure
+from khala_bridge.observe.landmarks import at_work
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2, n, percent, point, tenth, whole
 
@@ -170,7 +171,8 @@ def _group_line(name: str, group: Sequence[UnitView]) -> str:
         where = f"around {point((x, y))}"
     distances = [unit.distance for unit in group if unit.distance is not None]
     away = f" | the nearest {tenth(min(distances))} away" if distances else ""
-    left = f" | {percent(_share(group))} of health and shield" if _share(group) < 1 else ""
+    share = _share(group)
+    left = f" | {percent(share)} of health and shield" if share < 1 else ""
     unfinished = sum(unit.build_progress < 1 for unit in group)
     left += f" | {unfinished} unfinished" if unfinished else ""
     buffs = Counter(buff for unit in group for buff in unit.buffs if not buff.startswith(_CARRYING))
@@ -261,8 +263,7 @@ def orders(queue: Sequence[OrderView]) -> str:
     """Return the orders of a unit: `Train_Marine 83%, then 4 Train_Marine`; a Reactor has two at work."""
     if not queue:
         return ""
-    working = [order for place, order in enumerate(queue) if not place or order.progress]
-    waiting = [order for place, order in enumerate(queue) if place and not order.progress]
+    working, waiting = at_work(queue)
     later = [(words, len(list(same))) for words, same in groupby(map(_order, waiting))]
     begun = " and ".join(map(_order, working))
     return ", then ".join([begun, *(f"{count} {words}" if count > 1 else words for words, count in later)])
