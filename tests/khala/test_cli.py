@@ -234,7 +234,7 @@ def test_each_side_of_a_duel_plays_with_its_own_model_and_has_its_own_result(tmp
     assert red["usage"]["Captain"]["requests"] == 0
     assert "blue: win, enemy defeated" in done.stderr
     assert "red: loss, defeated" in done.stderr
-    assert done.stderr.count("step 0, ") == 1
+    assert done.stderr.count("step 0 of 25, ") == 1
 
 
 class Refusing(BaseHTTPRequestHandler):
