@@ -32,8 +32,10 @@ _ACTION = re.compile(r"<(\w+)\(([a-z, ]*)\)>")
 _MAX_ACTIONS = re.compile(r"At most (\d{1,4}) actions? per team")
 _WRITE_TO = re.compile(r"^    You can write to: (.*)", re.MULTILINE)
 _EFFECT_ON = re.compile(r"(\w+) on (\d{1,4})", re.ASCII)
+_LEFT = r"(?: \(\d[\d.]* s left\))?"
+_WAIT = re.compile(r" \(\d[\d.]* s\)", re.ASCII)
 _ON_GROUND = re.compile(
-    rf"^        (?:own|ally|enemy|neutral) (\w+) at ({_POINT}(?:, {_POINT})*)", re.MULTILINE | re.ASCII
+    rf"^        (?:own|ally|enemy|neutral) (\w+) at ({_POINT}{_LEFT}(?:, {_POINT}{_LEFT})*)", re.MULTILINE | re.ASCII
 )
 _TIME = re.compile(r"^    Time: (\d{1,4}):(\d\d(?:\.\d)?)", re.MULTILINE | re.ASCII)
 _AMOUNT = re.compile(r"\b(Minerals|vespene): (\d{1,7})", re.ASCII | re.IGNORECASE)
@@ -392,7 +394,7 @@ def _unit(line: str) -> TextUnit | None:
         hallucination="hallucination" in fields,
         effects=tuple(fields["effects"].split(", ")) if "effects" in fields else (),
         built=_first(fields.get("built", ""), 100.0),
-        not_ready=tuple(fields.get("not", "").removeprefix("ready ").split(", ")) if "not" in fields else (),
+        not_ready=tuple(_WAIT.sub("", fields["not"]).removeprefix("ready ").split(", ")) if "not" in fields else (),
     )
 
 

@@ -6,11 +6,13 @@ and no frame. `raw_executor` and `screen_executor` play the same commands in two
 """
 
 from khala_bridge.act.actor import Actor, JointAction, executor_of
+from khala_bridge.act.casts import Casts
 from khala_bridge.act.plan import Executor, GameRefusal, Plan, PlanResult, PlanStep
 from khala_bridge.act.translate import Command
 
 __all__ = [
     "Actor",
+    "Casts",
     "Command",
     "Executor",
     "GameRefusal",

@@ -80,6 +80,8 @@ def _details(unit: Unit) -> UnitDetails | None:
     if contents := unit.mineral_contents or unit.vespene_contents:
         found["contents"] = contents
     if unit.is_own:
+        if unit.buff_duration_remain:
+            found["left_s"] = round(unit.buff_duration_remain / LOOPS_PER_S, 1)
         if unit.cargo_space_max:
             found["cargo_max"] = unit.cargo_space_max
             found["passengers"] = tuple(sorted(unit.passengers))

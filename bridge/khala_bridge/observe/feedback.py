@@ -15,7 +15,7 @@ from khala_protocol.messages import count_refusals
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from khala_protocol.messages import NoteView, Received, Rejection
+    from khala_protocol.messages import CastView, NoteView, Received, Rejection
 
 MAX_REJECTIONS = 10
 """Rejections that an observation lists; the others are counted."""
@@ -36,6 +36,8 @@ class Feedback:
     """Whether it gave an order or wrote a message."""
     notes: tuple[NoteView, ...] = ()
     """All of its notes."""
+    casts: tuple[CastView, ...] = ()
+    """What became of its casts, of the newest calls last."""
 
 
 def shorten(rejections: Sequence[Rejection]) -> tuple[Rejection, ...]:

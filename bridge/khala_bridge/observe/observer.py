@@ -27,6 +27,7 @@ from khala_bridge.observe.places import Places
 from khala_bridge.observe.scene import SideScene
 from khala_bridge.observe.stages import Stages
 from khala_bridge.observe.text import Page, render, sections_of
+from khala_bridge.observe.timers import Timers
 from khala_bridge.state.teams import TeamRoster
 from khala_protocol.messages import LOOPS_PER_S
 
@@ -89,6 +90,7 @@ class Observer:
         world = snapshot.info.frame(self._task.frames)
         episode.roster.update(snapshot.own, snapshot.player)
         episode.chronicle.note(snapshot)
+        episode.timers.note(snapshot)
         if self._leads:
             episode.places.note(snapshot)
         episode.note_orders(feedback or {})
@@ -189,6 +191,7 @@ class _Episode:
     chronicle: Chronicle = field(default_factory=Chronicle)
     stages: Stages = field(default_factory=Stages)
     places: Places = field(default_factory=Places)
+    timers: Timers = field(default_factory=Timers)
     last: dict[str, _Last] = field(default_factory=dict)
     """By agent."""
     ordered: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -236,7 +239,7 @@ class _Moment:
     def scene(self) -> SideScene:
         """The scene."""
         teams = (team for teams in self.teams.values() for team in teams)
-        return SideScene(self.snapshot, self.task.frames, teams)
+        return SideScene(self.snapshot, self.task.frames, teams, self.episode.timers)
 
     @cached_property
     def album(self) -> Album | None:

@@ -40,6 +40,14 @@ class Choice(NamedTuple):
     barred: tuple[UnavailableAction, ...]
 
 
+class SkillState(NamedTuple):
+    """A skill of a unit."""
+
+    ability: int
+    ready: bool
+    """Whether the unit could use it now."""
+
+
 class Possible:
     """The means of a side at one moment, and the actions that they allow."""
 
@@ -76,13 +84,13 @@ class Possible:
         states = [self._side.units[body.tag] for body in members]
         return self._choice(judged, doers, self._of_side._replace(agent=agent, members=states, around=around))
 
-    def skills(self, agent: AgentConfig, body: Body) -> tuple[str, ...]:
-        """Return the skills that the agent has and this very unit can use now; none if the game was not asked."""
+    def skills(self, agent: AgentConfig, body: Body) -> Mapping[str, SkillState]:
+        """Return the skills that the agent has for this very unit, by name; none if the game was not asked."""
         skills = _skills(agent.actions.get(body.name, ()))
         if self._abilities is None or not skills:
-            return ()
+            return {}
         able = self._abilities.get(body.tag, frozenset())
-        return tuple([name for name, ability in skills.items() if ability in able])
+        return {name: SkillState(ability, ability in able) for name, ability in skills.items()}
 
     def for_side(self, names: Iterable[str]) -> Choice:
         """Return the choice of a side team's actions; possible are those that some unit of the side can carry out."""

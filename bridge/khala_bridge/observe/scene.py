@@ -46,27 +46,27 @@ from khala_bridge.observe.events import Witnessed
 from khala_bridge.observe.looks import BodyArrays, looks
 from khala_bridge.observe.observation import TeamObservation
 from khala_bridge.observe.offers import Possible
+from khala_bridge.observe.timers import BARRIERS
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, EffectView, Resources, TeamView, UnitDetails, View
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
     from khala_bridge.auto.aims import Aim
     from khala_bridge.auto.warp import PowerField
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.events import Events
     from khala_bridge.observe.looks import Look, Shown
-    from khala_bridge.observe.offers import Choice
+    from khala_bridge.observe.offers import Choice, SkillState
+    from khala_bridge.observe.timers import Timers
     from khala_bridge.state import Snapshot
     from khala_bridge.state.teams import Team
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Alliance as Whose
     from khala_protocol.messages import Frames, Point, UnitView
 
-BARRIERS = frozenset({"ForceField"})
-"""Types of units that are effects on the ground to those who see them."""
 _WHOSE: dict[Alliance, Whose] = {
     Alliance.OWN: "own",
     Alliance.ALLY: "ally",
@@ -83,9 +83,13 @@ _NO_DETAILS = UnitDetails()
 class SideScene:
     """A snapshot, and the common part of all teams' views."""
 
-    def __init__(self, snapshot: Snapshot, frames: Frames, teams: Iterable[Team]) -> None:
-        """Take a snapshot, the frames of its views, and the teams of all agents; their units are in the snapshot."""
+    def __init__(self, snapshot: Snapshot, frames: Frames, teams: Iterable[Team], timers: Timers) -> None:
+        """Take a snapshot that the timers have noted, the frames of its views, and the teams of all agents.
+
+        The units of the teams are in the snapshot.
+        """
         self.snapshot = snapshot
+        self._timers = timers
         self.world = snapshot.info.frame(frames)
         self._screen_size = frames.screen
         units = [unit for unit in snapshot.units.values() if not unit.is_neutral]
@@ -200,12 +204,26 @@ class SideScene:
         return tuple(units)
 
     def _add_skills(self, agent: AgentConfig, bodies: list[Body], views: tuple[UnitView, ...]) -> tuple[UnitView, ...]:
-        """Return the units of a team, each with the skills that it can use now and those that only others can."""
+        """Return the units of a team, each with the skills that are ready and those that are not.
+
+        A skill is not ready if only others of the team can use it now, or if it will be ready again at a known time.
+        """
         skills = [self.possible.skills(agent, body) for body in bodies]
-        ready_somewhere = dict.fromkeys(name for ready in skills for name in ready)
-        if not ready_somewhere:
-            return views
-        return tuple([_with_skills(view, ready, ready_somewhere) for view, ready in zip(views, skills, strict=True)])
+        of_team = {name for known in skills for name, skill in known.items() if skill.ready}
+        units = zip(bodies, views, skills, strict=True)
+        return tuple([self._with_skills(body, view, known, of_team) if known else view for body, view, known in units])
+
+    def _with_skills(
+        self, body: Body, view: UnitView, skills: Mapping[str, SkillState], of_team: Container[str]
+    ) -> UnitView:
+        unit = self.snapshot.units[body.tag]
+        ready = tuple([name for name, skill in skills.items() if skill.ready])
+        missing = {name: skill.ability for name, skill in skills.items() if not skill.ready}
+        waits = {name: self._timers.ready_in_s(unit, ability) for name, ability in missing.items()}
+        unready = {name: wait_s for name, wait_s in waits.items() if wait_s is not None or name in of_team}
+        if not ready and not unready:
+            return view
+        return view.but(details=(view.details or _NO_DETAILS).but(ready=ready, unready=unready))
 
     def _resources_on(self, camera: Camera) -> tuple[UnitView, ...]:
         """Return the resources on a camera's screen, by type and tag."""
@@ -214,15 +232,23 @@ class SideScene:
 
     def _effects_on(self, camera: Camera) -> tuple[EffectView, ...]:
         """Return the effects on the ground that a camera shows, and barriers that belong to nobody, by name."""
-        barriers = (unit for unit in self.snapshot.units.values() if unit.is_neutral and unit.name in BARRIERS)
-        found = [(effect_name(e.effect_id), e.alliance, e.radius, e.places) for e in self.snapshot.effects]
-        found += [(unit.name, unit.alliance, unit.radius, (unit.pos,)) for unit in barriers]
+        left_s = self._timers.effect_left_s
+        found = []
+        for effect in self.snapshot.effects:
+            name = effect_name(effect.effect_id)
+            left = left_s((effect.effect_id, effect.places), name)
+            found.append((name, effect.alliance, effect.radius, effect.places, left))
+        barriers = [unit for unit in self.snapshot.units.values() if unit.is_neutral and unit.name in BARRIERS]
+        found += [
+            (unit.name, unit.alliance, unit.radius, (unit.pos,), left_s(unit.tag, unit.name)) for unit in barriers
+        ]
         made = []
-        for name, alliance, radius, places in sorted(found):
+        for name, alliance, radius, places, left in sorted(found, key=lambda effect: effect[:4]):
             shown = [place for place in places if _shows(camera, *place)]
             if shown:
                 points = tuple(to_tenth(camera.screen(*place), camera.size) for place in shown)
-                made.append(EffectView(name=name, alliance=_WHOSE[alliance], radius=round(radius, 1), screen=points))
+                wide = round(radius, 1)
+                made.append(EffectView(name=name, alliance=_WHOSE[alliance], radius=wide, screen=points, left_s=left))
         return tuple(made)
 
 
@@ -241,11 +267,6 @@ def _arrays(order: Sequence[Body]) -> BodyArrays:
         np.array([b.alliance is not Alliance.ENEMY for b in order]),
         np.array(foe),
     )
-
-
-def _with_skills(view: UnitView, ready: tuple[str, ...], ready_somewhere: Iterable[str]) -> UnitView:
-    unready = tuple([name for name in ready_somewhere if name not in ready])
-    return view.but(details=(view.details or _NO_DETAILS).but(ready=ready, unready=unready))
 
 
 def _team_view(name: str, minimap: Point | None, choice: Choice) -> TeamView:

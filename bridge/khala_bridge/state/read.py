@@ -164,7 +164,7 @@ def _fields(first: str, last: str) -> Callable[[raw_pb2.Unit], tuple[Any, ...]]:
 
 
 _of_all = _fields("tag", "vespene_contents")
-_of_own = _fields("is_powered", "ideal_harvesters")
+_of_own = _fields("is_powered", "buff_duration_remain")
 
 
 def read_unit(unit: raw_pb2.Unit) -> Unit | None:

@@ -100,7 +100,7 @@ class Unit(NamedTuple):
     """Minerals that are left in a mineral field."""
     vespene_contents: int
     """Vespene that is left in a geyser or in the structure on it."""
-    # --- only of the player's own units; those up to `ideal_harvesters` as in the API ---
+    # --- only of the player's own units; those up to `buff_duration_remain` as in the API ---
     is_powered: bool = False
     """True if a power field reaches it, also for structures that need none."""
     is_selected: bool = False
@@ -117,6 +117,8 @@ class Unit(NamedTuple):
     """Number of workers that gather for a town hall or at a gas structure."""
     ideal_harvesters: int = 0
     """Number of workers that it has work for."""
+    buff_duration_remain: int = 0
+    """Game loops until its buff ends, or the unit itself if it lives for a time only; 0 for neither."""
     passengers: tuple[str, ...] = ()
     """Types of the units in it, by name."""
     orders: tuple[UnitOrder, ...] = ()

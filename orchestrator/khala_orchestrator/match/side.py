@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.act import Actor
+from khala_bridge.act import Actor, Casts
 from khala_bridge.observe import Feedback, Observer, shorten
 from khala_bridge.observe.triggers import triggers, vitals
 from khala_orchestrator.match import replies
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from khala_orchestrator.match.schedule import Decision, StepId
     from khala_orchestrator.match.turn import Answer
     from khala_orchestrator.words.mailbox import Post
-    from khala_protocol.messages import Advice, Fate, StandingView, Timings, Trigger, Unasked
+    from khala_protocol.messages import Advice, CastView, Fate, StandingView, Timings, Trigger, Unasked
     from khala_protocol.speech import Speech
 
 
@@ -97,6 +97,7 @@ class MatchSide:
     run: str
     _observer: Observer = field(init=False)
     _actor: Actor = field(init=False)
+    _casts: Casts = field(default_factory=Casts, init=False)
     _mailbox: Mailbox = field(init=False)
     _members: dict[str, _Member] = field(init=False)
     """By the name of the agent, in the order of the task."""
@@ -133,6 +134,7 @@ class MatchSide:
         """Forget the episode before."""
         self._observer.begin()
         self._actor.begin()
+        self._casts.begin()
         self._mailbox.clear()
         self._members = {}
         for agent in self.task.agents:
@@ -194,6 +196,7 @@ class MatchSide:
             view=seen.view,
             images=tuple(picture.ref for picture in seen.pictures),
             accepted=seen.heard.accepted,
+            casts=seen.heard.casts,
             rejections=seen.heard.rejections,
             messages=seen.heard.messages,
         )
@@ -285,7 +288,8 @@ class MatchSide:
         unasked: Mapping[Seat, Unasked] = MappingProxyType({}),
     ) -> Report:
         """Return the report of a step, and keep what each agent is to hear of it."""
-        feedback = {seat.agent: self._feedback(seat, turn, result) for seat in self.seats}
+        casts = self._casts.follow(turn.commands, turn.before, result.snapshot, result.played.refusals)
+        feedback = {seat.agent: self._feedback(seat, turn, result, casts.get(seat.agent, ())) for seat in self.seats}
         before = turn.before.score
         after = result.snapshot.score
         for message in turn.post.taken:
@@ -319,7 +323,7 @@ class MatchSide:
             timings=timings,
         )
 
-    def _feedback(self, seat: Seat, turn: SideTurn, result: StepResult) -> Feedback:
+    def _feedback(self, seat: Seat, turn: SideTurn, result: StepResult, casts: Sequence[CastView]) -> Feedback:
         """Return what an agent is to hear of a step."""
         member = self._members[seat.agent]
         rejections: tuple[Rejection, ...] = (
@@ -333,7 +337,8 @@ class MatchSide:
         accepted = turn.joint.accepted.get(seat.agent, ())
         wrote = any(message.agent == seat.agent for message in turn.post.taken)
         received = turn.post.received.get(seat, ())
-        return Feedback(accepted, shorten(rejections), received, ordered=bool(accepted) or wrote)
+        ordered = bool(accepted) or wrote
+        return Feedback(accepted, shorten(rejections), received, ordered=ordered, casts=tuple(casts))
 
     def _fate(self, decision: Decision, turn: SideTurn) -> Fate | None:
         return "refused" if replies.is_too_old(decision, self.task) else turn.joint.fates.get(decision.seat.agent)
@@ -376,4 +381,5 @@ def _join(before: Feedback, more: Feedback) -> Feedback:
         before.rejections + more.rejections,
         newest(before.messages + more.messages),
         ordered=before.ordered or more.ordered,
+        casts=tuple({cast.call: cast for cast in (*before.casts, *more.casts)}.values()),
     )

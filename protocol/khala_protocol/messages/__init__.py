@@ -33,6 +33,7 @@ from khala_protocol.messages.from_agents import (
 from khala_protocol.messages.to_agents import (
     AgentKind,
     Briefing,
+    CastView,
     Clock,
     Contact,
     Example,
@@ -142,6 +143,7 @@ __all__ = [
     "ArmyPart",
     "Briefing",
     "Call",
+    "CastView",
     "Casualties",
     "ChatMessage",
     "Clock",

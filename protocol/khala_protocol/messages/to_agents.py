@@ -220,6 +220,16 @@ class Verdict(Frozen):
     """What was refused and why, in words; the game and the deadline are those of the observation."""
 
 
+class CastView(Frozen):
+    """What became of a cast that the agent ordered, in this step or before."""
+
+    call: str
+    """As in `Observation.accepted`, `Sentry-1 <Ability_ForceField_Screen([12, 9])>`."""
+    end: Literal["cast", "under way", "not cast"]
+    why: str = ""
+    """Why it was not cast."""
+
+
 class Observation(Wire):
     """Host → agent: what one agent sees at one step. A pure function of what was recorded before."""
 
@@ -238,6 +248,8 @@ class Observation(Wire):
     images: tuple[ImageRef, ...] = ()
     accepted: tuple[str, ...] = ()
     """The agent's calls of the last step that were carried out, as written."""
+    casts: tuple[CastView, ...] = ()
+    """What became of casts, also of those that were accepted earlier."""
     rejections: tuple[Rejection, ...] = ()
     """The agent's calls of the last step that were not carried out."""
     messages: tuple[Received, ...] = ()

@@ -57,8 +57,11 @@ class UnitDetails(Frozen):
     """Workers of an own base or gas structure, and how many it has work for."""
     ready: tuple[str, ...] = ()
     """Of the skills that the agent may use, those that a unit of its team could use now."""
-    unready: tuple[str, ...] = ()
-    """Of these, the ones that only other units of its team could use now."""
+    unready: dict[str, float | None] = Field(default_factory=dict)
+    """Of these, the ones that only other units of its team could use now, or that will be ready again: the
+    seconds until then at most, None if they are not known."""
+    left_s: float | None = None
+    """Seconds until its buff ends, or a unit that lives for a time only; own units only."""
 
 
 class UnitView(Frozen):
@@ -117,6 +120,8 @@ class EffectView(Frozen):
     radius: float
     """In world units; 0 if the game gives none."""
     screen: tuple[Point, ...]
+    left_s: float | None = None
+    """Seconds until it ends, at most; None if that is not known."""
 
 
 class ActionCost(Frozen):

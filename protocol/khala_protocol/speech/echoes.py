@@ -44,7 +44,8 @@ _KIND = r"(?:tag|screen|minimap)\b"
 _FORM = re.compile(rf"<\s*+(?:\w++\(\s*+{_KIND}(?:\s*+,\s*+{_KIND})*+\s*+\)|{_ANY})\s*+>?", re.IGNORECASE)
 _SAMPLE = re.compile(rf"<\s*+{_ANY}\s*+>?", re.IGNORECASE)
 _HOST_WORDS = re.compile(
-    r"(?:^|[\s\"'(])(?:(?:accepted|rejected|refused)\s?+:[^<]{0,60}+|write (?:it like|it as)\s*+:?\s*+[\"'`]*+)$",
+    r"(?:^|[\s\"'(])"
+    r"(?:(?:accepted(?: before)?|rejected|refused)\s?+:[^<]{0,60}+|write (?:it like|it as)\s*+:?\s*+[\"'`]*+)$",
     re.IGNORECASE,
 )
 

@@ -19,6 +19,7 @@ from khala_simulator.economy import payments, supply
 from khala_simulator.economy.requirements import met
 from khala_simulator.native import columns
 from khala_simulator.tables import prices
+from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import EXCLUDED, NOT_REQUIRED, ActionResult
 from khala_simulator.tables.stats import AIR_PLANE, GROUND_PLANE
 from khala_simulator.world.casts import Cast
@@ -124,6 +125,9 @@ def cooldown_left(world: World, slot: int, ability: Ability) -> float:
 def aim_refusal(world: World, cast: Cast) -> ActionResult:
     """Return why a unit can't aim an ability like this, or success; the way there only counts if it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
+    if target == NOBODY and cast.point is None and ability.requires_point:
+        aims_at_units = AbilityAim.POINT not in ability.aim
+        return ActionResult.MUST_TARGET_UNIT if aims_at_units else ActionResult.MUST_TARGET_VISIBLE_LOCATION
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
         if wrong is not ActionResult.SUCCESS:

@@ -219,8 +219,8 @@ def test_effects_on_the_ground_are_told_with_their_place_and_size(unit: Any, sna
     far = Effect(11, Alliance.ENEMY, 0.5, (WorldPoint(90, 90),))
     seen = dataclasses.replace(seen, effects=(storm, bile, far))
     text = Observer(task("3s_vs_3z")).observe(seen).agents["CombatGroupSmac"].text
-    assert "    Effects on the ground:\n        enemy CorrosiveBile at [12, 10]\n" in text
-    assert "        enemy PsiStorm at [14, 11], radius 1.5\n" in text
+    assert "    Effects on the ground:\n        enemy CorrosiveBile at [12, 10] (1.4 s left)\n" in text
+    assert "        enemy PsiStorm at [14, 11] (2.9 s left), radius 1.5\n" in text
     assert "[86," not in text
     assert read(text).teams["Stalker-1"].effects == [("CorrosiveBile", (12.0, 10.0)), ("PsiStorm", (14.0, 11.0))]
 

@@ -104,7 +104,7 @@ def test_it_is_told_which_unit_has_a_skill_ready(unit: Any, team: Any) -> None:
     units = [unit(tag, "Stalker", 15 + tag, 16) for tag in (1, 2)]
     given = {1: able("Attack_screen"), 2: able("Attack_screen", "Effect_Blink_screen")}
     details = [u.details for u in team(units, abilities=given, upgrades=(87,)).units]
-    assert [(d.ready, d.unready) for d in details] == [((), ("Blink",)), (("Blink",), ())]
+    assert [(d.ready, d.unready) for d in details] == [((), {"Blink": None}), (("Blink",), {})]
     given[2] = given[1]
     assert [u.details for u in team(units, abilities=given, upgrades=(87,)).units] == [None, None]
 

@@ -10,7 +10,7 @@ import pytest
 from khala_simulator.abilities import casting, commands
 from khala_simulator.abilities.registry import SKILLS
 from khala_simulator.abilities.skill import Skill
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, traits
 from khala_simulator.tables.abilities import AbilityAim, Filter, Need
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
@@ -125,6 +125,31 @@ def test_whom_an_ability_may_be_aimed_at(field: Any, victim: str, owner: int, wo
     assert casting.aim_refusal(field.world, Cast(slot, made, target)) is why
 
 
+@pytest.mark.parametrize(
+    ("aim", "why"),
+    [
+        (AbilityAim.UNIT, ActionResult.MUST_TARGET_UNIT),
+        (AbilityAim.POINT | AbilityAim.UNIT, ActionResult.MUST_TARGET_VISIBLE_LOCATION),
+        (AbilityAim.POINT | AbilityAim.NONE, ActionResult.SUCCESS),
+    ],
+)
+def test_an_ability_that_must_be_aimed_is_not_used_on_nothing(
+    field: Any, trick: Trick, aim: AbilityAim, why: ActionResult
+) -> None:
+    slot = caster(field)
+    made = ability(field, aim=aim, range=9.0)
+    assert casting.aim_refusal(field.world, Cast(slot, made)) is why
+    used = casting.use(field.world, [slot], made)
+    field.play(5)
+    assert bool(used) is bool(trick.effects) is (why is ActionResult.SUCCESS)
+
+
+@pytest.mark.parametrize("slot", [NOBODY, 10_000])
+def test_traits_of_no_unit_are_an_error(field: Any, slot: int) -> None:
+    with pytest.raises(IndexError, match=str(slot)):
+        traits.refresh(field.world, slot)
+
+
 def test_a_caster_walks_into_range_and_pays_when_it_takes_effect(field: Any, trick: Trick) -> None:
     slot, made = caster(field), ability(field, aim=AbilityAim.POINT, range=4.0, energy=60.0, cooldown_loops=32.0)
     assert casting.use(field.world, [slot], made, point=(20.0, 16.0)) == [slot]
@@ -173,7 +198,7 @@ def test_a_channel_ends_once_in_time_or_by_another_order(
 
 
 def test_a_transient_ability_leaves_the_orders_alone(field: Any, trick: Trick) -> None:
-    slot, made = caster(field), ability(field, transient=True)
+    slot, made = caster(field), ability(field, aim=AbilityAim.NONE, transient=True)
     commands.move(field.world, [slot], (20.0, 16.0))
     casting.use(field.world, [slot], made)
     assert trick.effects == [0]

@@ -12,17 +12,26 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import Received, Rejection
+    from khala_protocol.messages import CastView, Received, Rejection
 
 _QUOTES = re.compile("'{3,}")
 
 
 @section("last_actions")
 def last_actions(page: Page) -> Iterator[str]:
-    """Show the calls of the last reply that were carried out."""
-    if page.observation.heard.accepted:
+    """Show the calls of the last reply that were carried out, and what became of casts."""
+    heard = page.observation.heard
+    fates = {cast.call: cast for cast in heard.casts}
+    if heard.accepted or fates:
         yield "Your last actions"
-        yield from (f"{INDENT}accepted: {call}" for call in page.observation.heard.accepted)
+    for call in heard.accepted:
+        fate = fates.pop(call, None)
+        yield f"{INDENT}accepted: {call}{_fate(fate) if fate else ''}"
+    yield from (f"{INDENT}accepted before: {call}{_fate(fate)}" for call, fate in fates.items())
+
+
+def _fate(cast: CastView) -> str:
+    return f": {cast.end}" + (f", {cast.why}" if cast.why else "")
 
 
 @section("rejections")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from khala_bridge.observe.text.page import Page
-    from khala_protocol.messages import ActionSpec, EffectView, Event, OrderView, TeamView, UnitDetails, UnitView
+    from khala_protocol.messages import ActionSpec, EffectView, Event, OrderView, Point, TeamView, UnitDetails, UnitView
 
 MOST = 12
 """Units of a list that are told one by one: of the team's own the weakest, of enemies the nearest. Pages with more than
@@ -239,6 +239,8 @@ def _condition(unit: UnitView) -> str:
         fields += _details(unit.details)
     if unit.buffs:
         fields.append(f"effects {', '.join(unit.buffs)}")
+    if unit.details is not None and unit.details.left_s is not None:
+        fields.append(f"{tenth(unit.details.left_s)} s left")
     return "".join(f" | {field}" for field in fields)
 
 
@@ -256,7 +258,8 @@ def _details(details: UnitDetails) -> Iterator[str]:
 def _skills(details: UnitDetails) -> str:
     """Return the skills that a unit can use now; not part of its condition, since they differ between agents."""
     ready = f" | ready {', '.join(details.ready)}" if details.ready else ""
-    return ready + (f" | not ready {', '.join(details.unready)}" if details.unready else "")
+    waits = [f"{name} ({tenth(left_s)} s)" if left_s else name for name, left_s in details.unready.items()]
+    return ready + (f" | not ready {', '.join(waits)}" if waits else "")
 
 
 def orders(queue: Sequence[OrderView]) -> str:
@@ -279,10 +282,14 @@ def _effect_lines(effects: Sequence[EffectView]) -> list[str]:
     """Return a line for all effects of a kind."""
     lines = []
     for (alliance, name, radius), alike in groupby(effects, lambda e: (e.alliance, e.name, e.radius)):
-        places = ", ".join(point(place) for effect in alike for place in effect.screen)
+        places = ", ".join(_place_of(effect, place) for effect in alike for place in effect.screen)
         wide = f", radius {n(radius)}" if radius else ""
         lines.append(f"{INDENT2}{alliance} {name} at {places}{wide}{_MEANING.get(name, '')}")
     return lines
+
+
+def _place_of(effect: EffectView, place: Point) -> str:
+    return point(place) if effect.left_s is None else f"{point(place)} ({tenth(effect.left_s)} s left)"
 
 
 _MEANING = {"ForceField": ": of ground units, only massive ones pass"}
