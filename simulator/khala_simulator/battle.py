@@ -1,4 +1,4 @@
-"""A battle in this process: orders by tag, game loops, and units as columns, without messages or sockets.
+"""A battle in this process: game loops, and units as columns, without messages or sockets.
 
 It is the game that a client of the game process plays: the same map, seed and orders make the same world, loop for
 loop, and units have the values that an observation has. It is for maps of one agent without fog, such as SMAC's, whose
@@ -15,10 +15,8 @@ from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_simulator.abilities import commands
 from khala_simulator.api import vitals
-from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.game import HostedGame, Setup
 from khala_simulator.api.game_info import known_structures, paths
-from khala_simulator.api.giving import carry_out
 from khala_simulator.api.layers import Frame
 from khala_simulator.api.seat import PlayerSeat
 from khala_simulator.api.sight import look
@@ -26,7 +24,7 @@ from khala_simulator.api.vital_rows import ROWS
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tables.versions import DEFAULT_VERSION
 from khala_simulator.tick import advance
-from khala_simulator.world.world import INDEX_SHIFT, NO_TAG
+from khala_simulator.world.world import INDEX_SHIFT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
-    Point = tuple[float, float]
 
 PLAYER: Final = 1
 ENEMY: Final = 2
@@ -160,6 +157,11 @@ class Battle:
         """Game loops since its begin."""
         return self._world.loop
 
+    @property
+    def world(self) -> World:
+        """The world, to which `khala_simulator.smac.orders` gives orders."""
+        return self._world
+
     def digest(self) -> str:
         """Return the SHA-256 of everything that decides the future."""
         return self._world.digest()
@@ -171,18 +173,6 @@ class Battle:
         return BattleGround(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
 
     # acting -------------------------------------------------------------------------------------------------------
-
-    def order(self, ability: int, tag: int, *, target: int = NO_TAG, point: Point | None = None) -> None:
-        """Order a unit of the player to use an ability, at a unit, a point or nothing; nothing happens if it cannot.
-
-        Args:
-            ability: its id, general or of the unit's type.
-            tag: of the unit.
-            target: tag of the unit that it is aimed at.
-            point: the world point that it is aimed at.
-        """
-        at = None if point is None else (float(np.float32(point[0])), float(np.float32(point[1])))
-        carry_out(self._world, judge(self._world, PLAYER, UnitCommand(ability, (tag,), target, at)))
 
     def kill(self, tags: Iterable[int]) -> None:
         """Kill units of any player; they die in the next loop."""

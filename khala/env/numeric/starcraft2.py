@@ -23,7 +23,8 @@ from khala.env.numeric.names import SmacNames
 from khala.env.numeric.options import options_of
 from khala_simulator.battle import Battle
 from khala_simulator.smac.board import Board
-from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, GOES_ON, MOVES, NO_OP, NOTHING, STOP, WON
+from khala_simulator.smac.orders import give_orders
+from khala_simulator.smac.rules import GOES_ON, NOTHING, WON
 from khala_simulator.smac.scene import BattleScene, SceneLayout
 from khala_simulator.tables.versions import DEFAULT_VERSION
 
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
     Floats32 = NDArray[np.float32]
 
-ATTACK, MOVE, STOP_ORDER, HEAL = 23, 16, 4, 386
 _RESTART_LOOPS: Final = 2
 _MOST_SEED = 2**31
 _OVER: Final = "the episode is over: call reset() first"
@@ -171,8 +171,7 @@ class StarCraft2Env(SmacNames):
             raise ValueError(_OVER)
         scene = self._scene
         scene.take(actions)
-        for agent, action in enumerate(scene.last.tolist()):
-            self._order(agent, action)
+        give_orders(self.battle.world, scene.fighters, scene.last, self.options.move_amount)
         self.battle.advance(self.options.step_mul)
         self._steps += 1
         self.battle.see(scene.fighters)
@@ -188,23 +187,6 @@ class StarCraft2Env(SmacNames):
             if not (0 <= action < self.n_actions and self._scene.masks[agent, action]):
                 can = np.flatnonzero(self._scene.masks[agent]).tolist()
                 raise ValueError(f"agent {agent} cannot perform action {action}: it can perform {can}")
-
-    def _order(self, agent: int, action: int) -> None:
-        fighters = self._scene.fighters
-        tag = int(fighters.tag[agent])
-        if action == NO_OP:
-            return
-        if action == STOP:
-            self.battle.order(STOP_ORDER, tag)
-        elif action < FIRST_TARGET:
-            dx, dy = MOVES[action - FIRST_MOVE]
-            far = self.options.move_amount
-            x, y = fighters.numbers[:2, agent].tolist()
-            self.battle.order(MOVE, tag, point=(x + dx * far, y + dy * far))
-        elif fighters.medivac[agent]:
-            self.battle.order(HEAL, tag, target=int(fighters.tag[action - FIRST_TARGET]))
-        else:
-            self.battle.order(ATTACK, tag, target=int(fighters.tag[self.n_agents + action - FIRST_TARGET]))
 
     def _outcome(self) -> tuple[float, bool, dict[str, Any]]:
         """Return what `step` returns, and count the battle if it is over."""

@@ -91,11 +91,11 @@ def meant(world: World, slot: int, requested: int) -> Ability | None:
 
 def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, ActionResult | None]:
     """Return the result of ``meant``, and whether the unit can use it now; None where that was not checked."""
-    exact, forms = _forms(world.catalog, columns.columns_of(world).type[slot], requested)
+    exact, kinds = forms(world.catalog, columns.columns_of(world).type[slot], requested)
     if exact is not None:
         return exact, None
     first: tuple[Ability | None, ActionResult | None] = None, None
-    for ability in forms:
+    for ability in kinds:
         why = casting.refusal(world, slot, ability)
         if why is ActionResult.SUCCESS:
             return ability, why
@@ -104,7 +104,7 @@ def _meant(world: World, slot: int, requested: int) -> tuple[Ability | None, Act
 
 
 @lru_cache(maxsize=4096)
-def _forms(catalog: Catalog, row: int, requested: int) -> tuple[Ability | None, tuple[Ability, ...]]:
+def forms(catalog: Catalog, row: int, requested: int) -> tuple[Ability | None, tuple[Ability, ...]]:
     """Return the ability on a type's card with this id, or else those that a general id may mean."""
     card = catalog.abilities_of(row) if requested > 0 else ()
     exact = next((a for a in card if a.id == requested), None)

@@ -23,12 +23,15 @@ from khala_simulator.battle import ENEMY, PLAYER, Battle
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.process.client import Client, command
 from khala_simulator.process.replay import Replay
+from khala_simulator.smac.orders import give_orders
 from khala_simulator.tables.versions import DEFAULT_VERSION
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from khala_simulator.battle import Point, Units
+    from khala_simulator.battle import Units
+    from khala_simulator.smac.fighters import Fighters
+    from khala_simulator.world.world import World
 
 EPISODES = 200
 """Of all maps together, through PySC2."""
@@ -112,10 +115,6 @@ def mirrored(door: Door) -> type[Battle]:
             door.begin(map_name, seed)
             self.compare()
 
-        def order(self, ability: int, tag: int, *, target: int = 0, point: Point | None = None) -> None:
-            super().order(ability, tag, target=target, point=point)
-            door.act(command(ability, [tag], target=target or None, point=point))
-
         def kill(self, tags: Iterable[int]) -> None:
             tags = list(tags)
             super().kill(tags)
@@ -136,6 +135,22 @@ def mirrored(door: Door) -> type[Battle]:
                 np.testing.assert_array_equal(columns(ours, own=player == PLAYER), read(theirs, own=player == PLAYER))
 
     return Mirrored
+
+
+def orders_of(fighters: Fighters, actions: Sequence[int], far: float) -> Iterator[sc.Action]:
+    """Yield the orders that SMAC's package sends for some actions: 2 to 5 walk, from 6 on attack, a Medivac heals."""
+    for agent, action in enumerate(actions):
+        tag = int(fighters.tag[agent])
+        if action == 1:
+            yield command(4, [tag])
+        elif 2 <= action <= 5:
+            x, y = fighters.numbers[:2, agent].tolist()
+            dx, dy = ((0, far), (0, -far), (far, 0), (-far, 0))[action - 2]
+            yield command(16, [tag], point=(x + dx, y + dy))
+        elif action >= 6 and fighters.medivac[agent]:
+            yield command(386, [tag], target=int(fighters.tag[action - 6]))
+        elif action >= 6:
+            yield command(23, [tag], target=int(fighters.tag[fighters.agents + action - 6]))
 
 
 def columns(units: Units, *, own: bool) -> np.ndarray[Any, Any]:
@@ -163,7 +178,14 @@ def read(units: Iterable[Any], *, own: bool) -> np.ndarray[Any, Any]:
 
 def played(door: Door, name: str, episodes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Play random episodes in both places; after each, the worlds are the same."""
+
+    def give(world: World, fighters: Fighters, actions: np.ndarray[Any, Any], far: float) -> None:
+        give_orders(world, fighters, actions, far)
+        for order in orders_of(fighters, actions.tolist(), far):
+            door.act(order)
+
     monkeypatch.setattr(starcraft2, "Battle", mirrored(door))
+    monkeypatch.setattr(starcraft2, "give_orders", give)
     env, rng, ends = StarCraft2Env(name, seed=7), np.random.default_rng(7), []
     for _ in range(episodes):
         env.reset()
