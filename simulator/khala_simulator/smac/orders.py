@@ -1,7 +1,7 @@
 """The orders of SMAC's agents, one for each in a step, given as the API gives them.
 
 A unit whose type has the order itself on its card, as almost all have, gets it here without a message; every other
-order goes through `khala_simulator.api.abilities`. Both make the same world. Above: `khala.env.numeric`. Below:
+order goes through `khala_simulator.api.abilities`. Both make the same world. Above: `khala_sc2.env.numeric`. Below:
 `khala_simulator.api`, `khala_simulator.abilities`.
 """
 
