@@ -1,4 +1,4 @@
-"""Replays for tests: a recording in place of the agents, or of the game; `khala_sc2.pytest_plugin` has them as fixtures.
+"""Replays for tests: a recording in place of the agents or the game; `khala_sc2.pytest_plugin` has them as fixtures.
 
     differences = await replay_host("golden.mcap")      recorded replies → host, bridge and game
     differences = await replay_agents("golden.mcap")    recorded observations → workers and prompts

@@ -121,8 +121,8 @@ def _name(process: psutil.Process) -> str:
     known = {
         "khala_simulator": "game",
         "khala_sc2.playing.spare": "agents",
-        "khala agent": "agents",
-        "khala llm": "endpoint",
+        "khala_sc2 agent": "agents",
+        "khala_sc2 llm": "endpoint",
     }
     return next((name for mark, name in known.items() if mark in line), "host")
 

@@ -23,8 +23,8 @@ def page() -> str:
     return join(
         head("Measures", "`khala_sc2/experiment/measures`"),
         "The numbers of an experiment: a row for each episode and side, found from its recording alone with "
-        "`khala_sc2.experiment.measures.measure`. Every column is a text, a number, true or false, or null, so that a row "
-        "fits into SQLite and Parquet.",
+        "`khala_sc2.experiment.measures.measure`. Every column is a text, a number, true or false, or null, so that a "
+        "row fits into SQLite and Parquet.",
         *(block for group in GROUPS for block in _section(group)),
     )
 

@@ -1,7 +1,7 @@
-"""What agents can say, chosen and printed: the work of `khala actions`, whose options are in `khala_sc2.commands.actions`.
+"""What agents can say, chosen and printed: the work of `khala actions`.
 
-It loads no PySC2. A mistake of the user is raised as a `ConfigError` of one sentence, as in the other
-commands; `khala_sc2.cli` prints it.
+`khala_sc2.commands.actions` has its options. This module loads no PySC2. A mistake of the user is raised as a
+`ConfigError` of one sentence, as in the other commands; `khala_sc2.cli` prints it.
 """
 
 from __future__ import annotations

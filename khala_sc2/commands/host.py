@@ -1,7 +1,7 @@
 """The work of `khala host` and `khala doctor`, and the end of `khala run`, which `khala_sc2.commands.run` begins.
 
-`khala_sc2.cli` above has the options. It imports this module only to run a command: tasks and messages take half a second
-to import, and `--help` need not wait for that.
+`khala_sc2.cli` above has the options. It imports this module only to run a command: tasks and messages take half a
+second to import, and `--help` need not wait for that.
 """
 
 from __future__ import annotations

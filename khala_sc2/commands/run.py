@@ -2,8 +2,8 @@
 
 To import what a match needs takes this process a second and a half, that of the agents one second, and the game half a
 second. So the others are started first, with what is known by then: agents as a process that waits to be told which
-ones to be, the game as one that has no map yet. `khala_sc2.cli` is above, and `khala_sc2.commands.run_options` declares the
-options; `khala_sc2.playing.local` plays the match.
+ones to be, the game as one that has no map yet. `khala_sc2.cli` is above, and `khala_sc2.commands.run_options` declares
+the options; `khala_sc2.playing.local` plays the match.
 """
 
 from __future__ import annotations

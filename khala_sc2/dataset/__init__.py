@@ -14,6 +14,6 @@
     export    all of it, for the command `khala dataset export`
     replay    a policy that gives the replies of a data set
 
-Above it is `khala_sc2.cli`. Everything is read and written row by row, so the size of recordings does not matter. pyarrow,
-the extra `data`, is imported only where Parquet is written or read.
+Above it is `khala_sc2.cli`. Everything is read and written row by row, so the size of recordings does not matter.
+pyarrow, the extra `data`, is imported only where Parquet is written or read.
 """

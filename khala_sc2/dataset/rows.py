@@ -1,8 +1,8 @@
 """A recording → one row for each decision of an agent whose reply counted.
 
 A row is complete when the report of its decision came, and, if its agent asked a model, the request: requests travel
-on their own topic and may arrive some steps later. Until then rows wait, a bounded number of them. Above: `khala.
-dataset.export`; below: the recording, `khala_sc2.dataset.rewards` and `khala_sc2.dataset.prompts`.
+on their own topic and may arrive some steps later. Until then rows wait, a bounded number of them. Above:
+`khala_sc2.dataset.export`; below: the recording, `khala_sc2.dataset.rewards` and `khala_sc2.dataset.prompts`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The work of `khala experiment run`, `resume`, `list`, `show`, `status` and `index`.
 
-`khala_sc2.experiment.cli` above has the options. It imports this module only to run a command: tasks and PySC2's names take
-a second to import, and `--help` need not wait for that.
+`khala_sc2.experiment.cli` above has the options. It imports this module only to run a command: tasks and PySC2's names
+take a second to import, and `--help` need not wait for that.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The rows of an experiment's index: its tables, how a match is noted in them, and how they are read.
 
-`khala_sc2.experiment.store` above owns the file; `khala_sc2.indexes` below makes it again when it is broken. Whatever stands in
-a row is checked when it is read, as the file may be anyone's.
+`khala_sc2.experiment.store` above owns the file; `khala_sc2.indexes` below makes it again when it is broken. Whatever
+stands in a row is checked when it is read, as the file may be anyone's.
 """
 
 from __future__ import annotations

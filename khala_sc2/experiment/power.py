@@ -1,7 +1,7 @@
 """How many games are needed, before any or with some played: for an interval so wide, to tell two conditions apart.
 
-Pure functions of shares, on the intervals and tests of `khala_sc2.experiment.statistics`. All return the whole number of
-games, those already played included.
+Pure functions of shares, on the intervals and tests of `khala_sc2.experiment.statistics`. All return the whole number
+of games, those already played included.
 """
 
 from __future__ import annotations

@@ -8,6 +8,6 @@ figures   what became of them: numbers with intervals, and tables
 scan      at which steps it matters most who decides
 recorded  the recorded future, played once more
 
-`khala_orchestrator.past.fork` is below, which makes the beginning of a fork, and `khala_sc2.experiment.engine`, which plays
-it.
+`khala_orchestrator.past.fork` is below, which makes the beginning of a fork, and `khala_sc2.experiment.engine`, which
+plays it.
 """

@@ -1,7 +1,7 @@
 """The solver: the model plays all agents of the first side of a match, each with its own observations and memory.
 
-Above: `khala_sc2.inspect.tasks`. Below: `khala_sc2.playing.seats`, which plays the match, and `khala_agents.llm_policy`, which
-makes the prompts, so that a model reads here what it reads in any other match.
+Above: `khala_sc2.inspect.tasks`. Below: `khala_sc2.playing.seats`, which plays the match, and
+`khala_agents.llm_policy`, which makes the prompts, so that a model reads here what it reads in any other match.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 RESULT, RECORDING = "khala_result", "khala_recording"
 """What the store of a sample has afterwards: the result of its episode, and the path of its recording."""
 MATCH = "khala_match"
-"""What a sample is to play, in its metadata: the task, the seed, and further options of `khala_sc2.playing.matches.new`."""
+"""What a sample is to play, in its metadata: task, seed and further options of `khala_sc2.playing.matches.new`."""
 
 
 @solver

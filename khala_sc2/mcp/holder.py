@@ -1,7 +1,8 @@
 """Who plays a seat: one client at a time, so that no other acts for it unnoticed. A machine without input or output.
 
-Above: `khala_sc2.mcp.server`. Clients of older protocol versions have sessions, whose identifier names them. Newer versions
-have none; there the cookie that `khala_sc2.mcp.serve` gives each client names it. All clients without cookies are one.
+Above: `khala_sc2.mcp.server`. Clients of older protocol versions have sessions, whose identifier names them. Newer
+versions have none; there the cookie that `khala_sc2.mcp.serve` gives each client names it. All clients without cookies
+are one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One seat as an MCP server: tools to observe, act, write and look up, resources for the briefing and the pictures.
 
-Above: `khala_sc2.mcp.serve`, which connects it. Below: `khala_sc2.mcp.table`, and the official SDK. A seat is a server of its
-own, with an address of its own: protocol versions from 2026-07-28 on have no sessions that could hold one.
+Above: `khala_sc2.mcp.serve`, which connects it. Below: `khala_sc2.mcp.table`, and the official SDK. A seat is a server
+of its own, with an address of its own: protocol versions from 2026-07-28 on have no sessions that could hold one.
 """
 
 from __future__ import annotations

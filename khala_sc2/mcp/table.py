@@ -1,6 +1,7 @@
 """A match whose seats are played by sessions, each at its own pace.
 
-Above: `khala_sc2.mcp.server`, which gives one seat to an MCP client. Below: `khala_sc2.playing.seats`, which plays the match.
+Above: `khala_sc2.mcp.server`, which gives one seat to an MCP client. Below: `khala_sc2.playing.seats`, which plays the
+match.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """One session of OpenEnv: a match, some of whose agents the client plays.
 
 The match is played by the host of every other match; a step lasts until somebody is asked again. Above:
-`khala_sc2.openenv.server`. Below: `khala_sc2.openenv.settings`, which makes the match, and `khala_sc2.playing.seats`, which plays
-it.
+`khala_sc2.openenv.server`. Below: `khala_sc2.openenv.settings`, which makes the match, and `khala_sc2.playing.seats`,
+which plays it.
 """
 
 from __future__ import annotations

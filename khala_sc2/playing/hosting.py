@@ -1,7 +1,7 @@
 """A match on an open bus: its game and its host, and both once more if the game is lost.
 
-`khala_sc2.playing.local` and `khala host` are above; they bring the bus and the agents, which stay while a game is started
-again.
+`khala_sc2.playing.local` and `khala host` are above; they bring the bus and the agents, which stay while a game is
+started again.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Matches in a process of their own, as its parent sees them: a job goes in, and how it ended comes out.
 
-Each job is a line of JSON on the stdin of the process, and each ending a line on its stdout. `khala_sc2.playing.worker` is
-the process. Above: experiments, whose processes play many matches, and the service, whose processes play one.
+Each job is a line of JSON on the stdin of the process, and each ending a line on its stdout. `khala_sc2.playing.worker`
+is the process. Above: experiments, whose processes play many matches, and the service, whose processes play one.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class MatchWorker:
 
     @classmethod
     async def start(cls, *options: str, log: Path | None = None) -> Self:
-        """Start a process with these options of `khala_sc2.playing.worker`; `log` gets its stderr, ours if it is None."""
+        """Start a process with these options of `khala_sc2.playing.worker`; `log` gets its stderr; None: ours."""
         process = await start_process("khala_sc2.playing.worker", *options, environ=os.environ, log=log, piped=True)
         return cls(process, log)
 

@@ -5,8 +5,9 @@
             for seat, seen in turn.asked.items():
                 match.act(seat, reply_to(seen.observation.text))
 
-The match is one of `khala_sc2.playing.one_process`: the same host, the same workers, the same recording. Only the policy of
-a seat waits for the caller. Above it are doors of other tools, such as an environment for reinforcement learning.
+The match is one of `khala_sc2.playing.one_process`: the same host, the same workers, the same recording. Only the
+policy of a seat waits for the caller. Above it are doors of other tools, such as an environment for reinforcement
+learning.
 """
 
 from __future__ import annotations

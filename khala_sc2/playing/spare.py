@@ -2,8 +2,8 @@
 
 To import it takes a process a second of a free core, and more on a busy machine; what it then becomes is `khala agent`
 with the same arguments and environment as one that is started for the purpose. Each is for one use. `khala run` starts
-one before it imports anything itself; a worker of `khala serve` has some in stock. `python -m khala_sc2.playing.spare` is
-the process; `Spares` is the stock that its parent keeps.
+one before it imports anything itself; a worker of `khala serve` has some in stock. `python -m khala_sc2.playing.spare`
+is the process; `Spares` is the stock that its parent keeps.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ NEEDED = ("khala_sc2.cli", "khala_agents.commands", "khala_agents.llm.transport"
 
 
 class Spares:
-    """A stock of processes, as a `khala_sc2.playing.children.Spawn`; leaving the context ends those that nobody took."""
+    """A stock of processes, as a `khala_sc2.playing.children.Spawn`; leaving the context ends those left over."""
 
     def __init__(self, count: int) -> None:
         self._count = count

@@ -1,7 +1,7 @@
-"""The process that plays matches, one after the other: it reads jobs and writes endings, as `khala_sc2.playing.jobs` says.
+"""The process that plays matches, one by one: it reads jobs and writes endings, as `khala_sc2.playing.jobs` says.
 
-The agents decide in this process (`khala_sc2.playing.one_process`), unless the job wants processes for them. It keeps its
-game from match to match, and ends when its stdin does.
+The agents decide in this process (`khala_sc2.playing.one_process`), unless the job wants processes for them. It keeps
+its game from match to match, and ends when its stdin does.
 
 With `--live` it is for a match that somebody waits for. It gets ready before it knows which: it imports everything, and
 starts a process of the game, which takes any map, and `--spares` processes for agents.

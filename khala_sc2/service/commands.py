@@ -1,7 +1,7 @@
 """The work of `khala serve` and of the commands that ask it.
 
-`khala_sc2.service.cli` above has the options. It imports this module only to run a command: the bus and the messages take
-half a second to import, and `--help` need not wait for that.
+`khala_sc2.service.cli` above has the options. It imports this module only to run a command: the bus and the messages
+take half a second to import, and `--help` need not wait for that.
 """
 
 from __future__ import annotations

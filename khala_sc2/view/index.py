@@ -1,7 +1,7 @@
 """The index of a recording: where each sample lies, and what the time line is drawn from, in SQLite.
 
-`khala_sc2.view.scan` writes it while it reads the recording; answers read it and then only the chunks that they need. It
-holds nothing that the recording does not: an index that is broken, or of another file, is made again. Two viewers of
+`khala_sc2.view.scan` writes it while it reads the recording; answers read it and then only the chunks that they need.
+It holds nothing that the recording does not: an index that is broken, or of another file, is made again. Two viewers of
 one recording share it: one of them writes, the other waits until that one stops.
 
 It is in the user's cache directory, under the hash of the recording's path, and never beside the recording: whoever

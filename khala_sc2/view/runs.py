@@ -1,6 +1,7 @@
 """A recording that was opened: its index, the thread that keeps that up to date, and every answer of its paths.
 
-Answers are bytes of JSON, made in threads: `khala_sc2.view.server` sends them, `khala_sc2.view.export` keeps them in a file.
+Answers are bytes of JSON, made in threads: `khala_sc2.view.server` sends them, `khala_sc2.view.export` keeps them in a
+file.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The table of an experiment, with a way to each recording.
 
-Nothing is computed here that a report does not compute: see `khala_sc2.experiment.report`, which takes a second to load.
+Nothing is computed here that a report does not compute: see `khala_sc2.experiment.report`, which takes a second to
+load.
 """
 
 from __future__ import annotations

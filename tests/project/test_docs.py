@@ -162,7 +162,7 @@ async def check_policy(policy: Policy, scene: tuple[Briefing, Observation]) -> N
 
 
 def double(fixture: str) -> Callable[..., Any]:
-    """Return a fixture of `khala_sc2.pytest_plugin` that finds no difference, if it is called as the real one may be."""
+    """Return a fixture of `khala_sc2.pytest_plugin` that finds no difference, if it is called like the real one."""
     real = inspect.signature(getattr(testing, fixture))
 
     async def find_none(*args: Any, **kwargs: Any) -> list[object]:

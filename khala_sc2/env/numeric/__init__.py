@@ -93,9 +93,9 @@ def vector_env(
         threads: how many battles play at the same time. More than one: each of these is a process of its own, because
             the engine holds Python's lock; then the memory of all of them is shared, and no number goes through a pipe.
         autoreset_mode: when an episode begins whose predecessor is over, in Gymnasium's words.
-        buffers: arrays of the caller that are written in each step, by the names of `khala_sc2.env.numeric.batch.shapes`:
-            `{"observation": array, "reward": array}`. NumPy's, or what shares its memory with NumPy, such as a tensor
-            of torch. Without them, each step returns new arrays.
+        buffers: arrays of the caller that are written in each step, by the names of
+            `khala_sc2.env.numeric.batch.shapes`: `{"observation": array, "reward": array}`. NumPy's, or what shares
+            its memory with NumPy, such as a tensor of torch. Without them, each step returns new arrays.
         max_cycles: steps of an episode; None: as many as in SMAC.
         **options: see `khala_sc2.env.numeric.options.Options`.
 

@@ -1,8 +1,8 @@
 """A batch of battles that are stepped together, into arrays of the caller.
 
 Each battle is a `StarCraft2Env`, so that its numbers are SMAC's to the bit; a step makes no array and no object for
-each agent. Battles whose episode is over begin the next one by themselves. Above: `khala_sc2.env.numeric.workers`. Below:
-`khala_sc2.env.numeric.starcraft2`.
+each agent. Battles whose episode is over begin the next one by themselves. Above: `khala_sc2.env.numeric.workers`.
+Below: `khala_sc2.env.numeric.starcraft2`.
 """
 
 from __future__ import annotations

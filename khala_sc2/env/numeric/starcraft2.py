@@ -6,7 +6,8 @@
 
 The order of what happens is SMAC's own, down to the game loops in which an episode begins, so that the same seed and
 actions make the same worlds as SMAC's package on the simulator's server. Above: the environments of other interfaces.
-Below: `khala_sc2.env.numeric.forces`, `khala_sc2.env.numeric.rewards`, `khala_simulator.smac`, `khala_simulator.battle`.
+Below: `khala_sc2.env.numeric.forces`, `khala_sc2.env.numeric.rewards`, `khala_simulator.smac`,
+`khala_simulator.battle`.
 """
 
 from __future__ import annotations

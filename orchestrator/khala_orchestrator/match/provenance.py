@@ -13,7 +13,8 @@ import psutil
 from khala_protocol.platforms import cores
 
 PACKAGES = (
-    "khala_sc2", "khala_agents", "khala_bridge", "khala_configs", "khala_orchestrator", "khala_protocol", "khala_simulator",
+    "khala_sc2", "khala_agents", "khala_bridge", "khala_configs",
+    "khala_orchestrator", "khala_protocol", "khala_simulator",
 )  # fmt: skip
 
 SUFFIXES = frozenset({".py", ".pxd", ".pyx"})
