@@ -17,8 +17,11 @@ COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 # What people install is typed as macOS and Windows have it; tests skip there what they lack, and bench runs on Linux.
 INSTALLED := agents bridge configs khala_sc2 orchestrator protocol simulator
+# What `make wheels` builds, and where
+DISTRIBUTIONS := khala-sc2 khala-sc2-agents khala-sc2-bridge khala-sc2-configs khala-sc2-orchestrator khala-sc2-protocol khala-sc2-simulator
+DIST ?= dist
 
-.PHONY: help install install-tests check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,6 +54,14 @@ ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(fil
 install: .venv/.ready ## Install what is needed to play into .venv
 
 install-tests: .venv/.tests ## Install what the tests need as well
+
+extras: install ## Install what environments, data sets, Inspect, `khala mcp` and `khala openenv` need as well
+	$(UV) sync --quiet --frozen --inexact --python $(PYTHON) --extra data --extra env --extra inspect --extra mcp --extra openenv
+
+wheels: $(filter .uv/bin/uv,$(UV)) ## Build a wheel of every distribution into dist/; make wheels PYTHON=python3.12 for another Python
+	for distribution in $(DISTRIBUTIONS); do \
+	  $(UV) build --quiet --wheel --python $(PYTHON) --package $$distribution --out-dir $(DIST) || exit 1; \
+	done
 
 demo: install ## Play a battle on this machine: simulator, host, two agents, scripted model; then without orders
 	$(RUN)khala run 2s3z_pair --seed 2

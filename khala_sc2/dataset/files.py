@@ -8,7 +8,8 @@ from enum import StrEnum
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from khala_protocol.errors import ConfigError, RecordingError
+from khala_protocol.errors import RecordingError
+from khala_protocol.extras import needs
 from khala_protocol.files import MB, make_private, open_private, write_private
 from khala_sc2.dataset import forms
 
@@ -192,13 +193,11 @@ def import_pyarrow() -> tuple[Any, Any]:
     """Return pyarrow and its module for Parquet.
 
     Raises:
-        ConfigError: it is not installed.
+        NotInstalled: it is not there.
     """
-    try:
+    with needs("data", source="Parquet"):
         import pyarrow  # type: ignore[import-untyped]  # noqa: PLC0415, ICN001  # an extra
         import pyarrow.parquet  # type: ignore[import-untyped]  # noqa: PLC0415
-    except ImportError:
-        raise ConfigError('Parquet needs pyarrow, which is not installed: pip install "khala-sc2[data]"') from None
     return pyarrow, pyarrow.parquet
 
 

@@ -8,10 +8,11 @@ from functools import lru_cache
 from importlib import import_module
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.llm.client import estimated_text_tokens
 from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -103,7 +104,8 @@ def token_counter(name: str | None) -> TokenCounter:
 
 
 def _tiktoken(name: str) -> TokenCounter:
-    tiktoken = _import("tiktoken", "tiktoken")
+    with needs("data", source="--tokenizer"):
+        tiktoken = import_module("tiktoken")
     try:
         encoding = tiktoken.get_encoding(name.removeprefix(TIKTOKEN))
     except Exception as error:  # noqa: BLE001  # tiktoken raises ValueError, and what its download raises
@@ -112,7 +114,8 @@ def _tiktoken(name: str) -> TokenCounter:
 
 
 def _tokenizers(name: str) -> TokenCounter:
-    tokenizer_class = _import("tokenizers", '"khala-sc2[data]"').Tokenizer
+    with needs("data", source="--tokenizer"):
+        tokenizer_class = import_module("tokenizers").Tokenizer
     is_file = Path(name).is_file()
     try:
         tokenizer = tokenizer_class.from_file(name) if is_file else tokenizer_class.from_pretrained(name)
@@ -121,17 +124,6 @@ def _tokenizers(name: str) -> TokenCounter:
         raise _no_tokenizer(name, error, advice) from None
     shown = Path(name).name if is_file else name
     return TokenCounter(f"counted by {shown}", lambda text: len(tokenizer.encode(text, add_special_tokens=False).ids))
-
-
-def _import(package: str, wanted: str) -> Any:
-    try:
-        return import_module(package)
-    except ImportError:
-        raise ConfigError(
-            f"needs the package {package}, which is not installed: pip install {wanted}. Without the option, lengths "
-            "are estimated",
-            source="--tokenizer",
-        ) from None
 
 
 def _no_tokenizer(name: str, error: Exception, advice: str) -> ConfigError:

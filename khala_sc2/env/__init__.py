@@ -1,4 +1,4 @@
-"""Environments for reinforcement learning, by PettingZoo and Gymnasium; `pip install 'khala-sc2[env]'`.
+"""Environments for reinforcement learning, by PettingZoo and Gymnasium. They need the extra `env`.
 
 env = khala_sc2.env.parallel_env("2s3z_pair")      any task in words, as its agents play it over the bus
 env = khala_sc2.env.numeric.parallel_env("3m")     SMAC's maps in numbers, as fast as the simulator goes
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
-
+from khala_protocol.extras import needs
 from khala_sc2.env.rewards import battle
-from khala_sc2.env.text import TextParallelEnv
+
+with needs("env", source="khala_sc2.env"):
+    from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
+
+    from khala_sc2.env.text import TextParallelEnv
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

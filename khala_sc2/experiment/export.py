@@ -6,7 +6,7 @@ import csv
 import io
 from typing import TYPE_CHECKING, Any
 
-from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 from khala_protocol.files import replacing, write_private
 from khala_sc2.experiment.measures import Measures
 from khala_sc2.experiment.plan import FACTOR
@@ -35,13 +35,11 @@ def write_parquet(store: Store, path: Path) -> int:
     """Write the rows as Parquet, each column with its type, and return their number.
 
     Raises:
-        ConfigError: pyarrow is not installed.
+        NotInstalled: pyarrow is not there.
     """
-    try:
-        import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415  # of the extra `data`
+    with needs("data", source="--parquet"):
+        import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415  # or --csv, which needs no package
         from pyarrow import parquet  # noqa: PLC0415
-    except ImportError:
-        raise ConfigError("Parquet needs pyarrow: pip install 'khala-sc2[data]', or give --csv") from None
     columns, rows = table(store)
     kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
     schema = pa.schema([(name, kinds[kind]) for name, kind in columns.items()])

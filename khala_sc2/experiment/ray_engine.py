@@ -18,19 +18,18 @@ from typing import TYPE_CHECKING, Any, Self
 
 from khala_agents.llm.money import SUFFIX, MoneyLedger
 from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 from khala_sc2.experiment.engine import MATCH_MB, MATCHES_OF_A_PROCESS, slots_of_this_machine
 from khala_sc2.playing import logs, worker
 from khala_sc2.playing.jobs import END_S, Ended, Job
 
-try:
+with needs("ray", source="--on ray"):
     import fsspec  # type: ignore[import-untyped]  # it has no types
     import ray
     from ray.exceptions import RayError
 
     from khala_sc2.experiment.ray_limits import endpoints, gates_at
     from khala_sc2.experiment.ray_node import RETRY_S, START_S, running_head
-except ModuleNotFoundError as error:
-    raise ConfigError(f"there is no {error.name}: pip install 'khala-sc2[ray]'", source="--on ray") from None
 
 if TYPE_CHECKING:
     from types import TracebackType

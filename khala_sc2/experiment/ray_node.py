@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import importlib.util
 import os
 import signal
 import socket
@@ -17,6 +18,7 @@ import time
 from typing import TYPE_CHECKING
 
 from khala_protocol.errors import ConfigError
+from khala_protocol.extras import not_installed
 from khala_sc2.experiment.engine import MATCH_MB, slots_of_this_machine
 
 if TYPE_CHECKING:
@@ -72,8 +74,8 @@ def join(address: str, jobs: int | None) -> None:
     Raises:
         ConfigError: the address is no address, or Ray is not installed.
     """
-    if subprocess.run([sys.executable, "-c", "import ray"], check=False, capture_output=True).returncode:
-        raise ConfigError("there is no ray: pip install 'khala-sc2[ray]'", source="khala experiment join")
+    if importlib.util.find_spec("ray") is None:
+        raise not_installed("ray", "ray", source="khala experiment join")
     host, port = split_address(address)
     signal.signal(signal.SIGTERM, _interrupt)
     while not _is_open(host, port):

@@ -7,3 +7,8 @@
 
 It needs the extra `inspect`. Below it: `khala_sc2.playing.seats`.
 """
+
+from khala_protocol.extras import needs
+
+with needs("inspect", source="khala_sc2.inspect"):
+    import inspect_ai  # noqa: F401  # every module here needs it

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 from khala_protocol.trust import trust_named
 from khala_sc2.mcp.table import Table
 from khala_sc2.playing.matches import new
@@ -40,12 +41,8 @@ def run_mcp(wanted: WantedSeats) -> None:
     Raises:
         ConfigError: an option is wrong, or the SDK is not installed.
     """
-    try:
-        from khala_sc2.mcp.serve import over_http, over_stdio  # noqa: PLC0415  # of the extra `mcp`
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"there is no module {error.name}: pip install 'khala-sc2[mcp]'", source="khala mcp"
-        ) from None
+    with needs("mcp", source="khala mcp"):
+        from khala_sc2.mcp.serve import over_http, over_stdio  # noqa: PLC0415
     table = table_of(wanted)
     asyncio.run(over_stdio(table) if wanted.port is None else over_http(table, wanted.port))
 

@@ -17,11 +17,14 @@ import os
 from typing import Any, Self
 from urllib.parse import quote
 
-from openenv.core.client_types import StepResult
-from openenv.core.env_client import EnvClient
-from websockets.exceptions import ConnectionClosed
+from khala_protocol.extras import needs
 
-from khala_sc2.openenv.models import KhalaAction, KhalaObservation, KhalaState
+with needs("openenv", source="khala_sc2.openenv.client"):
+    from openenv.core.client_types import StepResult
+    from openenv.core.env_client import EnvClient
+    from websockets.exceptions import ConnectionClosed
+
+    from khala_sc2.openenv.models import KhalaAction, KhalaObservation, KhalaState
 
 __all__ = ["KhalaAction", "KhalaEnv", "KhalaObservation", "KhalaState"]
 

@@ -10,6 +10,7 @@ from khala_agents.build import load_attribute
 from khala_orchestrator.config import load_task
 from khala_protocol.commandline import say
 from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 from khala_protocol.listening import bind
 from khala_protocol.trust import trust_named
 from khala_sc2.playing.minds import Minds
@@ -46,14 +47,10 @@ def run_openenv(wanted: WantedServer) -> None:
     Raises:
         ConfigError: an option is wrong, or OpenEnv is not installed.
     """
-    try:
-        import uvicorn  # noqa: PLC0415  # of the extra `openenv`, as all below it
+    with needs("openenv", source="khala openenv"):
+        import uvicorn  # noqa: PLC0415
 
         from khala_sc2.openenv.server import app_of, openenv_door, server_config  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"there is no module {error.name}: pip install 'khala-sc2[openenv]'", source="khala openenv"
-        ) from None
     door = openenv_door(wanted.host, is_open=wanted.is_open)
     app = app_of(settings_of(wanted), sessions=wanted.sessions, idle_s=wanted.idle_s, door=door)
     with bind(wanted.host, wanted.port) as listening:

@@ -16,7 +16,7 @@ from opentelemetry.sdk.trace import TracerProvider
 from opentelemetry.sdk.trace.export import BatchSpanProcessor
 from opentelemetry.trace import StatusCode
 
-from khala_protocol.errors import ConfigError
+from khala_protocol.extras import needs
 from khala_protocol.messages import ModelCall, Report, count_refusals
 
 if TYPE_CHECKING:
@@ -138,12 +138,10 @@ def otlp(endpoint: str | None) -> SpanProcessor:
     """Return what sends spans to an endpoint; None: the one of the variables OTEL_EXPORTER_OTLP_….
 
     Raises:
-        ConfigError: the exporter is not installed.
+        NotInstalled: the exporter is not there.
     """
-    try:
-        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter  # noqa: PLC0415  # an extra
-    except ImportError:
-        raise ConfigError("traces need the exporter: pip install 'khala-sc2[otlp]'", source="--otlp") from None
+    with needs("otlp", source="--otlp"):
+        from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter  # noqa: PLC0415
     url = f"{endpoint.rstrip('/')}/v1/traces" if endpoint else None
     return BatchSpanProcessor(OTLPSpanExporter(endpoint=url))
 

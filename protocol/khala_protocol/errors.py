@@ -2,6 +2,7 @@
 
     KhalaError
     ├── ConfigError          the user's: a file, an option, an environment variable
+    │   └── NotInstalled     a package of an extra is missing, see `khala_protocol.extras`
     ├── BusError             the link's: no router, refused, closed
     │   ├── NoRouter         nothing that could be joined is there
     │   └── BusClosed        the bus was closed, here or by the other side

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -50,9 +49,3 @@ def test_a_taken_port_is_said(tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=rf"^--port: cannot listen on 127.0.0.1:{port}: "):
             run_mcp(wanted(tmp_path, port=port))
-
-
-def test_without_the_sdk_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala_sc2.mcp.serve", None)
-    with pytest.raises(ConfigError, match=r"pip install 'khala-sc2\[mcp\]'$"):
-        run_mcp(wanted(tmp_path))

@@ -90,9 +90,9 @@ def _usable(url: str, source: str) -> Proxy:
     if parts.scheme not in _KINDS or not parts.hostname:
         raise ConfigError(f"a proxy of the kind {parts.scheme!r} cannot be used: {', '.join(_KINDS)}", source=variable)
     if parts.scheme in _SOCKS and importlib.util.find_spec("socksio") is None:
-        raise ConfigError(
-            "a SOCKS proxy needs a package that is not installed: `pip install 'khala-sc2[socks]'`", source=variable
-        )
+        from khala_protocol.extras import not_installed  # noqa: PLC0415  # reads metadata, which takes time
+
+        raise not_installed("socks", "socksio", source=variable)
     return Proxy(url, source)
 
 

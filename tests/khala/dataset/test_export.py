@@ -394,7 +394,7 @@ def test_without_pyarrow_the_extra_is_named(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ConfigError, match=r'pip install "khala-sc2\[data\]"'):
+    with pytest.raises(ConfigError, match=r"^Parquet: pyarrow is not installed; this installs it: "):
         export([recording.path], tmp_path / "out", Recipe((RowForm.PARQUET,)))
     assert export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,))).rows["train"]
 

@@ -96,15 +96,10 @@ def test_tiktoken_counts_a_marker_of_its_own_as_text(monkeypatch: pytest.MonkeyP
         token_counter("tiktoken:none")
 
 
-@pytest.mark.parametrize(
-    ("name", "package", "wanted"),
-    [("tokenizer.json", "tokenizers", r'"khala-sc2\[data\]"'), ("tiktoken:o200k_base", "tiktoken", "tiktoken")],
-)
-def test_a_package_that_is_missing_is_named(
-    monkeypatch: pytest.MonkeyPatch, name: str, package: str, wanted: str
-) -> None:
+@pytest.mark.parametrize(("name", "package"), [("tokenizer.json", "tokenizers"), ("tiktoken:o200k_base", "tiktoken")])
+def test_a_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, name: str, package: str) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(ConfigError, match=rf"--tokenizer: needs the package {package}, .* pip install {wanted}\."):
+    with pytest.raises(ConfigError, match=f"^--tokenizer: {package} is not installed; this installs it: "):
         token_counter(name)
 
 

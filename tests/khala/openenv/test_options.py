@@ -187,12 +187,6 @@ def test_the_command_finds_what_is_wrong_before_it_serves() -> None:
             run_openenv(wanted(port=port))
 
 
-def test_openenv_is_named_if_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala_sc2.openenv.server", None)
-    with pytest.raises(ConfigError, match=re.escape("pip install 'khala-sc2[openenv]'")):
-        run_openenv(wanted())
-
-
 @pytest.mark.slow
 def test_openenv_validates_the_server_that_runs() -> None:
     command = [sys.executable, "-m", "khala_sc2", "openenv", "--port", "0"]
