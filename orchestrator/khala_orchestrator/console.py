@@ -272,6 +272,9 @@ def table(result: Result, *, named: bool = False) -> Panel:
         rows.add_row("latency", milliseconds)
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
+    if result.hallucinations:
+        kinds = sorted(result.hallucinations.items())
+        rows.add_row("hallucinations", ", ".join(f"{count} {kind.replace('_', '-')}" for kind, count in kinds))
     rows.add_row("tokens", _tokens(result.usage.values()))
     if result.advisers:
         rows.add_row("advice", ", ".join(f"{count} by {name}" for name, count in result.advisers.items()))

@@ -30,6 +30,12 @@ from khala_protocol.messages.from_agents import (
     Reply,
     ReplyStatus,
 )
+from khala_protocol.messages.hallucinations import (
+    HALLUCINATION_KINDS,
+    HallucinationKind,
+    Judgement,
+    count_hallucinations,
+)
 from khala_protocol.messages.to_agents import (
     AgentKind,
     Briefing,
@@ -120,6 +126,7 @@ MESSAGE_TYPES: tuple[type[Wire], ...] = (
 )  # fmt: skip
 
 __all__ = [
+    "HALLUCINATION_KINDS",
     "LOOPS_PER_S",
     "MAX_ADVICE_CHARACTERS",
     "MAX_DETAIL_CHARACTERS",
@@ -161,7 +168,9 @@ __all__ = [
     "Frames",
     "Frozen",
     "GridView",
+    "HallucinationKind",
     "ImageRef",
+    "Judgement",
     "Landmark",
     "MemoryRule",
     "Message",
@@ -209,6 +218,7 @@ __all__ = [
     "View",
     "WarpGates",
     "Wire",
+    "count_hallucinations",
     "count_refusals",
     "refusals_by_reason",
 ]

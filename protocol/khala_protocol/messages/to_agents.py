@@ -26,6 +26,7 @@ RejectionReason = Literal[
     "dead_target",  # a tag of a unit that has died
     "not_yours",  # a tag of a unit that does not obey this team
     "invalid_target",  # a unit or a point that this action cannot be used on
+    "friendly_target",  # a unit of one's own side, or an ally's, taken for an enemy
     "wrong_frame",  # a point that only makes sense in the other frame
     "out_of_bounds",  # a point outside of its frame or of the map
     "not_available",  # known, but not now: cost, cooldown, requirement

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from khala_protocol.messages.base import Count, Frozen, Wire
+from khala_protocol.messages.hallucinations import HallucinationKind
 from khala_protocol.messages.to_agents import Clock, Received, Rejection
 from khala_protocol.messages.usage import Usage
 
@@ -250,6 +251,8 @@ class Result(Wire):
     """By agent: in how many steps it was not asked, by reason."""
     rejections: dict[str, int] = {}
     """Rejected calls by reason."""
+    hallucinations: dict[HallucinationKind, int] = {}
+    """Rejected calls of the agents themselves, by kind of hallucination; see [measures](measures.md#hallucinations)."""
     fates: dict[str, dict[str, int]] = {}
     """By agent: how many of its decisions were `fresh`, `stale`, …"""
     accepted_of: dict[str, int] = {}
