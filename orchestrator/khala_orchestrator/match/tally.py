@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.state import Snapshot
     from khala_orchestrator.roster import Seat
-    from khala_protocol.messages import Ending, HallucinationKind, Outcome
+    from khala_protocol.messages import Ending, HallucinationKind, Outcome, Variant
 
 REFUSED = "model refused"
 """Why an episode was ended in which an endpoint refuses an agent for good."""
@@ -45,6 +45,7 @@ class Tally:
         *,
         opponent: str = "",
         undecided: float = 0.0,
+        variant: Variant = "files",
     ) -> None:
         """Begin with the first snapshot of a side.
 
@@ -54,11 +55,13 @@ class Tally:
             required: the agents that it cannot do without.
             opponent: who it plays against, in words.
             undecided: the part of its decisions that a required agent may leave to others or to nobody.
+            variant: of the task.
         """
         self._side = side
         self._required = tuple(required)
         self._opponent = opponent
         self._limit = undecided
+        self._variant: Variant = variant
         self._deeds = Deeds()
         self._first = self._last = snapshot
         self._alliance: dict[int, Alliance] = {}
@@ -122,6 +125,7 @@ class Tally:
             run=run,
             side=self._side,
             episode=episode,
+            variant=self._variant,
             outcome=outcome,
             cause=cause,
             opponent=self._opponent,

@@ -17,7 +17,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from khala_protocol.messages.base import LOOPS_PER_S, MOST, SCHEMA_VERSION, Count, Frozen, Point, Wire
+from khala_protocol.messages.base import LOOPS_PER_S, MOST, SCHEMA_VERSION, Count, Frozen, Point, Variant, Wire
 from khala_protocol.messages.from_agents import (
     MAX_ADVICE_CHARACTERS,
     MAX_DETAIL_CHARACTERS,
@@ -214,6 +214,7 @@ __all__ = [
     "UnitView",
     "Usage",
     "ValidArguments",
+    "Variant",
     "Verdict",
     "View",
     "WarpGates",
