@@ -57,7 +57,7 @@ class MapSpec(Frozen):
     two_sides: bool = False
     """Whether a second side of agents, or another player, can take the place of the computer player."""
     difficulty: Difficulty = "very_hard"
-    """Of the computer player; the paper's setting."""
+    """Of the computer player; the setting of LLM-PySC2's code."""
     limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Game loop at which the map itself ends the game."""
     endless: bool = False

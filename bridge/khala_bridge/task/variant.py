@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import Field
 
-from khala_bridge.catalogue.catalogue import chosen
+from khala_bridge.catalogue.catalogue import catalogue, chosen
 from khala_protocol.messages import Frozen, Point
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ ORDERS: Final = ("No_Operation", "Hold_Position", "Move_Screen", "Move_Minimap",
 """Orders of the paper's table B1 that it gives to every unit."""
 ATTACKS: Final = ("Attack_Unit", "Select_Unit_Attack_Unit")
 """Those that it gives to units that can attack."""
+NOT_IN_PAPER: Final = "orders"
+"""The group of orders that the paper leaves out."""
 
 
 class Stage(Frozen):
@@ -51,7 +53,8 @@ class PapersTask(Frozen):
     teams: dict[str, PapersTeam] = Field(default_factory=dict)
     """By name of the team."""
     orders: bool = False
-    """Whether every type of unit has the orders of the paper's table B1, those that attack as far as it can."""
+    """Whether every type of unit has the orders of the paper's table B1, those that attack as far as it can, and none
+    that the paper leaves out."""
 
     def over(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         """Return the fields of a task with these differences; fields that no task can have stay as they are."""
@@ -78,7 +81,7 @@ class PapersTask(Frozen):
 
 
 def _with_orders(kind: str, names: Iterable[str]) -> Iterator[str]:
-    """Yield the orders of table B1 for a type of unit, then its other actions."""
-    own = chosen(names, kind)
+    """Yield the orders of table B1 for a type of unit, then its actions that are no orders."""
+    own = [name for name in chosen(names, kind) if catalogue()[name].group != NOT_IN_PAPER]
     orders = (*ORDERS, *(ATTACKS if ATTACKS[0] in own else ()))
     yield from dict.fromkeys((*orders, *own))
