@@ -126,7 +126,7 @@ def _names(factors: tuple[str, ...], rows: Sequence[Row], by: Sequence[str]) -> 
     duels = len({row[SIDE] for row in rows}) > 1
     known = [*factors, SIDE] if duels else list(factors)
     for name in by:
-        if name not in known:
+        if name not in (*known, VARIANT):
             raise ConfigError(f"there is no factor {name!r}: there are {', '.join(known)}", source="--by")
     return list(by) or known or ["task"]  # recordings that no experiment has labelled have no factors
 
