@@ -15,7 +15,7 @@ from khala_simulator.tick import new_game
 
 if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig, TaskConfig
-    from khala_bridge.task.differences import Difference
+    from khala_bridge.task.differences import PapersDifference
     from khala_bridge.task.maps import MapSpec
     from khala_simulator.world.world import World
 
@@ -76,7 +76,7 @@ def _notes() -> str:
     return table(("task", "what", "the paper says", "its maps and files do", "played"), rows)
 
 
-def _difference(row: Difference, *, with_levels: bool) -> tuple[str, ...]:
+def _difference(row: PapersDifference, *, with_levels: bool) -> tuple[str, ...]:
     levels = f", level {', '.join(map(str, row.levels))}" if with_levels and row.levels else ""
     return (f"{row.what}{levels}", row.paper or "nothing", row.files, PLAYED[row.played])
 

@@ -14,7 +14,7 @@ from khala_bridge import data
 from khala_protocol.messages import Frozen
 
 
-class Difference(Frozen):
+class PapersDifference(Frozen):
     """One thing that the paper and its files have otherwise."""
 
     what: str
@@ -39,9 +39,9 @@ class PapersNotes(Frozen):
     """Names of tasks, or patterns of them."""
     called: str = ""
     """Its name in the paper."""
-    differs: tuple[Difference, ...]
+    differs: tuple[PapersDifference, ...]
 
-    def of(self, task: str) -> tuple[Difference, ...]:
+    def of(self, task: str) -> tuple[PapersDifference, ...]:
         """Return the differences in a task of this name."""
         if not any(fnmatch.fnmatchcase(task, pattern) for pattern in self.tasks):
             return ()
@@ -54,6 +54,6 @@ def papers_notes() -> dict[str, PapersNotes]:
     return data.table("paper.yaml", PapersNotes)
 
 
-def differences_of(task: str) -> tuple[Difference, ...]:
+def differences_of(task: str) -> tuple[PapersDifference, ...]:
     """Return where the paper and its files differ in a task."""
     return tuple(row for notes in papers_notes().values() for row in notes.of(task))
