@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, codes, head, join, table
+from khala_bridge.task.differences import differences_of, papers_notes
 from khala_bridge.task.maps import known_maps
 from khala_orchestrator.config import all_tasks, task_files
 from khala_protocol.messages import LOOPS_PER_S
@@ -14,11 +15,26 @@ from khala_simulator.tick import new_game
 
 if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig, TaskConfig
+    from khala_bridge.task.differences import PapersDifference
     from khala_bridge.task.maps import MapSpec
     from khala_simulator.world.world import World
 
 AGENTS, OPPONENT = 1, 2
 """Player numbers on the shipped maps."""
+PLAYED = {
+    "files": "files",
+    "paper": "paper",
+    "variant": "files, or paper with `variant: paper`",
+}
+VARIANTS = """## The paper and its files
+
+The paper of LLM-PySC2 and its published maps and files differ in places. A task plays what the maps and files do.
+`khala run TASK --variant paper`, or `variant: paper` in a task file or an experiment, plays what the paper says, where
+the last column says so. Its maps are the simulator's own, and the real game does not have them; its orders are possible
+in both games. Killed workers are counted by those that are left. The run card, each result and each report name the
+variant, and no cell of a report mixes two. Agents read a number behind the name of each team of a single unit, so that
+`Observer` is `Observer-1` to them.
+"""
 
 
 def tasks() -> str:
@@ -33,6 +49,8 @@ def tasks() -> str:
         "What `khala run` and `khala host` take by name. To make one: [write a task](../how-to/write-a-task.md). A map "
         "without a task file is played by one commander of all units, with every action that they have.",
         table(("task", "agents", "about"), overview),
+        VARIANTS,
+        _notes(),
         *(_task(task) for task in found if task.name in written),
     )
 
@@ -46,6 +64,21 @@ def maps() -> str:
         "affair; the last columns are what the simulator's maps hold.",
         table(("map", "file", "race", "against", "limit", "cells", "agents' units", "enemy units"), rows),
     )
+
+
+def _notes() -> str:
+    """Return where the paper and its files differ, over all tasks."""
+    rows = [
+        (title if row is notes.differs[0] else "", *_difference(row, with_levels=True))
+        for title, notes in papers_notes().items()
+        for row in notes.differs
+    ]
+    return table(("task", "what", "the paper says", "its maps and files do", "played"), rows)
+
+
+def _difference(row: PapersDifference, *, with_levels: bool) -> tuple[str, ...]:
+    levels = f", level {', '.join(map(str, row.levels))}" if with_levels and row.levels else ""
+    return (f"{row.what}{levels}", row.paper or "nothing", row.files, PLAYED[row.played])
 
 
 def _link(task: TaskConfig) -> str:
@@ -75,7 +108,18 @@ def _task(task: TaskConfig) -> str:
         task.task,
         "\n".join(facts),
         table(("agent", "team", "units", "actions"), rows),
+        _of_paper(task),
     )
+
+
+def _of_paper(task: TaskConfig) -> str:
+    """Return where the paper and its files differ in a task; "" if they do not."""
+    rows = [_difference(row, with_levels=False) for row in differences_of(task.name)]
+    if not rows:
+        return ""
+    called = next((n.called for n in papers_notes().values() if n.called and n.of(task.name)), "")
+    head = f"In the paper: `{called}`." if called else ""
+    return join(head, table(("what", "the paper says", "its maps and files do", "played"), rows))
 
 
 def _teams(agent: AgentConfig) -> list[tuple[str, str, str, str]]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, head, join, prose, table
 from docs.pages.schema import Describer, about, attributes
+from khala_protocol.messages import HALLUCINATION_KINDS
 from khala_sc2.experiment.measures import GROUPS
-from khala_sc2.experiment.measures.hallucinations import KINDS, Hallucinations
+from khala_sc2.experiment.measures.hallucinations import Hallucinations
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -43,7 +44,10 @@ def _section(group: type) -> list[str]:
 
 def _kinds() -> str:
     """Return which rejection is which kind of hallucination."""
-    rows = [(code(reason), code(judgement.kind), judgement.because) for reason, judgement in KINDS.items()]
+    rows = [
+        (code(reason), code(judgement.kind or "not_hallucinated"), judgement.because)
+        for reason, judgement in HALLUCINATION_KINDS.items()
+    ]
     return table(("reason of the rejection", "kind", "because"), rows)
 
 

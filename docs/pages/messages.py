@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts, remarks
 from khala_protocol import keys, messages
-from khala_protocol.messages import MESSAGE_TYPES, Wire, to_agents, to_all
+from khala_protocol.messages import HALLUCINATION_KINDS, MESSAGE_TYPES, Wire, to_agents, to_all
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -67,5 +67,10 @@ def _frames() -> str:
 
 
 def _words(module: ModuleType, name: str, field: str) -> str:
-    rows = [(code(value), remark) for value, remark in remarks(module, name)]
-    return join(f"### {code(field)}", table(("value", "meaning"), rows))
+    kinds: dict[str, str | None] = {}
+    if field == "Rejection.reason":
+        kinds |= {reason: judged.kind for reason, judged in HALLUCINATION_KINDS.items()}
+    rows = [
+        (code(value), remark, (kinds.get(value) or "").replace("_", "-")) for value, remark in remarks(module, name)
+    ]
+    return join(f"### {code(field)}", table(("value", "meaning", "hallucination"), rows))

@@ -49,6 +49,15 @@ Rhythm = Annotated[
         show_default="as the task says",
     ),
 ]
+VariantName = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="files|paper",
+        help="Of a task of LLM-PySC2: as its published files play it, or as its paper says where they differ.",
+        show_default="as the task says",
+    ),
+]
 Rule = Annotated[
     ClockRule | None,
     typer.Option(
@@ -173,6 +182,7 @@ Latency = Annotated[float, typer.Option("--latency", min=0, help="Seconds that t
 class MatchOptions:
     """How a match is played; the names are those of `khala_sc2.playing.matches.new`."""
 
+    variant: VariantName = None
     opponent: Opponent = None
     level: Level = None
     seed: Seed = None

@@ -14,7 +14,7 @@ from khala_protocol.errors import ConfigError
 from khala_sc2.experiment import power, statistics
 from khala_sc2.experiment.likeness import CardDifference, differences, forbidden
 from khala_sc2.experiment.measures import Measures
-from khala_sc2.experiment.selection import SIDE, Row, Selection, factor
+from khala_sc2.experiment.selection import SIDE, VARIANT, Row, Selection, factor
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -117,7 +117,10 @@ def _games(selection: Selection, others: tuple[str, ...]) -> dict[Group, dict[Se
         sides = ", ".join(selection.sides)
         raise ConfigError(f"{selection.text} has matches of sides {sides}: name one, as {_with(selection, SIDE)}")
     groups: defaultdict[Group, dict[Seat, Row]] = defaultdict(dict)
+    variants: dict[str, str] = {}
     for row in selection.rows:
+        if variants.setdefault(row["task"], row[VARIANT]) != row[VARIANT]:
+            raise ConfigError(f"{selection.text} has matches of both variants of {row['task']}: compare one with one")
         group = Group(row["task"], tuple(factor(row, name) for name in others))
         seat = (row["seed"], row["repetition"], row["episode"], "" if SIDE in selection.where else row[SIDE])
         if (twin := groups[group].get(seat)) is not None:

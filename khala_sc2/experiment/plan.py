@@ -37,8 +37,8 @@ SWAPPED = "swapped"
 """Name of the factor that says whether the sides' models are swapped."""
 _TASK_FIELDS = {
     "clock": "rule", "max_wait_s": "max_wait_s", "step_loops": "step_loops", "thinking_loops": "thinking_loops",
-    "speed": "speed", "rhythm": "rhythm", "executor": "executor", "images": "images", "memory": "memory",
-    "communication": "communication", "max_steps": "max_steps",
+    "speed": "speed", "rhythm": "rhythm", "variant": "variant", "executor": "executor", "images": "images",
+    "memory": "memory", "communication": "communication", "max_steps": "max_steps",
 }  # fmt: skip
 """Settings by the names that `khala_orchestrator.config.change` has for them."""
 

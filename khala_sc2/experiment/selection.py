@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from khala_sc2.experiment.played import PlayedMatch
 
+VARIANT = "variant"
+"""The name by which matches of two variants of a task are told apart, if no factor does."""
 SIDE = "side"
 """A name that selections know beside the factors, for duels."""
 
@@ -85,7 +87,8 @@ def states_of(matches: Iterable[PlayedMatch]) -> dict[str, int]:
 
 def factor(row: Row, name: str) -> str:
     """Return the name of a factor's value in a row, or its side; "" if it has none."""
-    return str(row.get(SIDE if name == SIDE else f"{FACTOR}{name}") or "")
+    named = row.get(SIDE if name == SIDE else f"{FACTOR}{name}")
+    return str(named or (row.get(VARIANT) if name == VARIANT else "") or "")
 
 
 def _split(text: str) -> tuple[str, str]:

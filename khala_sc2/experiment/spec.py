@@ -87,6 +87,7 @@ class Settings(Frozen):
     thinking_loops: int | None = Field(default=None, ge=0)
     speed: float | None = Field(default=None, gt=0)
     rhythm: str | None = None
+    variant: str | None = None
     executor: str | None = None
     images: str | None = None
     memory: MemoryRule | None = None

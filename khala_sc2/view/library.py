@@ -113,7 +113,7 @@ def line_of(head: Head, id: str, name: str) -> RunLine:  # noqa: A002  # as in t
         id=id,
         path=name,
         run=card.run if card else "",
-        task=card.task if card else "",
+        task=card.played_task if card else "",
         map=card.map_name if card else "",
         seed=card.seed if card else 0,
         opponent=card.opponent if card else "",

@@ -121,7 +121,7 @@ def change(task: TaskConfig, **changes: Any) -> TaskConfig:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
-        raise ConfigError(f"{place}: {words_of(first)}", source="command line") from None
+        raise ConfigError(f"{place}: {words_of(first)}" if place else words_of(first), source="command line") from None
 
 
 def _fields_of(opponent: str | dict[str, Any]) -> dict[str, Any]:

@@ -179,7 +179,7 @@ class Progress:
         steps = f" of {self._max_steps}" if self._max_steps else ""
         line = Text(f"step {newest.step}{steps}   game {clock(newest.game_loop)}   score ")
         line.append_text(Text(", ").join(self._score(report) for report in self._reports.values()))
-        title = f"{self._run.task} · {self._run.run}" if self._run else ""
+        title = f"{self._run.played_task} · {self._run.run}" if self._run else ""
         return Panel(Group(line, rows), title=Text(title), border_style="blue")
 
     def _score(self, report: Report) -> Text:
@@ -223,7 +223,7 @@ def speaker(seat: Seat, *, named: bool) -> Text:
 def card(run: Run) -> Panel:
     """Return a panel with the run card."""
     rows = Table.grid(padding=(0, 2))
-    rows.add_row("task", f"{run.task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
+    rows.add_row("task", f"{run.played_task} on {run.map_name}, seed {run.seed}, {run.episodes} episode(s)")
     rows.add_row("game", f"{run.game}, {run.executor} executor")
     if run.opponent:
         rows.add_row("against", run.opponent)
@@ -256,6 +256,8 @@ def rule(clock: Clock) -> str:
 def table(result: Result, *, named: bool = False) -> Panel:
     """Return a panel with the result of an episode; `named` if there is one of another side, too."""
     rows = Table.grid(padding=(0, 2))
+    if result.variant == "paper":
+        rows.add_row("variant", "paper: as the paper says, where its published files do something else")
     kd = "none lost" if result.kd is None else f"{result.kd:.2f}"
     rows.add_row(
         "K/D",
@@ -272,6 +274,9 @@ def table(result: Result, *, named: bool = False) -> Panel:
         rows.add_row("latency", milliseconds)
     rejected = ", ".join(f"{count} {reason}" for reason, count in sorted(result.rejections.items())) or "none"
     rows.add_row("actions", f"{result.accepted} accepted; rejected: {rejected}")
+    if result.hallucinations:
+        kinds = sorted(result.hallucinations.items())
+        rows.add_row("hallucinations", ", ".join(f"{count} {kind.replace('_', '-')}" for kind, count in kinds))
     rows.add_row("tokens", _tokens(result.usage.values()))
     if result.advisers:
         rows.add_row("advice", ", ".join(f"{count} by {name}" for name, count in result.advisers.items()))

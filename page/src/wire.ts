@@ -63,7 +63,7 @@ export interface Deed {
   team: string;
   /** None while its step is not over, or if the host did not say. */
   accepted: boolean | null;
-  reason: "malformed" | "unknown_action" | "wrong_arguments" | "unknown_team" | "unknown_target" | "dead_target" | "not_yours" | "invalid_target" | "wrong_frame" | "out_of_bounds" | "not_available" | "too_many_actions" | "unknown_recipient" | "unread" | "too_late" | "too_many_messages" | "refused_by_game" | null;
+  reason: "malformed" | "unknown_action" | "wrong_arguments" | "unknown_team" | "unknown_target" | "dead_target" | "not_yours" | "invalid_target" | "friendly_target" | "wrong_frame" | "out_of_bounds" | "not_available" | "too_many_actions" | "unknown_recipient" | "unread" | "too_late" | "too_many_messages" | "refused_by_game" | null;
   /** Why it was refused, as the agent reads it. */
   message: string;
   /** Units that it names. */

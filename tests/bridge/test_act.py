@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from s2clientprotocol import raw_pb2
+    from s2clientprotocol import sc2api_pb2 as sc_pb
 
     from khala_bridge.state import Snapshot
     from khala_bridge.task.config import TaskConfig
@@ -264,12 +265,12 @@ REFUSED = [
     ),
     (
         "<Attack_Unit(0x100080001)>",
-        "invalid_target",
+        "friendly_target",
         "0x100080001 is your own Stalker; Attack_Unit needs an enemy unit.",
     ),
     (
         "<Attack_Unit(0x1000c0001)>",
-        "invalid_target",
+        "friendly_target",
         "0x1000c0001 is your own Zealot; Attack_Unit needs an enemy unit.",
     ),
     (
@@ -317,8 +318,28 @@ def test_a_call_is_refused_in_words_that_help(
     assert (rejection.team, rejection.start) == ("Stalker-1", reply.index(call))
 
 
+@pytest.mark.parametrize(
+    ("call", "reason", "hint"),
+    [
+        ("<Move_Minimap([12, 9])>", "wrong_frame", "Move_Minimap takes a point of the minimap, for one of the screen"),
+        ("<Move_Minimap([40, 9])>", "out_of_bounds", "on the minimap it is x 0 to 64, y 16 to 64."),
+    ],
+)
+def test_a_point_of_the_screen_on_the_minimap_is_known_where_the_map_ends(
+    call: str, reason: str, hint: str, act: Callable[..., JointAction]
+) -> None:
+    def low(_: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:
+        info.start_raw.playable_area.p1.y = 24
+
+    (rejection,) = act(team(call), change=low).rejections["A"]
+    assert rejection.reason == reason
+    assert "of the minimap lies beyond the edge of the map" in rejection.message
+    assert hint in rejection.message
+
+
 ELSEWHERE = {  # where the sentences of the other classes are pinned
     "malformed": "tests/protocol/test_speech.py",
+    "invalid_target": "tests/bridge/test_validity.py",
     "unknown_team": "below and tests/bridge/test_addressee.py",
     "too_many_actions": "below",
     "unknown_recipient": "tests/orchestrator/test_mailbox.py",

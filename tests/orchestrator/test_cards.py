@@ -91,6 +91,16 @@ def test_the_run_card_says_what_repeats_the_run(config: Callable[..., MatchConfi
     )
     assert card.catalogue_sha256 == catalogue_sha256()
     assert TaskConfig.model_validate(card.config) == match.task
+    assert (card.variant, card.played_task) == ("files", "2s3z_pair")
+
+
+def test_the_run_card_names_the_variant_of_the_paper(config: Callable[..., MatchConfig]) -> None:
+    task = change(load_task("pvz_task3_level1"), variant="paper")
+    match = config().model_copy(update={"task": task})
+    card = run_card(match, GameIdentity("4.10", "B", "m", "0"))
+    assert (card.task, card.variant, card.map_name) == ("pvz_task3_level1", "paper", "pvz_task3_level1_paper")
+    assert card.played_task == "pvz_task3_level1 (variant paper)"
+    assert TaskConfig.model_validate(card.config) == task
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,22 @@ def test_a_run_card(printed: Printed, card_of_run: Run) -> None:
     ]
 
 
+def test_a_run_card_and_a_result_name_the_variant_of_the_paper(printed: Printed, card_of_run: Run) -> None:
+    lines = printed(card(card_of_run.model_copy(update={"variant": "paper"})), width=100)
+    assert any("2s3z_pair (variant paper) on 2s3z" in line for line in lines)
+    fields = {"run": "r", "episode": 0, "outcome": "win", "cause": "", "steps": 1, "game_loop": 1, "game_s": 1.0}
+    found = Result(
+        **fields, wall_s=1.0, killed=Casualties(), lost=Casualties(), kd=None, variant="paper",
+        hallucinations={"fact_conflicting": 2, "context_conflicting": 1},
+    )  # fmt: skip
+    lines = printed(table(found), width=100)
+    assert any("variant" in line and "paper: as the paper says" in line for line in lines)
+    assert any("hallucinations  1 context-conflicting, 2 fact-conflicting" in line for line in lines)
+    assert not any(
+        "variant" in line for line in printed(table(found.model_copy(update={"variant": "files"})), width=100)
+    )
+
+
 def test_a_run_card_says_that_pictures_show_more_than_texts(printed: Printed, card_of_run: Run) -> None:
     first, *others = card_of_run.agents
     seeing = first.model_copy(update={"pictures": ("screen", "minimap")})

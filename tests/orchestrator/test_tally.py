@@ -47,6 +47,16 @@ def result(*afters: Snapshot, reports: list[Report] | None = None) -> Result:
     return tally.result("r", 0, wall_s=2.0)
 
 
+def test_a_result_names_the_variant_and_counts_hallucinations_of_the_agents_themselves() -> None:
+    world = snapshot({1}, {11})
+    tally = Tally(world, variant="paper")
+    tally.add(report(0, rejected=2), world)
+    tally.add(report(1, "fallback", rejected=5), world)
+    found = tally.result("r", 0, wall_s=1.0)
+    assert (found.variant, found.rejections) == ("paper", {"unknown_target": 7})
+    assert found.hallucinations == {"input_conflicting": 2}
+
+
 def test_deaths_are_counted_by_side_and_values_since_the_beginning() -> None:
     found = result(
         snapshot({1, 3}, {11, 12}, dead={2}, killed=50, lost=125),

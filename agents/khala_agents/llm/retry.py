@@ -30,7 +30,8 @@ class RetryRule(Frozen):
     """How often a failed try is repeated, and after what time.
 
     The wait before try i + 2 is min(base_s · 2^i, cap_s) + jitter, i = 0, 1, …, with jitter uniform in
-    [0, jitter_s); it is as long as `Retry-After` says if that is longer. Form and numbers of the paper's client.
+    [0, jitter_s); it is as long as `Retry-After` says if that is longer. Form and numbers, five tries and eight seconds
+    among them, are those of LLM-PySC2's code; its paper gives none.
     """
 
     tries: int = Field(default=5, ge=1)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from khala_bridge.act.recognise import Recognised
     from khala_bridge.observe.observation import SideObservation
     from khala_bridge.state import Unit
+    from khala_protocol.messages import RejectionReason
 
 _SIDES = {Alliance.OWN: "own", Alliance.ALLY: "ally", Alliance.ENEMY: "enemy", Alliance.NEUTRAL: "neutral"}
 _WHOSE = {
@@ -97,7 +98,9 @@ class Targets:
             raise self._out_of_sight(said, unit)
         if said.action.aim == "unit" and (reason := unfit(said.action, aim_of(unit))):
             what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
-            raise CallRejected("invalid_target", f"{what}; {said.action.name} needs {reason}.")
+            is_friend = said.action.target == "enemy" and unit.alliance in (Alliance.OWN, Alliance.ALLY)
+            kind: RejectionReason = "friendly_target" if is_friend else "invalid_target"
+            raise CallRejected(kind, f"{what}; {said.action.name} needs {reason}.")
         return unit
 
     def place(self, said: Recognised) -> WorldPoint:
@@ -152,7 +155,10 @@ class Targets:
         point = self._observation.map.world(MinimapPoint(x, y))
         if not self._observation.map.holds(point):
             what = f"[{x:g}, {y:g}] of the minimap lies beyond the edge of the map"
-            raise CallRejected("out_of_bounds", f"{what}; {self._playable()}.")
+            is_on_screen = x <= screen and y <= screen
+            kind: RejectionReason = "wrong_frame" if is_on_screen else "out_of_bounds"
+            hint = self._sister(said, "minimap", "screen") if is_on_screen else self._playable()
+            raise CallRejected(kind, f"{what}; {hint}.")
         return point
 
     def _playable(self) -> str:
@@ -168,12 +174,16 @@ class Targets:
             raise CallRejected(
                 "out_of_bounds", f"[{x:g}, {y:g}] is outside of the {frame}: x and y are from 0 to {size:g}."
             )
+        where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
+        raise CallRejected("wrong_frame", f"{where}; {self._sister(said, frame, other)}.")
+
+    def _sister(self, said: Recognised, frame: str, other: str) -> str:
+        """Return as the end of a sentence which action takes a point of the other frame."""
         sister = said.action.name.replace(frame.capitalize(), other.capitalize())
         agent = self._observation.configs[said.team.agent]
         has_sister = sister in {action.name for action in agent.catalogue()}
         hint = f"for one of the {other} there is {sister}" if has_sister else f"it looks like one of the {other}"
-        where = f"[{x:g}, {y:g}] is outside of the {frame}, where x and y are from 0 to {size:g}"
-        raise CallRejected("wrong_frame", f"{where}; {said.action.name} takes a point of the {frame}, {hint}.")
+        return f"{said.action.name} takes a point of the {frame}, {hint}"
 
     # --- tags that are wrong ----------------------------------------------------------------------------------
 

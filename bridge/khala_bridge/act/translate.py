@@ -9,9 +9,9 @@ It has no frame: `raw_executor` and `screen_executor` beside it make the calls o
     target    `khala_bridge.act.targets`
 
 Order of the commands of one turn, unit by unit: the first one replaces what the unit did. A later one waits for it
-if the action queues (the catalogue says), and replaces it if not. In the paper the first queueing function of a *team*
-replaces. Then an order to a second unit would wait behind that unit's old order, and an attack would cancel a skill of
-the same reply, since here all commands of a turn reach the game in one loop.
+if the action queues (the catalogue says), and replaces it if not. In LLM-PySC2's code the first queueing function of a
+*team* replaces. Then an order to a second unit would wait behind that unit's old order, and an attack would cancel a
+skill of the same reply, since here all commands of a turn reach the game in one loop.
 
 An instant ability (Stimpack, Guardian Shield, a cloak) is no order: the game carries it out at once and leaves the
 orders of the unit alone. So it does not count as the first one: a move after it replaces what the unit did before the

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from khala_bridge.state import Unit
 
 NEAR_ARMY: Final = 24.0
-"""Enemies within this distance of the middle of the army are fought first; the paper's figure."""
+"""Enemies within this distance of the middle of the army are fought first; the figure of LLM-PySC2's code."""
 NEAR_ONE: Final = 20.0
-"""Enemies within this distance of any unit of the army, too; the paper's figure."""
+"""Enemies within this distance of any unit of the army, too; the figure of LLM-PySC2's code."""
 INTRUDES: Final = 15.0
-"""Enemies within this distance of an own structure are intruders; the paper's figure."""
+"""Enemies within this distance of an own structure are intruders; the figure of LLM-PySC2's code."""
 
 
 def army_attack(ask: RuleRequest) -> list[RuleOrder]:

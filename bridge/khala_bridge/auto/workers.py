@@ -33,7 +33,7 @@ PER_GAS: Final = 3
 OF_HALL: Final = 10.0
 """Resources within this distance of a town hall are gathered into it."""
 MOST_WORKERS: Final = 75
-"""Workers up to which the host trains more; the paper's figure."""
+"""Workers up to which the host trains more; the figure of LLM-PySC2's code."""
 TRAINED: Final = {
     "Nexus": "Train_Probe_quick",
     "CommandCenter": "Train_SCV_quick",

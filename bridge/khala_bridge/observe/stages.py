@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from khala_bridge.state.teams import Team
-    from khala_bridge.task.config import Stage
+    from khala_bridge.task.variant import Stage
     from khala_protocol.messages import Point
 
 

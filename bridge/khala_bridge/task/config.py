@@ -22,6 +22,7 @@ from khala_bridge.knowledge.forms import forms_of
 from khala_bridge.task.images import ImageSpec  # noqa: TC001  # pydantic evaluates it
 from khala_bridge.task.maps import MOST_LOOPS, MapSpec, Race, known_maps
 from khala_bridge.task.opponent import Opponent, opponent_of
+from khala_bridge.task.variant import PapersTask, Stage
 from khala_protocol.configfile import UnknownName
 from khala_protocol.errors import WrongKey
 from khala_protocol.keys import check_name
@@ -34,9 +35,9 @@ from khala_protocol.messages import (
     Frames,
     Frozen,
     MemoryRule,
-    Point,
     TeamSpec,
     Trigger,
+    Variant,
 )
 
 if TYPE_CHECKING:
@@ -100,18 +101,6 @@ KeyName: TypeAlias = Annotated[str, AfterValidator(_key_name)]
 UnitTypeName: TypeAlias = Annotated[str, AfterValidator(lambda name: _known(name, knowledge(), "unit type"))]
 ActionName: TypeAlias = Annotated[str, AfterValidator(_known_action)]
 MapName: TypeAlias = Annotated[str, AfterValidator(lambda name: name and _known(name, known_maps(), "map"))]
-
-
-class Stage(Frozen):
-    """One part of a team's task, until the next one begins; the last part stays."""
-
-    task: str
-    at: Point | None = None
-    """Place on the minimap that ends the stage when the middle of the team's screen is there."""
-    within: float = Field(default=4.0, gt=0)
-    """Cells of the minimap that count as being there."""
-    until_s: float | None = Field(default=None, ge=0)
-    """Time on the game's clock that ends the stage, in seconds."""
 
 
 class TeamConfig(Frozen):
@@ -328,6 +317,11 @@ class TaskConfig(Frozen):
     scenes: Literal["whole", "seen", "none"] = "whole"
     """What the host tells those who watch of the map in each step, never agents: the whole map without fog, where the
     game shows it; what the sides see together; or nothing. See [scenes](../how-to/read-a-recording.md#the-map)."""
+    variant: Variant = "files"
+    """Of a task of LLM-PySC2: `files` as its published maps and files play it, `paper` as its paper says. The list of
+    [tasks](tasks.md) says where the two differ."""
+    paper: PapersTask = PapersTask()
+    """What is different with `variant: paper`."""
     executor: Literal["raw", "screen"] = "raw"
     rhythm: Rhythm = "own"
     """`paper`: at most one decision in a second of the game, and workers that gather and are trained by the host, as in
@@ -353,6 +347,16 @@ class TaskConfig(Frozen):
         if not isinstance(fields, dict) or fields.get("rhythm") != "paper":
             return fields
         return fields | {name: _with(fields.get(name), preset) for name, preset in PAPERS_RHYTHM.items()}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_variant(cls, fields: Any) -> Any:
+        if not isinstance(fields, dict) or fields.get("variant") != "paper":
+            return fields
+        try:
+            return PapersTask.model_validate(fields.get("paper", {})).over(fields)
+        except ValueError:  # its own field says what is wrong
+            return fields
 
     @field_validator("sides")
     @classmethod
@@ -382,6 +386,12 @@ class TaskConfig(Frozen):
     def _one_map(self) -> Self:
         if bool(self.map) == (self.own_map is not None):
             raise ValueError("give either map or own_map")
+        return self
+
+    @model_validator(mode="after")
+    def _two_variants(self) -> Self:
+        if self.variant == "paper" and not self.has_variants:
+            raise ValueError(f"the paper says nothing else of {self.name} than its files: leave out variant")
         return self
 
     @model_validator(mode="after")
@@ -424,10 +434,16 @@ class TaskConfig(Frozen):
         return self._map.model_copy(update={k: v for k, v in changed.items() if v is not None})
 
     @property
+    def has_variants(self) -> bool:
+        """Whether the paper and its files differ in this task, so that there is a choice."""
+        return self.paper != PapersTask() or bool(self.map and known_maps()[self.map].paper)
+
+    @property
     def _map(self) -> MapSpec:
-        """The map as it is."""
+        """The map as it is, of the task's variant."""
         if self.own_map is None:
-            return known_maps()[self.map]
+            spec = known_maps()[self.map]
+            return spec.as_in_paper() if self.variant == "paper" else spec
         return self.own_map.model_copy(update={"name": self.own_map.name or PurePosixPath(self.own_map.file).stem})
 
     @property

@@ -29,8 +29,17 @@ Difficulty: TypeAlias = Literal[
 ]
 
 
+PAPERS = "_paper"
+"""Ends the name of a map that plays what the paper says."""
 MOST_LOOPS = 2**24
 """Game loops of a game: more than eight days; a game of the real one ends before 2**19 by itself."""
+
+
+class PapersMap(Frozen):
+    """Another map beside a published one, which plays what the paper says. Only the simulator has it."""
+
+    limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
+    """Game loop at which it ends the game; None for that of the published map."""
 
 
 class MapSpec(Frozen):
@@ -48,7 +57,7 @@ class MapSpec(Frozen):
     two_sides: bool = False
     """Whether a second side of agents, or another player, can take the place of the computer player."""
     difficulty: Difficulty = "very_hard"
-    """Of the computer player; the paper's setting."""
+    """Of the computer player; the setting of LLM-PySC2's code."""
     limit_loops: int | None = Field(default=None, ge=1, le=MOST_LOOPS)
     """Game loop at which the map itself ends the game."""
     endless: bool = False
@@ -59,6 +68,8 @@ class MapSpec(Frozen):
     """Types of the agents' units, for a task that is made for the map."""
     upgrades: tuple[str, ...] = ()
     """Upgrades that the map grants the agents' side, as far as actions need them; named as in `pysc2.lib.upgrades`."""
+    paper: PapersMap | None = None
+    """For `variant: paper` of a task; None if the published map plays what the paper says."""
 
     @field_validator("file")
     @classmethod
@@ -67,6 +78,15 @@ class MapSpec(Frozen):
         if not parts or ".." in parts or PurePosixPath(file).is_absolute() or not file.isprintable():
             raise ValueError("give the path of a map from the directory Maps of the install downwards")
         return file
+
+    def as_in_paper(self) -> MapSpec:
+        """Return the map that plays what the paper says: this one, unless there is another."""
+        if self.paper is None:
+            return self
+        file = PurePosixPath(self.file)
+        changed = {"name": f"{self.name}{PAPERS}", "file": str(file.with_stem(f"{file.stem}{PAPERS}"))}
+        limit = self.paper.limit_loops or self.limit_loops
+        return self.model_copy(update=changed | {"limit_loops": limit, "paper": None})
 
 
 @functools.cache

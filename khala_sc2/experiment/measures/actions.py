@@ -50,6 +50,8 @@ class Actions:
     """Of these: a tag of a unit that does not obey this team."""
     rejected_invalid_target: int
     """Of these: a unit or a point that the action cannot be used on."""
+    rejected_friendly_target: int
+    """Of these: a unit of the agent's own side, or an ally's, taken for an enemy."""
     rejected_wrong_frame: int
     """Of these: a point that only makes sense in the other frame."""
     rejected_out_of_bounds: int

@@ -1,9 +1,12 @@
 """Calls that contradict what the agent knew or could know, by kind of contradiction.
 
-The kinds are those of the paper (LLM-PySC2, arXiv 2411.05348) and of the survey that names them (arXiv 2309.01219).
-The survey counts a contradiction of anything in the prompt as input-conflicting. Here the part of the prompt that stays
-the same all episode is the input, and what observations said is the context, so that a model that does not follow
-instructions can be distinguished from one that loses track of the game. `KINDS` is the whole mapping.
+The kinds are those of the paper (LLM-PySC2, arXiv 2411.05348): input-conflicting, an action that is not valid;
+fact-conflicting, an ally taken for an enemy; context-conflicting, a point of the screen used as one of the minimap, or
+the reverse. `khala_protocol.messages.hallucinations` has the whole mapping. The host counts them in each result; here,
+calls that were right when the agent saw the game are left out.
+
+A point of the wrong frame is known by its place: it lies outside of its own frame or of the map, and inside the other
+frame. A wrong point that lies inside both cannot be told from a poor choice, and is carried out.
 """
 
 from __future__ import annotations
@@ -11,47 +14,19 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
-from khala_protocol.messages import count_refusals
+from khala_protocol.messages import HALLUCINATION_KINDS, HallucinationKind, count_refusals
 from khala_sc2.experiment.measures.evidence import tags
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from khala_protocol.messages import Observation, Rejection, RejectionReason
+    from khala_protocol.messages import Observation, Rejection
     from khala_sc2.experiment.measures.evidence import RecordedDecision, SideStep
 
-Kind: TypeAlias = Literal["input_conflicting", "context_conflicting", "fact_conflicting", "not_hallucinated"]
-
-
-class Judgement(NamedTuple):
-    """The kind of a rejection, and why."""
-
-    kind: Kind
-    because: str
-
-
-KINDS: Mapping[RejectionReason, Judgement] = {
-    "malformed": Judgement("input_conflicting", "the prompt says how a call is written"),
-    "unknown_action": Judgement("input_conflicting", "the prompt lists the actions"),
-    "wrong_arguments": Judgement("input_conflicting", "the prompt says what each action takes"),
-    "wrong_frame": Judgement("input_conflicting", "the prompt says in which frame an action takes a point"),
-    "out_of_bounds": Judgement("input_conflicting", "the prompt gives the size of both frames"),
-    "unknown_recipient": Judgement("input_conflicting", "the prompt lists who can be written to"),
-    "unknown_team": Judgement("context_conflicting", "the observation has a heading for each team that has units"),
-    "unknown_target": Judgement("context_conflicting", "the observation lists the tags of the units in sight"),
-    "dead_target": Judgement("context_conflicting", "an observation said that it died, or no longer lists it"),
-    "not_yours": Judgement("context_conflicting", "the observation lists the units of each team"),
-    "invalid_target": Judgement("fact_conflicting", "in the game the action cannot be used on it"),
-    "not_available": Judgement("fact_conflicting", "in the game it costs, needs or waits for more"),
-    "unread": Judgement("not_hallucinated", "no call was refused: there was none"),
-    "too_late": Judgement("not_hallucinated", "a deadline, however right the call was"),
-    "too_many_actions": Judgement("not_hallucinated", "a limit, however right the call was"),
-    "too_many_messages": Judgement("not_hallucinated", "a limit, however right the message was"),
-    "refused_by_game": Judgement("not_hallucinated", "the game refused what the rules allowed"),
-}
-"""Every reason for a rejection."""
+Kind: TypeAlias = HallucinationKind | Literal["not_hallucinated"]
+COLUMNS: tuple[Kind, ...] = (*get_args(HallucinationKind), "not_hallucinated")
 
 _NAME = re.compile(r"<(?:Standing\()?\s*(\w+)")
 
@@ -63,11 +38,11 @@ class Hallucinations:
     calls: int
     """Calls that policies said: accepted, rejected, and messages. Those of the task's default reply do not count."""
     input_conflicting: int
-    """Rejected calls that break the rules of the prompt."""
-    context_conflicting: int
-    """Rejected calls that contradict the observation that they answer, or earlier ones."""
+    """Rejected calls that are no valid actions."""
     fact_conflicting: int
-    """Rejected calls that contradict how the game works, or what is possible in it at the moment."""
+    """Rejected calls that take an own or allied unit for an enemy."""
+    context_conflicting: int
+    """Rejected calls that use a point of the screen as one of the minimap, or the reverse."""
     not_hallucinated: int
     """Rejected calls that are none of these: limits, deadlines, errors of the game, calls of default replies, and
     those that are `outdated`."""
@@ -105,7 +80,7 @@ class HallucinationTally:
                 yield "not_hallucinated"
             else:
                 for reason in count_refusals([rejection]).elements():
-                    yield KINDS[reason].kind
+                    yield HALLUCINATION_KINDS[reason].kind or "not_hallucinated"
 
     def total(self) -> Hallucinations:
         """Return the group."""
@@ -114,7 +89,7 @@ class HallucinationTally:
             calls=self._calls,
             outdated=self._outdated,
             hallucinated_share=hallucinated / self._calls if self._calls else None,
-            **{kind: self._kinds[kind] for kind in get_args(Kind)},
+            **{kind: self._kinds[kind] for kind in COLUMNS},
         )
 
 

@@ -25,6 +25,8 @@ class Identity:
     """Name of the run."""
     task: str
     """Name of the task."""
+    variant: str
+    """`files` if the task was played as its published files play it, `paper` if as its paper says."""
     side: str
     """The side that the numbers are about."""
     episode: int
@@ -83,6 +85,7 @@ class EpisodeProgress:
         return Identity(
             run=run.run,
             task=run.task,
+            variant=run.variant,
             side=side,
             episode=episode,
             seed=run.seed + episode,

@@ -61,6 +61,7 @@ def conditions(store: Store, played: Sequence[PlayedMatch], rows: Sequence[Row])
         ("opponents", _values(card.get("opponent") for card in cards)),
         ("clock", _values((card.get("clock") for card in cards), _clock)),
         ("rhythm", f"{_values((card.get('task') or {}).get('rhythm') for card in cards)}; {_measured_rhythm(rows)}"),
+        ("variant", _values(row["variant"] for row in rows)),
         ("executor", _values(card.get("executor") for card in cards)),
         ("models as asked", _values(call.model for call in calls)),
         ("models as answered", _values(name for row in rows for name in row["models"].split("; "))),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from khala_protocol.errors import ConfigError
 from khala_sc2.experiment import statistics
-from khala_sc2.experiment.selection import SIDE, Row, factor, factors_of
+from khala_sc2.experiment.selection import SIDE, VARIANT, Row, factor, factors_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -96,17 +96,23 @@ class CellSummary:
 def cells(played: Iterable[PlayedMatch], rows: Sequence[Row], by: Sequence[str] = ()) -> list[Cell]:
     """Return the cells in the order in which their first match was played, by all factors unless some are named.
 
+    Matches of two variants of a task never stand in one cell: if two would, the variant is one more factor.
+
     Raises:
         ConfigError: there is no such factor.
     """
     played = list(played)
     names = _names(factors_of(played), rows, by)
+    if VARIANT not in names and _mixes(rows, names):
+        names.append(VARIANT)
+    variants = {row["match"]: row[VARIANT] for row in rows}
     found: dict[tuple[str, ...], Cell] = {}
     done = {match.key for match in played if match.state == "done"}
     sides = sorted({row[SIDE] for row in rows}) if SIDE in names else [""]
     for match in played:
         for side in sides:
-            where = {name: side if name == SIDE else match.cell.get(name, "") for name in names}
+            known = {VARIANT: variants.get(match.key, ""), **match.cell, SIDE: side}
+            where = {name: known.get(name, "") for name in names}
             cell = found.setdefault(tuple(where.values()), Cell(where))
             if match.state != "done":
                 cell.others.append(match)
@@ -120,9 +126,17 @@ def _names(factors: tuple[str, ...], rows: Sequence[Row], by: Sequence[str]) -> 
     duels = len({row[SIDE] for row in rows}) > 1
     known = [*factors, SIDE] if duels else list(factors)
     for name in by:
-        if name not in known:
+        if name not in (*known, VARIANT):
             raise ConfigError(f"there is no factor {name!r}: there are {', '.join(known)}", source="--by")
     return list(by) or known or ["task"]  # recordings that no experiment has labelled have no factors
+
+
+def _mixes(rows: Iterable[Row], names: Sequence[str]) -> bool:
+    """Return whether a cell by these factors would hold matches of two variants."""
+    found: dict[tuple[str, ...], str] = {}
+    return any(
+        found.setdefault(tuple(factor(row, name) for name in names), row[VARIANT]) != row[VARIANT] for row in rows
+    )
 
 
 def _in_order(found: list[Cell], names: Sequence[str]) -> list[Cell]:

@@ -52,6 +52,7 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
     return Run(
         run=config.run,
         task=task.name,
+        variant=task.variant,
         map_name=task.map_spec.name,
         map_sha256=game.map_sha256,
         seed=config.seed,

@@ -194,8 +194,15 @@ class Match:
     def _tally(self, side: MatchSide, snapshot: Snapshot) -> Tally:
         others = [f"side {other.name}" for other in self.sides if other is not side]
         opponent = self.game.info.opponent or self.config.task.against or ", ".join(others)
-        undecided = self.config.task.faults.undecided
-        return Tally(snapshot, side.name, side.required, opponent=opponent, undecided=undecided)
+        task = self.config.task
+        return Tally(
+            snapshot,
+            side.name,
+            side.required,
+            opponent=opponent,
+            undecided=task.faults.undecided,
+            variant=task.variant,
+        )
 
     def _side(self, seat: Seat) -> MatchSide:
         return next(side for side in self.sides if side.name == seat.side)

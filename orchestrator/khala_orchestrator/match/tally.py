@@ -9,14 +9,24 @@ from typing import TYPE_CHECKING
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_orchestrator.match.validity import AWAY, Deeds, why_not_valid
-from khala_protocol.messages import LOOPS_PER_S, STEP_LIMIT, Casualties, EndState, Report, Result, Usage, count_refusals
+from khala_protocol.messages import (
+    LOOPS_PER_S,
+    STEP_LIMIT,
+    Casualties,
+    EndState,
+    Report,
+    Result,
+    Usage,
+    count_hallucinations,
+    count_refusals,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from khala_bridge.state import Snapshot
     from khala_orchestrator.roster import Seat
-    from khala_protocol.messages import Ending, Outcome
+    from khala_protocol.messages import Ending, HallucinationKind, Outcome, Variant
 
 REFUSED = "model refused"
 """Why an episode was ended in which an endpoint refuses an agent for good."""
@@ -35,6 +45,7 @@ class Tally:
         *,
         opponent: str = "",
         undecided: float = 0.0,
+        variant: Variant = "files",
     ) -> None:
         """Begin with the first snapshot of a side.
 
@@ -44,11 +55,13 @@ class Tally:
             required: the agents that it cannot do without.
             opponent: who it plays against, in words.
             undecided: the part of its decisions that a required agent may leave to others or to nobody.
+            variant: of the task.
         """
         self._side = side
         self._required = tuple(required)
         self._opponent = opponent
         self._limit = undecided
+        self._variant: Variant = variant
         self._deeds = Deeds()
         self._first = self._last = snapshot
         self._alliance: dict[int, Alliance] = {}
@@ -56,6 +69,7 @@ class Tally:
         self._usage: dict[str, Usage] = defaultdict(Usage)
         self._unasked: dict[str, Counter[str]] = defaultdict(Counter)
         self._rejections: Counter[str] = Counter()
+        self._hallucinations: Counter[HallucinationKind] = Counter()
         self._fates: dict[str, Counter[str]] = defaultdict(Counter)
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
@@ -74,7 +88,9 @@ class Tally:
             name = agent.agent
             self._deeds.add(agent)
             self._usage[name] += agent.usage
-            self._rejections.update(count_refusals(agent.rejections))
+            self._rejections.update(refusals := count_refusals(agent.rejections))
+            if agent.status == "ok":
+                self._hallucinations.update(count_hallucinations(refusals))
             if agent.rethinks:
                 self._rethinks[name] += agent.rethinks
             if agent.fate is not None:
@@ -109,6 +125,7 @@ class Tally:
             run=run,
             side=self._side,
             episode=episode,
+            variant=self._variant,
             outcome=outcome,
             cause=cause,
             opponent=self._opponent,
@@ -128,6 +145,7 @@ class Tally:
             statuses={name: dict(count) for name, count in self._deeds.statuses.items()},
             unasked={name: dict(count) for name, count in self._unasked.items()},
             rejections=dict(self._rejections),
+            hallucinations=dict(self._hallucinations),
             fates={name: dict(count) for name, count in self._fates.items()},
             accepted_of=dict(self._deeds.accepted),
             fallbacks={name: dict(count) for name, count in self._deeds.causes.items()},

@@ -158,8 +158,9 @@ def _agent(agent: AgentReport, *, named: bool) -> Iterator[Text]:
     yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{rethinks}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
+        kind = f" ({fault.hallucination.replace('_', '-')})" if fault.hallucination else ""
         yield Text.assemble(
-            (f"    {visible_line(fault.text)}", "red"), f"  {fault.reason}: {visible_line(fault.message)}"
+            (f"    {visible_line(fault.text)}", "red"), f"  {fault.reason}{kind}: {visible_line(fault.message)}"
         )
 
 

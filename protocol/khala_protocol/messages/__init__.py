@@ -17,7 +17,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from khala_protocol.messages.base import LOOPS_PER_S, MOST, SCHEMA_VERSION, Count, Frozen, Point, Wire
+from khala_protocol.messages.base import LOOPS_PER_S, MOST, SCHEMA_VERSION, Count, Frozen, Point, Variant, Wire
 from khala_protocol.messages.from_agents import (
     MAX_ADVICE_CHARACTERS,
     MAX_DETAIL_CHARACTERS,
@@ -29,6 +29,12 @@ from khala_protocol.messages.from_agents import (
     Purpose,
     Reply,
     ReplyStatus,
+)
+from khala_protocol.messages.hallucinations import (
+    HALLUCINATION_KINDS,
+    HallucinationKind,
+    Judgement,
+    count_hallucinations,
 )
 from khala_protocol.messages.to_agents import (
     AgentKind,
@@ -121,6 +127,7 @@ MESSAGE_TYPES: tuple[type[Wire], ...] = (
 )  # fmt: skip
 
 __all__ = [
+    "HALLUCINATION_KINDS",
     "LOOPS_PER_S",
     "MAX_ADVICE_CHARACTERS",
     "MAX_DETAIL_CHARACTERS",
@@ -163,7 +170,9 @@ __all__ = [
     "Frames",
     "Frozen",
     "GridView",
+    "HallucinationKind",
     "ImageRef",
+    "Judgement",
     "Landmark",
     "MemoryRule",
     "Message",
@@ -207,10 +216,12 @@ __all__ = [
     "UnitView",
     "Usage",
     "ValidArguments",
+    "Variant",
     "Verdict",
     "View",
     "WarpGates",
     "Wire",
+    "count_hallucinations",
     "count_refusals",
     "refusals_by_reason",
 ]

@@ -22,6 +22,8 @@ LOOPS_PER_S = 22.4
 MOST = 2**53
 """Largest number that every reader of JSON takes as it is. An agent reports its usage itself: no sum must fail."""
 
+Variant = Literal["files", "paper"]
+"""Whether a task is played as its published files play it, or as its paper says."""
 Count = Annotated[int, Field(ge=0, le=MOST)]
 Point = tuple[float, float]
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from khala_protocol.clock_rule import ClockRule
 from khala_protocol.messages.base import Count, Frozen, Wire
+from khala_protocol.messages.hallucinations import HALLUCINATION_KINDS, HallucinationKind
 from khala_protocol.messages.usage import Pace
 from khala_protocol.messages.view import ActionSpec, View
 from khala_protocol.rethinks import MAX_RETHINKS
@@ -26,6 +27,7 @@ RejectionReason = Literal[
     "dead_target",  # a tag of a unit that has died
     "not_yours",  # a tag of a unit that does not obey this team
     "invalid_target",  # a unit or a point that this action cannot be used on
+    "friendly_target",  # a unit of one's own side, or an ally's, taken for an enemy
     "wrong_frame",  # a point that only makes sense in the other frame
     "out_of_bounds",  # a point outside of its frame or of the map
     "not_available",  # known, but not now: cost, cooldown, requirement
@@ -183,6 +185,11 @@ class Rejection(Frozen):
     team: str | None = None
     others: dict[RejectionReason, int] = {}
     """How many it stands for, by reason, if an observation has no room for them; else it stands for itself."""
+
+    @property
+    def hallucination(self) -> HallucinationKind | None:
+        """The kind of hallucination that its reason is; None if it is none."""
+        return HALLUCINATION_KINDS[self.reason].kind
 
 
 def refusals_by_reason(reason: R, others: Mapping[R, int]) -> Mapping[R, int]:

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from khala_protocol.messages.base import Count, Frozen, Wire
+from khala_protocol.messages.base import Count, Frozen, Variant, Wire
+from khala_protocol.messages.hallucinations import HallucinationKind
 from khala_protocol.messages.to_agents import Clock, Received, Rejection
 from khala_protocol.messages.usage import Usage
 
@@ -72,6 +73,8 @@ class Run(Wire):
 
     kind: Literal["run"] = "run"
     task: str
+    variant: Variant = "files"
+    """As its published files play it, or as its paper says; see [tasks](tasks.md)."""
     map_name: str
     map_sha256: str
     seed: int
@@ -101,6 +104,11 @@ class Run(Wire):
     """The task file with all its defaults."""
     forked: Forked | None = None
     """None: it was played from its beginning; see `khala fork`."""
+
+    @property
+    def played_task(self) -> str:
+        """The task and, unless it is that of the published files, its variant: `pvz_task3_level1 (variant paper)`."""
+        return self.task if self.variant == "files" else f"{self.task} (variant {self.variant})"
 
 
 class Message(Wire):
@@ -219,6 +227,8 @@ class Result(Wire):
     kind: Literal["result"] = "result"
     side: str = "blue"
     episode: Count
+    variant: Variant = "files"
+    """As in the run card."""
     outcome: Ending
     cause: str
     """Why it ended: `enemy defeated`, `defeated`, `both sides dead`, `time limit`, `step limit`, `agents gone`; against
@@ -250,6 +260,8 @@ class Result(Wire):
     """By agent: in how many steps it was not asked, by reason."""
     rejections: dict[str, int] = {}
     """Rejected calls by reason."""
+    hallucinations: dict[HallucinationKind, int] = {}
+    """Rejected calls of the agents themselves, by kind of hallucination; see [measures](measures.md#hallucinations)."""
     fates: dict[str, dict[str, int]] = {}
     """By agent: how many of its decisions were `fresh`, `stale`, …"""
     accepted_of: dict[str, int] = {}

@@ -99,6 +99,8 @@ class Scenario(Model):
     """What the API calls the score: the game's own, the script's, or the resources that were gathered."""
     melee: bool = False
     """Whether every player starts with a town hall and twelve workers, and loses with their last structure."""
+    elimination: bool = True
+    """Whether a player of a melee game loses with the last structure; without it, the triggers alone end the game."""
     start_locations: tuple[Point, ...] = ()
     players: dict[PlayerId, PlayerSpec]
     own_types: tuple[UnitName, ...] = ()

@@ -58,7 +58,7 @@ def run(world: World) -> None:
                 _do(world, trigger, subject)
             if world.ended:
                 return
-    if deaths and scenario.melee:
+    if deaths and scenario.melee and scenario.elimination:
         melee_start.judge(world)
 
 

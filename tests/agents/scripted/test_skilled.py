@@ -395,6 +395,17 @@ def test_a_builder_builds_in_its_base_and_around_it_when_that_is_full() -> None:
     assert math.dist((2, 2), points(call.replace("(", "[").replace(")", "]"))[0]) > 10.0
 
 
+def test_a_builder_names_what_is_beside_where_the_host_finds_the_place() -> None:
+    hall, worker = line(0x30, "Nexus", 2, 2), line(1, "Probe", 12, 12)
+    pylons = [line(tag, "Pylon", 8, tag - 0x3C) for tag in (0x40, 0x44)]
+    assert calls(page(worker, allies=[hall], actions=["Build_Pylon_Near(tag)"])) == ["Build_Pylon_Near 0x30"]
+    counts = "Unit counts\n    Your units: 13 Probe\n    Your structures: 1 Nexus, 2 Pylon\n\n"
+    build = ["Build_Pylon_Near(tag)", "Build_Gateway_Near(tag)"]
+    seen = page(worker, allies=[hall, *pylons], actions=build, more=counts)
+    (call,) = calls(seen.replace("    Time: 0:20\n", "    Time: 0:20\n    Supply: 13 of 31 used\n"))
+    assert call in {"Build_Gateway_Near 0x40", "Build_Gateway_Near 0x44"}
+
+
 def test_a_structure_trains_one_unit_at_a_time() -> None:
     costs = "        Train_Marine: 50 minerals, 1 supply; enough for 8\n"
     counts = "Your units: 44 SCV\n    Your structures: 1 OrbitalCommand, 2 Barracks, 1 BarracksReactor, 4 SupplyDepot\n"

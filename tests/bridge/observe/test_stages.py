@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from khala_bridge.observe import Observer
 from khala_bridge.observe.stages import Stages
 from khala_bridge.state.teams import Team
-from khala_bridge.task.config import Stage, TeamConfig
+from khala_bridge.task.config import TeamConfig
+from khala_bridge.task.variant import Stage
 
 GO, TAKE, HOLD = (
     Stage(task="go", at=(30, 30), within=4),

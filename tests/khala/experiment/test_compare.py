@@ -152,6 +152,13 @@ def test_a_wrong_word_is_answered_with_what_there_is(made: HandMade, given: dict
     assert words in refusal(made, **given)
 
 
+def test_a_selection_of_both_variants_is_refused_even_if_tasks_may_differ(made: HandMade) -> None:
+    for player in ("skilled", "focus"):
+        made.add({"task": "2s3z", "player": player}, 1, variant="files")
+        made.add({"task": "2s3z", "player": player}, 2, variant="paper", card={"task": {"variant": "paper"}})
+    assert "has matches of both variants of 2s3z: compare one with one" in refusal(made, allow=["task"])
+
+
 def test_tasks_without_a_common_one_are_refused(made: HandMade) -> None:
     made.fill({"skilled": EARLY}, 3)
     made.fill({"focus": LATE}, 3, task="3s5z")

@@ -24,6 +24,7 @@ from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import RUN_TOPICS, Topic, agent_key, run_key
 from khala_protocol.messages import (
+    HALLUCINATION_KINDS,
     LOOPS_PER_S,
     ActionSpec,
     AgentCard,
@@ -53,7 +54,7 @@ from khala_protocol.messages import (
 from khala_protocol.recording import Recorder, Recording
 from khala_sc2.experiment.measures import GROUPS, Measures, measure
 from khala_sc2.experiment.measures.communication import is_acted_on
-from khala_sc2.experiment.measures.hallucinations import KINDS, Kind
+from khala_sc2.experiment.measures.hallucinations import COLUMNS
 from khala_sc2.playing.spending import spent_usd
 from khala_simulator.process.install import install
 
@@ -105,7 +106,7 @@ def assert_agrees(row: Measures, result: Result) -> None:
         assert getattr(row, column) == sum(number for name, number in statuses if name == status)
     assert row.unasked == sum(sum(counts.values()) for counts in result.unasked.values())
     assert (row.requests, row.prompt_tokens, row.cost_usd) == (usage.requests, usage.prompt_tokens, usage.cost_usd)
-    assert row.rejected == sum(getattr(row, kind) for kind in get_args(Kind))
+    assert row.rejected == sum(getattr(row, kind) for kind in COLUMNS)
 
 
 def test_the_golden_battle_has_one_row_with_the_sums_of_its_result() -> None:
@@ -123,16 +124,18 @@ def test_the_golden_battle_has_one_row_with_the_sums_of_its_result() -> None:
 @pytest.mark.asyncio(loop_scope="module")
 async def test_wrong_calls_of_a_match_are_counted_by_their_kind(game: Sides, tmp_path: Path) -> None:
     def wrong(_: Briefing, seen: Observation) -> str:
-        team = seen.view.teams[0].name
-        orders = "<Fly_Away()><Attack_Unit(0x7777)><Select_Unit_Blink_Screen(0x7777, [3, 3])><Move_Screen([9, 99])>"
-        return f"Actions:\nTeam {team}:\n{orders}\nCommunications:\n<MessageTo(Nobody, '''Hello''')>"
+        team = seen.view.teams[0]
+        own = next(unit.tag for unit in team.units if unit.alliance == "own")
+        orders = f"<Fly_Away()><Attack_Unit(0x7777)><Attack_Unit({own})><Move_Screen([40, 9])>"
+        return f"Actions:\nTeam {team.name}:\n{orders}\nCommunications:\n<MessageTo(Nobody, '''Hello''')>"
 
     recording = await played(game, tmp_path / "r.mcap", {"Stalkers": wrong, "Zealots": lambda *_: ""}, max_steps=2)
     (row,) = measure(recording)
     assert_agrees(row, recording.results[0])
     assert row.rejected_unknown_action + row.rejected_unknown_target + row.rejected_unknown_recipient >= 6
-    assert row.input_conflicting >= 4
-    assert row.context_conflicting >= 2
+    assert row.input_conflicting >= 6
+    kinds = {"input_conflicting": row.input_conflicting, "fact_conflicting": 2, "context_conflicting": 2}
+    assert {kind: getattr(row, kind) for kind in kinds} == recording.results[0].hallucinations == kinds
     assert (row.messages_sent, row.messages_undeliverable, row.messages_read, row.outdated) == (2, 2, 0, 0)
     assert row.hallucinated_share == 1.0
 
@@ -212,8 +215,18 @@ def result(side: str = "blue", episode: int = 0, **fields: Any) -> Result:
 
 
 def test_every_reason_for_a_rejection_has_a_kind() -> None:
-    assert set(KINDS) == set(get_args(RejectionReason))
-    assert all(judgement.kind in get_args(Kind) for judgement in KINDS.values())
+    assert set(HALLUCINATION_KINDS) == set(get_args(RejectionReason))
+
+
+def test_kinds_of_hallucinations_are_those_of_the_paper() -> None:
+    by_kind = {kind: [reason for reason, judged in HALLUCINATION_KINDS.items() if judged.kind == kind] for kind in (
+        "fact_conflicting", "context_conflicting", None,
+    )}  # fmt: skip
+    assert by_kind == {
+        "fact_conflicting": ["friendly_target"],  # an ally taken for an enemy
+        "context_conflicting": ["wrong_frame"],  # a screen point as one of the minimap, or the reverse
+        None: ["unread", "too_late", "too_many_actions", "too_many_messages", "refused_by_game"],
+    }
 
 
 def test_a_row_is_flat_its_columns_are_in_the_order_of_the_groups_and_a_database_takes_it(tmp_path: Path) -> None:
@@ -435,7 +448,7 @@ def test_an_observation_with_a_field_of_a_later_version_still_has_its_economy(tm
         recorder.write(agent_key(RUN, "blue", "A", Topic.OBSERVATION), newer)
         recorder.write(run_key(RUN, Topic.REPORT), encode(report(1, aged)))
     (row,) = measure(Recording.open(tmp_path / "r.mcap"))
-    assert (row.bases_end, row.context_conflicting, row.outdated) == (1, 1, 0)  # what it showed is not known
+    assert (row.bases_end, row.input_conflicting, row.outdated) == (1, 1, 0)  # what it showed is not known
 
 
 def test_a_recording_without_a_run_card_is_refused(tmp_path: Path) -> None:

@@ -71,6 +71,25 @@ def test_by_pools_the_other_factors(made: HandMade) -> None:
         report(made.store, ["players"])
 
 
+def test_two_variants_of_a_task_are_never_pooled_in_one_cell(made: HandMade) -> None:
+    made.fill({"skilled": {1, 2, 3}}, 4, task="pvz_task3_level1", variant="files")
+    for seed in (5, 6):
+        cell = {"task": "pvz_task3_level1", "player": "skilled"}
+        made.add(cell, seed, "loss", variant="paper", card={"task": {"variant": "paper"}})
+    for by in ((), ("task",), ("player",)):
+        found = {tuple(cell.where.values()): cell.games for cell in report(made.store, by=by).summaries}
+        paper = {where: games for where, games in found.items() if where[-1] == "paper"}
+        assert list(paper.values()) == [2]
+        assert sum(found.values()) == 46
+    facts = dict(row for row in table(made, "").rows if len(row) == 2)
+    assert facts["variant"] == "files, paper"
+
+
+def test_cells_of_one_variant_need_no_column_for_it(made: HandMade) -> None:
+    assert all("variant" not in cell.where for cell in report(made.store).summaries)
+    assert {cell.where["variant"] for cell in report(made.store, by=("variant",)).summaries} == {""}
+
+
 def test_what_agents_did_is_counted_per_game_and_per_hundred_calls(made: HandMade) -> None:
     values: dict[str, Any] = {
         "calls": 50,

@@ -79,6 +79,23 @@ ENDS = [
         TIE,
         marks=pytest.mark.slow,
     ),
+    ("pvz_task8_level1", [(2, "Hatchery", 0)], 101, VICTORY),  # it is the last structure
+    ("pvz_task1_level1_paper", [(2, "Drone", 5)], 160, VICTORY),
+    ("pvz_task1_level3_paper", [(2, "Queen", 0), (2, "Zergling", 0), (2, "Hatchery", 0), (2, "Drone", 6)], 1440, TIE),
+    ("pvz_task2_level2_paper", [(2, "Queen", 0), (2, "Drone", 6)], 1440, TIE),
+    pytest.param("pvz_task2_level3_paper", [(2, "Drone", 5)], 160, VICTORY, marks=pytest.mark.slow),
+    ("pvz_task3_level1", [(1, "Probe", 6)], 960, VICTORY),
+    ("pvz_task3_level1_paper", [(1, "Probe", 6)], 160, DEFEAT),
+    ("pvz_task4_level2_paper", [(2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)], 160, VICTORY),
+    ("pvz_task8_level3_paper", [(2, "Drone", 5), (2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)], 160, VICTORY),
+    ("pvz_task8_level1_paper", [(2, "Hatchery", 0), (2, "Drone", 5)], 1920, TIE),
+    pytest.param(
+        "pvz_task8_level2_paper",
+        [(2, "Drone", 6), (2, "Roach", 0), (2, "Ravager", 0), (2, "Queen", 0)],
+        1920,
+        TIE,
+        marks=pytest.mark.slow,
+    ),
 ]
 
 
@@ -239,6 +256,20 @@ def test_a_wave_brings_two_transports_with_four_banelings_each() -> None:
         assert len(new) == 2
         assert [len(world.passengers(slot)) for slot in new] == [4, 4]
         assert names.count("Baneling") <= 8 * wave
+
+
+def test_in_the_paper_four_waves_bring_zerglings_too_and_seven_probes_must_live_for_a_minute() -> None:
+    world = calm("pvz_task3_level3_paper")
+    for at in (0, 240, 480, 720):
+        advance(world, at - world.loop)
+        new = [s for s in of_type(world, 2, "OverlordTransport") if world.born_loop[s] == at]
+        loads = [sorted(world.unit_type(slot).name for slot in world.passengers(transport)) for transport in new]
+        assert loads == [["Baneling"] * 2 + ["Zergling"] * 4] * 2
+        kill(world, 2, "OverlordTransport")
+        advance(world, 1)
+    kill(world, 1, "Probe", leave=7)
+    advance(world, 5000)
+    assert (world.loop, results(world)) == (1344, [VICTORY, DEFEAT])
 
 
 def test_a_transport_that_comes_into_the_base_unloads_at_the_minerals() -> None:

@@ -34,6 +34,8 @@ ARMIES = [
     ),
     ("pvz_task3_level3", {"Stalker": 6, "Pylon": 3}, {"Queen": 2, "SpineCrawler": 5, "OverlordTransport": 2}),
     ("pvz_task4_level1", STALKERS, {"Roach": 15, "Ravager": 1}),
+    ("pvz_task4_level2", STALKERS, {"Roach": 15, "Ravager": 2, "Queen": 1, "Overseer": 1}),
+    ("pvz_task4_level2_paper", STALKERS, {"Roach": 15, "Ravager": 2, "Queen": 1}),
     ("pvz_task4_level3", STALKERS, {"Roach": 15, "Ravager": 3, "Queen": 2, "Overseer": 1}),
     (
         "pvz_task5_level3",
@@ -104,7 +106,7 @@ PURSES = [
     ("BuildMarines", (50, 0), [], []),
 ]
 
-FAMILIES = {"llm_pysc2": 25, "SMAC_Maps": 24, "llm_smac": 9, "mini_games": 7, "Melee": 9, "duels": 3}
+FAMILIES = {"llm_pysc2": 38, "SMAC_Maps": 24, "llm_smac": 9, "mini_games": 7, "Melee": 9, "duels": 3}
 
 
 def army(world: World, player: int) -> dict[str, int]:

@@ -1,7 +1,8 @@
 """Placing structures by hand with one worker: where there is room on the screen, and power if it is needed.
 
 The same wants as in `builds` decide what is built. The place is guessed from the screen, and corrected by the
-place that the host names when it refuses one.
+place that the host names when it refuses one. Where the host finds the place, a Pylon stands near a base and all else
+near a Pylon, each time near another one.
 """
 
 from __future__ import annotations
@@ -72,6 +73,11 @@ def _begin(plan: ReplyPlan, what: str) -> bool:
         wanted = "VespeneGeyser" if what in GAS else ""
         sites = [tag for kind, tag in situation.sites if (wanted in kind if wanted else "Mineral" in kind)]
         return bool(sites) and plan.give(f"Build_{what}_Near", sites[0])
+    if team.can(f"Build_{what}_Near"):
+        beside = [
+            unit for unit in team.allies if (unit.type in TOWN_HALLS if what == "Pylon" else unit.type == "Pylon")
+        ]
+        return bool(beside) and plan.give(f"Build_{what}_Near", beside[len(team.allies) % len(beside)].tag)
     if not team.can(f"Build_{what}_Screen"):
         return False
     place = _hint(plan, what) or _place(team, what, situation.fields)
