@@ -13,7 +13,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
-from khala.experiment.measures.evidence import tags
+from khala.dataset.heeding import tags
 from khala_protocol.messages import count_refusals
 
 if TYPE_CHECKING:
