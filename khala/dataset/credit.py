@@ -29,8 +29,9 @@ from statistics import fmean, pstdev
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from khala.dataset.heeding import is_acted_on, tags
-from khala.dataset.rewards import COUNTED, VALUE, WIN, rewards_to_go
+from khala.dataset.rewards import COUNTED, VALUE, WIN, Reward, rewards_to_go
 from khala_bridge.knowledge import knowledge
+from khala_orchestrator.roster import Seat
 from khala_protocol.messages import Observation, Report, count_refusals
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ __all__ = [
     "group_mean",
     "leave_one_out",
     "own_reward",
+    "own_rewards",
     "rewards_to_go",
     "weighted",
 ]
@@ -186,6 +188,25 @@ def credit(recording: Recording) -> dict[tuple[str, int], list[AgentTurn]]:
     for result in recording.results:
         books[result.side, result.episode].end(result)
     return {place: book.turns for place, book in books.items()}
+
+
+def own_rewards(
+    recording: Recording, gamma: float, reward: TurnReward = own_reward
+) -> dict[tuple[Seat, int, int], Reward]:
+    """Return the reward of each turn, alone and with what came after, by seat, episode and step.
+
+    Args:
+        recording: of a match.
+        gamma: discount from one turn of an agent to its next, 0 to 1.
+        reward: of a turn.
+    """
+    found = {}
+    for (side, episode), turns in credit(recording).items():
+        for agent, own in by_agent(turns).items():
+            values = [reward(turn) for turn in own]
+            for turn, value, to_go in zip(own, values, rewards_to_go(values, gamma), strict=True):
+                found[Seat(side, agent), episode, turn.step] = Reward(value, to_go)
+    return found
 
 
 class CreditBook:

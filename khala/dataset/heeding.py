@@ -1,8 +1,7 @@
 """Whether an order follows from a message: it names something that the message names.
 
-A message names tags (`0x1002c0001`), points of the minimap (`[41.4, 25]`), places (`Base 2`) and types of units
-(`Photon Cannons`). An order names the tag that it takes and the type of that unit, the point of the minimap that it
-takes, and the type that it makes. Points on a screen are not compared: each reader has its own.
+Points on a screen are not compared: each reader has its own. `khala.experiment.measures.communication` says more, and
+counts by it; `khala.dataset.credit` rewards by it.
 """
 
 from __future__ import annotations

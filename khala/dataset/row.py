@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala.dataset.rewards import Reward
-    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, Usage
+    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, TokenTrace, Usage
 
 UNFINISHED = "unfinished"
 """The outcome of an episode whose recording ends before it does."""
@@ -63,6 +63,11 @@ class Row:
     fate: Fate | None
     age_loops: int
     reward: Reward
+    """Of the side."""
+    own_reward: Reward
+    """Of the agent: `khala.dataset.credit.own_reward` of its turn."""
+    tokens: TokenTrace
+    """Of the request whose answer the reply is; empty as far as the endpoint told none, or there was none."""
     outcome: str
     valid: bool
 

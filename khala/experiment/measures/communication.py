@@ -1,6 +1,8 @@
 """Whether messages between agents arrived, and whether their readers did anything about them.
 
-`khala.dataset.heeding` says when an order follows from a message.
+A message names tags (`0x1002c0001`), points of the minimap (`[41.4, 25]`), places (`Base 2`) and types of units
+(`Photon Cannons`). An order names the tag that it takes and the type of that unit, the point of the minimap that it
+takes, and the type that it makes. Points on a screen are not compared: each reader has its own.
 """
 
 from __future__ import annotations

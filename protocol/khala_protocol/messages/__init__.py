@@ -29,6 +29,7 @@ from khala_protocol.messages.from_agents import (
     Purpose,
     Reply,
     ReplyStatus,
+    TokenTrace,
 )
 from khala_protocol.messages.to_agents import (
     AgentKind,
@@ -194,6 +195,7 @@ __all__ = [
     "TeamView",
     "Terrain",
     "Timings",
+    "TokenTrace",
     "Toll",
     "Trigger",
     "TypeCount",

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 import pytest
 import pytest_asyncio
 
-from khala.experiment.measures import GROUPS, Measures, measure
 from khala.dataset.heeding import is_acted_on
+from khala.experiment.measures import GROUPS, Measures, measure
 from khala.experiment.measures.hallucinations import KINDS, Kind
 from khala.playing.spending import spent_usd
 from khala_agents.policy import FunctionPolicy
