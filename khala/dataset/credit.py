@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PARTS",
+    "WEIGHTS",
     "AgentTurn",
     "CreditBook",
     "advantages",
@@ -122,14 +123,24 @@ PARTS: Final[Mapping[str, TurnReward]] = {
 }
 
 
-def weighted(
-    *, kills: float = 1.0, losses: float = 1.0, objective: float = 1.0, legality: float = 0.1, messages: float = 0.05
-) -> TurnReward:
-    """Return the reward that is the sum of the parts, each with a weight."""
-    weights = {
-        "kills": kills, "losses": losses, "objective": objective, "legality": legality, "messages": messages
-    }  # fmt: skip
-    return partial(_weigh, weights)
+WEIGHTS: Final[Mapping[str, float]] = {
+    "kills": 1.0,
+    "losses": 1.0,
+    "objective": 1.0,
+    "legality": 0.1,
+    "messages": 0.05,
+}
+
+
+def weighted(**weights: float) -> TurnReward:
+    """Return the reward that is the sum of the parts, each with a weight: that of `WEIGHTS`, or the given one.
+
+    Raises:
+        ValueError: there is no such part.
+    """
+    if unknown := sorted(weights.keys() - PARTS.keys()):
+        raise ValueError(f"a reward has no part {unknown[0]!r}: its parts are {', '.join(PARTS)}")
+    return partial(_weigh, {**WEIGHTS, **weights})
 
 
 def _weigh(weights: Mapping[str, float], turn: AgentTurn) -> float:
