@@ -24,7 +24,7 @@ def run(*words: str, cwd: Path) -> str:
     """Run a program of the environment, and return what it printed."""
     done = subprocess.run(
         [BIN / words[0], *words[1:]], cwd=cwd, capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": str(PROJECT)},
+        env={**os.environ, "PYTHONPATH": str(PROJECT), "KHALA_ENGINE": "python"},
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -38,5 +38,4 @@ def test_gym_env_validate_takes_the_configuration() -> None:
 def test_the_tests_that_gym_env_test_runs_pass_with_the_contract_of_sessions() -> None:
     """`gym env test` runs them in an environment that it makes of `requirements.txt`; here Khala is not on PyPI yet."""
     said = run("python", "-m", "pytest", "-q", "-p", "no:cacheprovider", cwd=SERVER)
-    assert "8 passed" not in said or "failed" not in said
-    assert " passed" in said
+    assert "7 passed" in said

@@ -24,9 +24,10 @@ pytestmark = [
 
 async def run(program: str, *arguments: str, out: Path) -> str:
     """Run a program of verifiers, and return what it printed."""
+    surroundings = os.environ | {"HOME": str(out), "KHALA_ENGINE": "python"}
     process = await asyncio.create_subprocess_exec(
-        BIN / program, *arguments, "-o", out, "--run.name", "run",
-        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT, cwd=out, env={**os.environ, "HOME": str(out)},
+        BIN / program, *arguments, "-o", out, "--run.name", "run", cwd=out, env=surroundings,
+        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
     said, _ = await process.communicate()
     assert process.returncode == 0, said.decode()

@@ -160,14 +160,9 @@ class KhalaStarCraftServer(GymnasiumServer):
     async def _begin(self, metadata: Mapping[str, Any]) -> AgentEpisode:
         try:
             row = TaskData.model_validate(dict(metadata))
-            spec = RolloutSpec(
-                row.battle,
-                row.seed,
-                agents=[row.agent] if row.agent else (),
-                others=row.others,
-                max_steps=row.max_steps,
-            )
-            return await self._in_games(_made(spec, row.agent, self._games))
+            agents = (row.agent,) if row.agent else ()
+            spec = RolloutSpec(row.battle, row.seed, agents, others=row.others, max_steps=row.max_steps)
+            return await self._in_games(_made(spec, self._games))
         except (KhalaError, ValidationError) as error:
             raise HTTPException(422, str(error)) from None
 

@@ -10,6 +10,7 @@ from unittest.mock import MagicMock
 import pytest
 from fastapi.testclient import TestClient
 from nemo_gym.base_resources_server import BaseResourcesServerConfig, ResourcesSeedSessionRequest
+from nemo_gym.episode_types import EpisodeId, TaskId
 from nemo_gym.server_utils import ServerClient
 from nemo_gym.testing.session_conformance import check_resources_session_contract
 from resources_servers.khala_starcraft.app import KhalaStarCraftServer
@@ -61,7 +62,10 @@ def test_a_row_names_no_file_no_code_and_nobody_else(app: FastAPI, row: dict[str
 
 def test_sessions_keep_the_contract_of_environment_servers(app: FastAPI) -> None:
     seed = ResourcesSeedSessionRequest(
-        resources_session_id="one", episode_id="episode", task_id="task", task_data={"battle": "2s3z", "seed": 1}
+        resources_session_id="one",
+        episode_id=EpisodeId(rollout_id="episode"),
+        task_id=TaskId(taskset="khala", task_id="2s3z-1"),
+        task_data={"battle": "2s3z", "seed": 1},
     )
     check_resources_session_contract(app, seed, keeps_state=True)
 
