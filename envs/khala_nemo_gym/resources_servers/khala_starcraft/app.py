@@ -140,7 +140,7 @@ class KhalaStarCraftServer(GymnasiumServer):
         await self.close_session(request.session.get(SESSION_ID_KEY))
         return {}
 
-    async def seed_session(self, request: Request, body: ResourcesSeedSessionRequest) -> ResourcesSeedSessionResponse:  # type: ignore[override]  # NeMo Gym's servers take the request as well
+    async def seed_session(self, request: Request, body: ResourcesSeedSessionRequest) -> ResourcesSeedSessionResponse:
         """Make an episode under the caller's name; `/reset` in this session begins it anew."""
         name = body.resources_session_id
         async with self._seeding:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any, Final
+
 from pydantic import BaseModel, ConfigDict, Field
 
-CONSUMED = {"consumed_by": ["verify"]}
+CONSUMED: Final[dict[str, Any]] = {"consumed_by": ["verify"]}
 
 
 class TaskData(BaseModel):
