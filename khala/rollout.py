@@ -116,7 +116,11 @@ class TeamRollout:
 
     @property
     def turns(self) -> Sequence[AgentTurn]:
-        """The turns of the agents that the caller plays; the last one of each grows until the episode is over."""
+        """The turns of the agents that the caller plays; the last one of each grows until the episode is over.
+
+        What their teammates see is not known here: kills and losses of the side are shared by what the played agents
+        saw, and are all theirs where nobody else is known to have a part.
+        """
         return [turn for turn in self._book.turns if turn.agent in self._seats]
 
     async def begin(self) -> Mapping[str, AgentPrompt]:

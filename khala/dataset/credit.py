@@ -1,7 +1,7 @@
 """What each agent's decisions were worth, from what a match says of its steps: parts, their sum, and what came after.
 
     turns = credit(recording)["blue", 0]                       what happened in each turn of each agent
-    rewards = [own_reward(turn) for turn in turns]             one number a turn: `weighted` makes others
+    rewards = [own_reward(turn) for turn in turns]             one number a turn: `with_weights` makes others
     returns = rewards_to_go(rewards_of_an_agent, gamma=0.99)   with all that came after
     advantages(returns_of_the_group)                           compared with other plays of the same game
 
@@ -53,7 +53,7 @@ __all__ = [
     "own_reward",
     "own_rewards",
     "rewards_to_go",
-    "weighted",
+    "with_weights",
 ]
 
 
@@ -132,7 +132,7 @@ WEIGHTS: Final[Mapping[str, float]] = {
 }
 
 
-def weighted(**weights: float) -> TurnReward:
+def with_weights(**weights: float) -> TurnReward:
     """Return the reward that is the sum of the parts, each with a weight: that of `WEIGHTS`, or the given one.
 
     Raises:
@@ -147,7 +147,7 @@ def _weigh(weights: Mapping[str, float], turn: AgentTurn) -> float:
     return sum(weight * PARTS[name](turn) for name, weight in weights.items())
 
 
-own_reward: Final = weighted()
+own_reward: Final = with_weights()
 """The reward of a turn if none is given."""
 
 
@@ -304,7 +304,7 @@ class CreditBook:
 
     def _kill_weights(self) -> dict[str, float]:
         """Return the price of the enemies that each agent had a part in, by the new observations."""
-        fallen = {event.tag: event for seen in self._new.values() for event in _died(seen, "enemy")}
+        fallen = {event.tag: event for seen in self._new.values() for event in _deaths(seen, "enemy")}
         aims = {agent: self._aims(agent, fallen) for agent in self._open}
         weights: dict[str, float] = defaultdict(float)
         for tag, event in fallen.items():
@@ -326,7 +326,7 @@ class CreditBook:
     def _loss_weights(self, gone: Collection[str]) -> dict[str, float]:
         """Return the price of the dead of each agent, by the new observations; of one that is gone, all that it had."""
         prices = {
-            agent: sum(_value(event.type) for event in _died(seen, "own"))
+            agent: sum(_value(event.type) for event in _deaths(seen, "own"))
             for agent, seen in self._new.items()
             if agent in self._open
         }
@@ -339,13 +339,13 @@ def _units(seen: Observation | None) -> Iterator[UnitView]:
         yield from team.units
 
 
-def _died(seen: Observation, alliance: str) -> Iterator[Event]:
+def _deaths(seen: Observation, alliance: str) -> Iterator[Event]:
     for team in seen.view.teams:
         yield from (event for event in team.events if event.what == "died" and event.alliance == alliance)
 
 
 def _saw_die(seen: Observation, tag: str) -> bool:
-    return any(event.tag == tag for event in _died(seen, "enemy"))
+    return any(event.tag == tag for event in _deaths(seen, "enemy"))
 
 
 def _price(units: Iterator[UnitView]) -> float:

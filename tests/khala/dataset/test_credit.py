@@ -16,7 +16,7 @@ from khala.dataset.credit import (
     leave_one_out,
     own_reward,
     rewards_to_go,
-    weighted,
+    with_weights,
 )
 from khala_protocol.messages import (
     AgentReport,
@@ -109,7 +109,7 @@ def test_a_message_counts_if_its_reader_does_what_it_names(order: str, heeded: i
 def test_a_reward_is_the_weighted_sum_of_its_parts() -> None:
     turn = AgentTurn("A", 3, killed=500, lost=200, accepted=3, refused=1, sent=2, heeded=1, ending="win")
     assert own_reward(turn) == pytest.approx(0.5 - 0.2 + 1 - 0.1 * 0.25 + 0.05 * 0.5)
-    assert weighted(kills=0, losses=2, objective=0, legality=0, messages=0)(turn) == pytest.approx(-0.4)
+    assert with_weights(kills=0, losses=2, objective=0, legality=0, messages=0)(turn) == pytest.approx(-0.4)
 
 
 def test_returns_and_baselines_follow_their_formulas() -> None:
