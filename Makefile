@@ -21,7 +21,7 @@ INSTALLED := agents bridge configs khala_sc2 orchestrator protocol simulator
 DISTRIBUTIONS := khala-sc2 khala-sc2-agents khala-sc2-bridge khala-sc2-configs khala-sc2-orchestrator khala-sc2-protocol khala-sc2-simulator
 DIST ?= dist
 
-.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted standards cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -87,6 +87,20 @@ slow: install-tests .venv/.real-model ## All long tests: whole tables, more exam
 interpreted: install-tests ## Unit tests of the rules in the interpreter, as a debugger plays them
 	KHALA_ENGINE=python $(RUN)pytest $(PARALLEL) tests/simulator/engine/test_damage.py tests/simulator/engine/test_weapons.py tests/simulator/engine/test_acquire.py tests/simulator/engine/test_regeneration.py tests/simulator/engine/test_melee_contact.py
 
+# verifiers pins mcp 2.0.0, NeMo Gym mcp 1 and Python 3.13: each has an environment of its own, with Khala in it.
+PYTHON_313 ?= $(firstword $(foreach p,python3.13 $(wildcard $(HOME)/.pyenv/versions/3.13*/bin/python3),$(shell $(p) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 13))' 2>/dev/null && echo $(p))))
+
+.venv-verifiers/.ready: envs/khala_verifiers/pyproject.toml uv.lock $(filter .uv/bin/uv,$(UV))
+	@UV=$(UV) bash .ci/environment .venv-verifiers $(PYTHON) "verifiers>=0.4,<0.5"
+	@$(UV) pip install --quiet --python .venv-verifiers/bin/python --no-deps -e envs/khala_verifiers
+
+.venv-nemo-gym/.ready: envs/khala_nemo_gym/resources_servers/khala_starcraft/requirements.txt uv.lock $(filter .uv/bin/uv,$(UV))
+	@test -n "$(PYTHON_313)" || { echo "NeMo Gym needs Python 3.13: say make standards PYTHON_313=/path/to/python3.13"; exit 1; }
+	@UV=$(UV) bash .ci/environment .venv-nemo-gym $(PYTHON_313) --python-version 3.13.14 "nemo-gym>=0.7,<0.8"
+
+standards: install-tests .venv-verifiers/.ready .venv-nemo-gym/.ready ## The checks of verifiers and NeMo Gym, each in an environment of its own
+	$(RUN)pytest -m "slow or not slow" tests/standards
+
 cover: install-tests ## Branch coverage of packages by their own tests; fails below COVERED per cent
 	rm -f .coverage .coverage.*
 	$(RUN)pytest $(PARALLEL) --cov --cov-report= $(addprefix tests/,$(COVERED_PACKAGES))
@@ -143,4 +157,4 @@ picture: install ## Play a battle and draw docs/images/2s3z.webp from its record
 	$(RUN)python -m docs.picture
 
 clean: ## Remove what make made
-	rm -rf site .coverage .coverage.* .venv .venv-3.* .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist
+	rm -rf site .coverage .coverage.* .venv .venv-3.* .venv-verifiers .venv-nemo-gym .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist

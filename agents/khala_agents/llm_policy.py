@@ -460,6 +460,7 @@ class _Tries:
             latency_s=self._clock() - began,
             waited_s=ticket.waited_s,
             usage=usage,
+            tokens=completion.tokens if completion else None,
         )
         self._context.trace(exchange)
 

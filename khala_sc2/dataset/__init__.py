@@ -2,7 +2,9 @@
 
     row       what is known of one decision
     rows      a recording → rows, one by one
-    rewards   what a decision was worth
+    rewards   what a decision was worth to its side
+    credit    what it was worth of the agent's own, and compared with others of its group
+    heeding   whether an order follows from a message
     prompts   the prompt of a decision, made again where no request to a model was recorded
     choose    which rows are exported, and into which split
     forms     a row → a chat in OpenAI's or ShareGPT's form, or TRL's prompt and completion

@@ -259,6 +259,9 @@ COLUMNS: Mapping[RowForm, str] = {
 * `reward`: minerals + vespene of what the side destroyed, minus those of what it lost, from this decision up to the
   next decision of its side; agents that decide in the same step share it.
 * `reward_to_go` = `reward` + {gamma:g} · `reward_to_go` of the next decision of the side, to the end of the episode.
+* `own_reward`, `own_reward_to_go`: of the agent alone, between its own decisions: its kills and losses, the result,
+  refused actions, messages that were acted on (`khala_sc2.dataset.credit`).
+* `prompt_token_ids`, `reply_token_ids`, `reply_logprobs`: as far as the endpoint told them, else empty.
 * `outcome`, `valid`: of the episode; `unfinished` if its recording ends before it does.
 """,
 }

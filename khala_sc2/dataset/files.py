@@ -226,7 +226,9 @@ def _columns(pa: Any) -> dict[str, Any]:
         "accepted": pa.list_(text),
         "rejected": pa.list_(pa.struct({"reason": text, "message": text, "text": text, "team": text})),
         "fate": text, "age_loops": whole,
-        "reward": number, "reward_to_go": number, "outcome": text, "valid": pa.bool_(),
+        "reward": number, "reward_to_go": number, "own_reward": number, "own_reward_to_go": number,
+        "prompt_token_ids": pa.list_(whole), "reply_token_ids": pa.list_(whole), "reply_logprobs": pa.list_(number),
+        "outcome": text, "valid": pa.bool_(),
         "usage": pa.struct({"requests": whole, "prompt_tokens": whole, "completion_tokens": whole,
                             "cached_tokens": whole, "reasoning_tokens": whole, "cost_usd": number}),
     }  # fmt: skip
@@ -248,6 +250,11 @@ def _plain(row: Row, *, images: bool) -> dict[str, Any]:
         ],
         "reward": row.reward.reward,
         "reward_to_go": row.reward.to_go,
+        "own_reward": row.own_reward.reward,
+        "own_reward_to_go": row.own_reward.to_go,
+        "prompt_token_ids": list(row.tokens.prompt_ids),
+        "reply_token_ids": list(row.tokens.reply_ids),
+        "reply_logprobs": list(row.tokens.logprobs),
         "usage": row.usage.model_dump(
             include={"requests", "prompt_tokens", "completion_tokens", "cached_tokens", "reasoning_tokens", "cost_usd"}
         ),

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import accumulate
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from khala_protocol.messages import Report
 
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
 
     from khala_protocol.messages import AgentStatus, Result
     from khala_protocol.recording import Recording
+
+WIN: Final = 1.0
+VALUE: Final = 1000.0
+"""Minerals and vespene that are worth as much as a win; all of an army of SMAC's 2s3z has 850."""
 
 COUNTED: frozenset[AgentStatus] = frozenset({"ok", "fallback"})
 """Statuses of a reply that the host acted on."""
@@ -55,12 +60,7 @@ class _Episode:
         values = self._by_decision(steps, result)
         if values is None:
             return dict.fromkeys(steps, UNKNOWN)
-        to_go = 0.0
-        found = {}
-        for step, value in zip(reversed(steps), reversed(values), strict=True):
-            to_go = value + gamma * to_go
-            found[step] = Reward(value, to_go)
-        return found
+        return dict(zip(steps, map(Reward, values, rewards_to_go(values, gamma)), strict=True))
 
     def _by_decision(self, steps: Sequence[int], result: Result | None) -> list[float] | None:
         known = {step: value for step, value in self.values.items() if value is not None}
@@ -72,6 +72,12 @@ class _Episode:
         if result is None:
             return None
         return [*[0.0] * (len(steps) - 1), result.killed.value - result.lost.value]
+
+
+def rewards_to_go(rewards: Sequence[float], gamma: float = 1.0) -> list[float]:
+    """Return each reward with all later ones, discounted: reward + gamma · (what is to go at the next decision)."""
+    later_first = accumulate(reversed(rewards), lambda to_go, reward: reward + gamma * to_go)
+    return list(later_first)[::-1]
 
 
 def value_of(report: Report) -> float | None:

@@ -11,7 +11,7 @@ from khala_sc2.dataset.prompts import without_example
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, Usage
+    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, TokenTrace, Usage
     from khala_sc2.dataset.rewards import Reward
 
 UNFINISHED = "unfinished"
@@ -63,6 +63,11 @@ class Row:
     fate: Fate | None
     age_loops: int
     reward: Reward
+    """Of the side."""
+    own_reward: Reward
+    """Of the agent: `khala_sc2.dataset.credit.own_reward` of its turn."""
+    tokens: TokenTrace
+    """Of the request whose answer the reply is; empty as far as the endpoint told none, or there was none."""
     outcome: str
     valid: bool
 

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from khala_orchestrator.roster import Seat
 from khala_protocol.files import MB
 from khala_protocol.keys import Topic
-from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report
+from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report, TokenTrace
+from khala_sc2.dataset.credit import own_rewards
 from khala_sc2.dataset.prompts import Prompter, count_example
 from khala_sc2.dataset.rewards import COUNTED, UNKNOWN, rewards
 from khala_sc2.dataset.row import UNFINISHED, Row, RowPicture
@@ -92,7 +93,7 @@ class Rows:
     """The rows of one recording, in the order in which their decisions were reported.
 
     Args:
-        recording: of a match; it is read twice.
+        recording: of a match; it is read three times.
         run: its run card.
         gamma: discount of the reward-to-go.
         images: whether rows have their pictures.
@@ -114,6 +115,7 @@ class Rows:
         self.left_out: Counter[str] = Counter()
         self._recording, self._run, self._images = recording, run, images
         self._rewards = rewards(recording, gamma)
+        self._own_rewards = own_rewards(recording, gamma)
         self._results: dict[tuple[str, int], Result] = {(r.side, r.episode): r for r in recording.results}
         self._as_sent = detail is None
         self._prompters: dict[Seat, Prompter] = defaultdict(partial(Prompter, detail or "full"))
@@ -211,6 +213,9 @@ class Rows:
         seen, reply, report, call = decision.seen, decision.reply, decision.report, decision.call
         assert reply is not None and report is not None
         prompt = self._prompt(decision)
+        answered = call is not None and reply.status == "ok"
+        reward = self._rewards.get((seen.side, seen.episode), {}).get(seen.step, UNKNOWN)
+        place = DecisionPlace(Seat(seen.side, seen.agent), seen.episode, seen.step)
         result = self._results.get((seen.side, seen.episode))
         shown = [ref for message in prompt for ref in message.images if ref.sha256 in decision.pictures]
         return Row(
@@ -231,13 +236,15 @@ class Rows:
             pictures=tuple(RowPicture(ref, decision.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
             status=reply.status,
-            model=(call.answered_by or call.model) if call is not None and reply.status == "ok" else "",
+            model=(call.answered_by or call.model) if call is not None and answered else "",
             usage=reply.usage,
             accepted=report.accepted,
             rejections=report.rejections,
             fate=report.fate,
             age_loops=report.age_loops,
-            reward=self._rewards.get((seen.side, seen.episode), {}).get(seen.step, UNKNOWN),
+            reward=reward,
+            own_reward=UNKNOWN if reward.reward is None else self._own_rewards.get(place, UNKNOWN),
+            tokens=(call.tokens if call is not None and answered else None) or TokenTrace(),
             outcome=result.outcome if result else UNFINISHED,
             valid=result.valid if result else False,
         )

@@ -6,9 +6,9 @@ is over; `khala_sc2.env.parallel_env` takes one of yours.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from khala_sc2.dataset.rewards import value_of
+from khala_sc2.dataset.rewards import VALUE, WIN, value_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 SideReward: TypeAlias = "Callable[[Sequence[Report], Result | None], float]"
 
-WIN: Final = 1.0
-VALUE: Final = 1000.0
-"""Minerals and vespene that are worth as much as a win; all of an army of SMAC's 2s3z has 850."""
+__all__ = ["VALUE", "WIN", "SideReward", "battle"]
 
 
 def battle(reports: Sequence[Report], result: Result | None) -> float:

@@ -33,6 +33,10 @@ class LoopThread:
         """Return the result of a coroutine that runs in the loop; raise what it raises."""
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result()
 
+    async def run_for(self, coroutine: Coroutine[Any, Any, T]) -> T:
+        """Do the same for a caller in another event loop, which goes on meanwhile."""
+        return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(coroutine, self._loop))
+
     def close(self) -> None:
         """End the loop and its thread."""
         self.run(self._loop.shutdown_default_executor())

@@ -210,6 +210,8 @@ export interface ModelCall {
   /** Estimated tokens to which the prompt was fitted; None if it is whole. */
   room_tokens: number | null;
   usage: Usage;
+  /** Absent if the endpoint told none of them; it tells them if `extra` of the model file asks for them. */
+  tokens: TokenTrace | null;
 }
 
 /** Server → page: what became of an advice, or why something cannot be had. */
@@ -481,6 +483,18 @@ export interface Timings {
   game_s: number;
   /** With the clock `realtime`: how much the game is behind the wall clock since the episode began. */
   lag_s: number;
+}
+
+/**
+ * The tokens of a request and its answer, as far as the endpoint told them; what it did not tell is empty.
+ */
+export interface TokenTrace {
+  /** Of the whole prompt, with what the chat template adds. */
+  prompt_ids: number[];
+  /** Of all that the model generated, its reasoning as well. */
+  reply_ids: number[];
+  /** Natural logarithm of the probability of each generated token; -9999 for 0, as vLLM has it. */
+  logprobs: number[];
 }
 
 export type UnitMark = [tag: number, type: string, player: number, x: number, y: number, radius: number, facing: number, health: number, health_max: number, shield: number, shield_max: number, energy: number, progress: number, flags: number, seen_by: number, order: string, target: number, to_x: number, to_y: number];

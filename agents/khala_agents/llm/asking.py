@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from khala_agents.llm.client import Departure
     from khala_agents.llm.http import HttpAnswer
     from khala_agents.llm.pricing import Prices
-    from khala_protocol.messages import ChatMessage, Usage
+    from khala_protocol.messages import ChatMessage, TokenTrace, Usage
 
 _LONG_PROMPT = 2000
 _FAR_FEWER = 0.5
@@ -187,6 +187,10 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
     def _usage(self, counts: object) -> Usage:
         """Return the tokens of an answer and their price from the endpoint's own counts."""
 
+    def _tokens(self, body: AnswerBodyT) -> TokenTrace | None:  # noqa: ARG002  # most endpoints tell none
+        """Return the tokens of a prompt and its answer; None if the endpoint did not tell any."""
+        return None
+
     @abstractmethod
     def _picture(self, media_type: str, data: str) -> dict[str, Any]:
         """Return a picture, in base64, as a part of a message."""
@@ -246,6 +250,7 @@ class HttpClient(ABC, Generic[AnswerBodyT]):
             model=model_name(body.model),
             verdict=judged.verdict,
             reason=judged.reason,
+            tokens=self._tokens(body),
         )
 
     async def _ask(self, request: Request) -> HttpAnswer:

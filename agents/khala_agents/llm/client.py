@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from khala_agents.answers.form import AnswerShape
     from khala_agents.llm.verdict import Verdict
     from khala_agents.llm.vision import Vision
-    from khala_protocol.messages import Purpose
+    from khala_protocol.messages import Purpose, TokenTrace
 
 Scalar = str | int | float | bool | None
 
@@ -108,6 +108,7 @@ class Completion:
         model: which model answered, in the endpoint's words; "" if it did not say.
         verdict: whether it has words to play.
         reason: why it has none, in one line for people; "" if it has.
+        tokens: those of the prompt and the answer, if the endpoint told them.
     """
 
     text: str
@@ -116,6 +117,7 @@ class Completion:
     model: str = ""
     verdict: Verdict = "ok"
     reason: str = ""
+    tokens: TokenTrace | None = None
 
     @property
     def cut(self) -> bool:

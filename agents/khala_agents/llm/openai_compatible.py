@@ -14,6 +14,7 @@ from khala_agents.llm.batches import OpenAIBatches
 from khala_agents.llm.client import MalformedCompletion
 from khala_agents.llm.effort import effort_fields
 from khala_agents.llm.faults import broken_off, is_error
+from khala_agents.llm.tokens import token_trace
 from khala_agents.llm.verdict import CUT, FILTERED, AnswerParts, tool_words
 from khala_protocol.messages import Usage
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from khala_agents.llm.effort import Effort
     from khala_agents.llm.profiles import Profile
     from khala_agents.llm.vision import Detail
+    from khala_protocol.messages import TokenTrace
 
 
 class _Message(BaseModel):
@@ -57,11 +59,14 @@ class _Choice(BaseModel):
     message: _Message | None = None
     finish_reason: Any = None
     error: Any = None
+    logprobs: Any = None
+    token_ids: Any = None
 
 
 class _Answer(AnswerBody):
     choices: Annotated[list[_Choice], Field(min_length=1)]
     error: Any = None
+    prompt_token_ids: Any = None
 
 
 class OpenAICompatible(HttpClient[_Answer]):
@@ -141,6 +146,10 @@ class OpenAICompatible(HttpClient[_Answer]):
         if choice.message is None and finish.lower() not in CUT | FILTERED:
             raise MalformedCompletion(f"{url} answered with a choice that has no message")
         return (choice.message or _Message()).take_apart(finish, self.answer_tokens)
+
+    def _tokens(self, body: _Answer) -> TokenTrace | None:
+        choice = body.choices[0]
+        return token_trace(body.prompt_token_ids, choice.token_ids, choice.logprobs)
 
     def _usage(self, counts: object) -> Usage:
         prompt = count(counts, "prompt_tokens")

@@ -73,6 +73,7 @@ class ReplayClient:
                 model=exchange.answered_by,
                 verdict=cast("Verdict", exchange.status) if exchange.status in VERDICTS else "ok",
                 reason=exchange.reason,
+                tokens=exchange.tokens,
             )
         *origin, attempt = _key(request)
         error = _failure(exchange)

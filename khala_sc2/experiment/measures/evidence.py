@@ -7,7 +7,6 @@ kept: an agent is not asked again before its decision took effect.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -98,14 +97,6 @@ def evidence(sample: Recorded) -> Evidence | None:
         return kind.model_validate_json(sample.payload)
     except ValidationError:
         return None
-
-
-_TAG = re.compile(r"0x[0-9a-f]+", re.IGNORECASE)
-
-
-def tags(text: str) -> frozenset[str]:
-    """Return the tags in a text, in small letters."""
-    return frozenset(tag.casefold() for tag in _TAG.findall(text))
 
 
 @dataclass(frozen=True)

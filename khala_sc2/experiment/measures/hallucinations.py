@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 from khala_protocol.messages import HALLUCINATION_KINDS, HallucinationKind, count_refusals
-from khala_sc2.experiment.measures.evidence import tags
+from khala_sc2.dataset.heeding import tags
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -29,6 +29,7 @@ from khala_protocol.messages.from_agents import (
     Purpose,
     Reply,
     ReplyStatus,
+    TokenTrace,
 )
 from khala_protocol.messages.hallucinations import (
     HALLUCINATION_KINDS,
@@ -205,6 +206,7 @@ __all__ = [
     "TeamView",
     "Terrain",
     "Timings",
+    "TokenTrace",
     "Toll",
     "Trigger",
     "TypeCount",

@@ -110,6 +110,17 @@ class ChatMessage(Frozen):
     """Pictures before the text, in their order."""
 
 
+class TokenTrace(Frozen):
+    """The tokens of a request and its answer, as far as the endpoint told them; what it did not tell is empty."""
+
+    prompt_ids: tuple[Count, ...] = ()
+    """Of the whole prompt, with what the chat template adds."""
+    reply_ids: tuple[Count, ...] = ()
+    """Of all that the model generated, its reasoning as well."""
+    logprobs: tuple[float, ...] = ()
+    """Natural logarithm of the probability of each generated token; -9999 for 0, as vLLM has it."""
+
+
 class ModelCall(Wire):
     """Agent → recorder: one request to a model and its answer. Never a key."""
 
@@ -148,3 +159,5 @@ class ModelCall(Wire):
     room_tokens: int | None = None
     """Estimated tokens to which the prompt was fitted; None if it is whole."""
     usage: Usage = Usage()
+    tokens: TokenTrace | None = Field(default=None, exclude_if=lambda tokens: tokens is None)
+    """Absent if the endpoint told none of them; it tells them if `extra` of the model file asks for them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import random
 import socket
 import tracemalloc
@@ -34,7 +35,7 @@ from khala_agents.llm.profiles import PROFILES, Profile
 from khala_agents.scripted.canned import Canned, Given
 from khala_agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint, count_tokens
 from khala_agents.scripted.faults import InjectedFaults
-from khala_protocol.messages import ChatMessage, Usage
+from khala_protocol.messages import ChatMessage, TokenTrace, Usage
 from khala_protocol.speech import parse
 
 if TYPE_CHECKING:
@@ -70,6 +71,44 @@ async def test_a_completion_comes_with_its_usage_and_price() -> None:
     said = count_tokens(completion.text)
     assert (completion.usage.prompt_tokens, completion.usage.completion_tokens) == (prompt, said)
     assert completion.usage.cost_usd == pytest.approx((prompt + 10 * said) / 1e6)
+
+
+# --- tokens --------------------------------------------------------------------------------------------
+
+TOLD = [
+    ({}, {}, None),
+    (
+        {"logprobs": {"content": [{"token": "Hi", "logprob": -0.5}, {"token": ".", "logprob": -math.inf}]}},
+        {},
+        TokenTrace(logprobs=(-0.5, -9999.0)),
+    ),
+    (
+        {"logprobs": {"content": [{"token": "token_id:7", "logprob": -1}]}, "token_ids": None},
+        {"prompt_token_ids": [1, 2, 3]},
+        TokenTrace(prompt_ids=(1, 2, 3), reply_ids=(7,), logprobs=(-1.0,)),
+    ),
+    ({"token_ids": [4, 5]}, {"prompt_token_ids": ["a", -1]}, TokenTrace(reply_ids=(4, 5))),
+    ({"token_ids": 4, "logprobs": {"content": [None]}}, {"prompt_token_ids": {}}, None),
+    ({"logprobs": {"content": [{"token": "token_id:" + "9" * 5000, "logprob": "low"}]}}, {}, None),
+]
+
+
+@pytest.mark.parametrize(("choice", "body", "tokens"), TOLD)
+async def test_tokens_are_read_as_far_as_an_endpoint_tells_them(choice: Any, body: Any, tokens: TokenTrace) -> None:
+    async def answer(request: web.Request) -> web.Response:
+        said = {"message": {"role": "assistant", "content": "Hi."}, "finish_reason": "stop"}
+        return web.json_response({"choices": [said | choice]} | body)
+
+    application = web.Application()
+    application.router.add_post("/v1/chat/completions", answer)
+    runner = web.AppRunner(application, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    try:
+        completion = await ask(client(f"http://127.0.0.1:{runner.addresses[0][1]}/v1"))
+    finally:
+        await runner.cleanup()
+    assert (completion.text, completion.tokens) == ("Hi.", tokens)
 
 
 # --- bodies --------------------------------------------------------------------------------------------

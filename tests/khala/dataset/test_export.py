@@ -71,6 +71,7 @@ def test_datasets_loads_all_columns_of_parquet_and_decodes_the_pictures(
         assert (got["id"], got["reply"], got["seed"], got["task"]) == (row.id, row.reply, 3, "2s3z_pair")
         assert [message["content"] for message in got["prompt"]] == [message.content for message in row.prompt]
         assert (got["reward"], got["reward_to_go"]) == row.reward
+        assert (got["own_reward"], got["own_reward_to_go"]) == row.own_reward != (None, None)
         assert (got["accepted"], got["fate"], got["outcome"]) == (list(row.accepted), row.fate, row.outcome)
         sizes = [(picture.ref.width, picture.ref.height) for picture in row.pictures]
         assert [image.size for image in got["images"]] == sizes != []

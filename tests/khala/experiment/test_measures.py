@@ -52,8 +52,8 @@ from khala_protocol.messages import (
     Wire,
 )
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.dataset.heeding import is_acted_on
 from khala_sc2.experiment.measures import GROUPS, Measures, measure
-from khala_sc2.experiment.measures.communication import is_acted_on
 from khala_sc2.experiment.measures.hallucinations import COLUMNS
 from khala_sc2.playing.spending import spent_usd
 from khala_simulator.process.install import install
