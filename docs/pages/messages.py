@@ -11,13 +11,13 @@ from pydantic import BaseModel
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
 from docs.pages.schema import Describer, about, parts, remarks
 from khala_protocol import keys, messages
-from khala_protocol.messages import HALLUCINATION_KINDS, MESSAGE_TYPES, Wire, to_agents, to_all
+from khala_protocol.messages import HALLUCINATION_KINDS, MESSAGE_TYPES, Wire, reasons, to_all
 
 if TYPE_CHECKING:
     from types import ModuleType
 
 DESCRIBER = Describer()
-LITERALS = {"AgentStatus": (to_all, "AgentReport.status"), "RejectionReason": (to_agents, "Rejection.reason")}
+LITERALS = {"AgentStatus": (to_all, "AgentReport.status"), "RejectionReason": (reasons, "Rejection.reason")}
 """Literals whose values have remarks, their module, and the field that holds one."""
 
 

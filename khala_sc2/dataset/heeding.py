@@ -1,7 +1,7 @@
 """Whether an order follows from a message: it names something that the message names.
 
-Points on a screen are not compared: each reader has its own. `khala_sc2.experiment.measures.communication` says more, and
-counts by it; `khala_sc2.dataset.credit` rewards by it.
+Points on a screen are not compared: each reader has its own. `khala_sc2.experiment.measures.communication` says more,
+and counts by it; `khala_sc2.dataset.credit` rewards by it.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from khala_protocol.messages.hallucinations import (
     Judgement,
     count_hallucinations,
 )
+from khala_protocol.messages.reasons import RejectionReason
 from khala_protocol.messages.to_agents import (
     AgentKind,
     Briefing,
@@ -50,7 +51,6 @@ from khala_protocol.messages.to_agents import (
     Observation,
     Received,
     Rejection,
-    RejectionReason,
     TeamSpec,
     Verdict,
     count_refusals,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_protocol.messages.to_agents import RejectionReason
+    from khala_protocol.messages.reasons import RejectionReason
 
 HallucinationKind = Literal["input_conflicting", "fact_conflicting", "context_conflicting"]
 
