@@ -72,7 +72,7 @@ LANGUAGES = {
 }
 OTHER_PROGRAMS = {
     "cd", "claude", "cp", "curl", "docker", "export", "git", "gym", "inspect", "kubectl", "make", "mkdir", "pip", "ray",
-    "sbatch", "scp", "source", "ssh", "vf-eval", "vf-validate",
+    "sbatch", "scp", "source", "ssh", "uv", "vf-eval", "vf-validate",
 }  # fmt: skip
 ALONE = {"khala-agent": "agent", "khala-llm": "llm", "khala-sc2": "sc2"}
 """The commands of a package that is installed without the others, and what `khala` calls them."""
