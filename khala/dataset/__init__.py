@@ -2,6 +2,7 @@
 
     row       what is known of one decision
     rows      a recording → rows, one by one
+    dynamics  a recording → observations, joint orders and next observations, for world models
     rewards   what a decision was worth
     prompts   the prompt of a decision, made again where no request to a model was recorded
     choose    which rows are exported, and into which split

@@ -1,4 +1,4 @@
-"""One row of a data set: a decision of an agent, with all that is known of it."""
+"""One row of a data set: a decision of an agent with all that is known of it, or two observations of a world model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala.dataset.rewards import Reward
-    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, Usage
+    from khala_protocol.messages import ChatMessage, Clock, Fate, ImageRef, Rejection, Usage, View
 
 UNFINISHED = "unfinished"
 """The outcome of an episode whose recording ends before it does."""
@@ -30,9 +30,35 @@ class RowPicture(NamedTuple):
         return f"{sha256(self.data).hexdigest()[:32]}.{self.ref.media_type.partition('/')[2]}"
 
 
+class OrderOfSide(NamedTuple):
+    """An action that was carried out, when it took effect."""
+
+    game_loop: int
+    agent: str
+    action: str
+    """With its team in front, `Zealot-1 <Attack_Unit(0x100280000)>`."""
+
+
+class NextObservation(NamedTuple):
+    """The observation that followed, in a data set of dynamics (`khala.dataset.dynamics`)."""
+
+    step: int
+    game_loop: int
+    observation: str
+    """The words of the observation before; the reply of the row has those of the next."""
+    orders: tuple[OrderOfSide, ...]
+    """Of the whole side, between the two observations."""
+    clock: Clock
+    fog: str | None
+    """What the side saw of the map at the observation before, as `Scene.fog` has it; None if it was not recorded."""
+    view: View
+    """The data that the words before were made from."""
+    next_view: View
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One decision of one agent."""
+    """One decision of one agent; in a data set of dynamics, one observation, and the next one as its reply."""
 
     run: str
     task: str
@@ -65,6 +91,8 @@ class Row:
     reward: Reward
     outcome: str
     valid: bool
+    following: NextObservation | None = None
+    """Only in a data set of dynamics."""
 
     @property
     def id(self) -> str:
