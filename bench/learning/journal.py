@@ -22,27 +22,36 @@ if TYPE_CHECKING:
 
 
 class Journal:
-    """What was done in a directory, in files of JSON lines, each written when it is known."""
+    """What was done in a directory, in files of JSON lines.
+
+    Args:
+        directory: of the files; lines that were not written to their end are removed.
+    """
 
     def __init__(self, directory: Path) -> None:
-        self.directory = directory
+        self._directory = directory
         directory.mkdir(parents=True, exist_ok=True)
+        for path in directory.glob("*.jsonl"):
+            text = path.read_text(encoding="utf-8")
+            if not text.endswith("\n"):
+                path.write_text(text[: text.rfind("\n") + 1], encoding="utf-8")
 
     def lines(self, name: str) -> list[dict[str, Any]]:
-        """Return the lines of a file; without its last one, if that was not written to its end."""
-        path = self.directory / f"{name}.jsonl"
-        if not path.exists():
-            return []
-        text = path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]
-        if whole != text:
-            path.write_text(whole, encoding="utf-8")
-        return [json.loads(line) for line in whole.splitlines()]
+        """Return the lines of a file."""
+        path = self._path(name)
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+
+    def steps(self) -> list[dict[str, Any]]:
+        """Return the line of each step; of one that was done again after a kill, the last."""
+        return list({(line["stage"], line["step"]): line for line in self.lines("steps")}.values())
 
     def add(self, name: str, line: dict[str, Any]) -> None:
         """Write a line."""
-        with (self.directory / f"{name}.jsonl").open("a", encoding="utf-8") as file:
+        with self._path(name).open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+
+    def _path(self, name: str) -> Path:
+        return self._directory / f"{name}.jsonl"
 
 
 def write_answered(answered: Answered) -> dict[str, Any]:
@@ -77,7 +86,7 @@ def advantages(rewards: Sequence[float]) -> list[float]:
     return [(reward - centre) / spread for reward in rewards]
 
 
-def tested_steps(steps: int, parts: int) -> set[int]:
+def steps_of_tests(steps: int, parts: int) -> set[int]:
     """Return the steps before which the model is tested: the first, the last, and those between."""
     return {math.ceil(steps * part / parts) for part in range(parts + 1)}
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 import random
+import sys
 import time
 from pathlib import Path
 from statistics import fmean
@@ -40,7 +41,7 @@ from bench.learning.journal import (
     read_answered,
     read_battle,
     summary,
-    tested_steps,
+    steps_of_tests,
     write_answered,
     write_battle,
 )
@@ -174,7 +175,7 @@ class Course:
         given = self._given
         batch = min(given.batch, len(rows))
         for step in range(learner.steps["taught"], given.taught + 1):
-            if step in tested_steps(given.taught, given.parts) and not learner.steps["practised"]:
+            if step in steps_of_tests(given.taught, given.parts) and not learner.steps["practised"]:
                 self._test_model(learner, f"taught {step}")
             if step == given.taught:
                 break
@@ -186,7 +187,7 @@ class Course:
     def _practise(self, learner: Learner) -> None:
         given = self._given
         for step in range(learner.steps["practised"], given.practised + 1):
-            if step and step in tested_steps(given.practised, given.parts):
+            if step and step in steps_of_tests(given.practised, given.parts):
                 self._test_model(learner, f"practised {step}")
             if step == given.practised:
                 break
@@ -290,7 +291,7 @@ def _check_same(given: Namespace) -> None:
 
 
 def _tell(words: str) -> None:
-    print(f"{time.strftime('%H:%M:%S')} {words}", flush=True)
+    print(f"{time.strftime('%H:%M:%S')} {words}", file=sys.stderr, flush=True)
 
 
 def _print(results: Sequence[dict[str, Any]]) -> None:
@@ -344,8 +345,9 @@ def main() -> None:
     Course(given).run()
     results = summary(journal)
     if given.json:
-        print(json.dumps({"results": results, "steps": journal.lines("steps"), "likeness": journal.lines("likeness")}))
+        found = {"results": results, "steps": journal.steps(), "likeness": journal.lines("likeness")}
+        print(json.dumps(found))
     else:
         _print(results)
     if given.picture:
-        draw(results, journal.lines("steps"), REFERENCES, given.picture)
+        draw(results, journal.steps(), REFERENCES, given.picture)
