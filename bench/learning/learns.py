@@ -40,8 +40,8 @@ from bench.learning.journal import (
     advantages,
     read_answered,
     read_battle,
-    summary,
     steps_of_tests,
+    summary,
     write_answered,
     write_battle,
 )

@@ -11,8 +11,8 @@ from bench.learning.journal import (
     Journal,
     advantages,
     read_battle,
-    summary,
     steps_of_tests,
+    summary,
     write_battle,
 )
 from bench.paths import ROOT
