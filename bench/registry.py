@@ -100,6 +100,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("environments.smac_speed", "The simulator"),
         Benchmark("environments.env_parity", "Environments for training"),
         Benchmark("environments.train", "docs/how-to/train.md"),
+        Benchmark("learning.learns", "A small model that learns"),
         Benchmark("language.offers", "Honest offers"),
         Benchmark("language.messages", "True messages"),
         Benchmark("language.numbers", "tests/bridge/test_knowledge_numbers.py"),

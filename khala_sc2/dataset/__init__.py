@@ -2,6 +2,7 @@
 
     row       what is known of one decision
     rows      a recording → rows, one by one
+    dynamics  a recording → observations, joint orders and next observations, for world models
     rewards   what a decision was worth to its side
     credit    what it was worth of the agent's own, and compared with others of its group
     heeding   whether an order follows from a message

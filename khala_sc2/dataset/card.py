@@ -94,6 +94,13 @@ class Recipe:
     """Whether a row whose prompt and reply came before is left out."""
     tokenizer: str | None = None
     """What counts tokens for the card, see `khala_sc2.dataset.lengths`; None: Khala's estimate."""
+    horizon_s: float | None = None
+    """Seconds of the game to the next observation, in a data set of dynamics; None for one of decisions."""
+
+    @property
+    def title(self) -> str:
+        """What the data set holds."""
+        return "Decisions of StarCraft II agents" if self.horizon_s is None else "Dynamics of StarCraft II"
 
 
 def card(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> str:
@@ -113,14 +120,15 @@ def card(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) ->
 def _front(contents: Contents, recipe: Recipe, form: RowForm, fingerprint: str) -> dict[str, object]:
     splits = [name for name in recipe.split.names if contents.rows[name]]
     tasks = ["text-generation", "reinforcement-learning"]
+    is_dynamics = recipe.horizon_s is not None
     return {
-        "pretty_name": "Decisions of StarCraft II agents",
+        "pretty_name": recipe.title,
         "license": "other",
         "license_name": "see-licence-below",
         "license_link": "#licence",
         "language": ["en"],
         "task_categories": [*tasks, "image-text-to-text"] if contents.pictures else tasks,
-        "tags": ["starcraft-ii", "llm-agents", "multi-agent", "khala"],
+        "tags": ["starcraft-ii", "llm-agents", "multi-agent", "khala", *(["world-model"] if is_dynamics else [])],
         "size_categories": [_size(contents.rows.total())],
         "configs": [
             {
@@ -137,18 +145,20 @@ def _size(rows: int) -> str:
 
 
 def _body(contents: Contents, recipe: Recipe, form: RowForm) -> Iterator[str]:
-    yield "# Decisions of StarCraft II agents\n"
+    is_dynamics = recipe.horizon_s is not None
+    yield f"# {recipe.title}\n"
     yield (
-        f"{contents.rows.total()} decisions of agents that play StarCraft II over a message bus, exported by Khala "
-        f"{__version__} from {_plural(contents.recordings, 'recording')}. One row is one decision: the prompt, the "
-        "reply, what became of its actions, and what they were worth.\n"
+        f"{contents.rows.total()} {'observations' if is_dynamics else 'decisions'} of agents that play StarCraft II "
+        f"over a message bus, exported by Khala {__version__} from {_plural(contents.recordings, 'recording')}. "
+        f"{_ROW_OF_DYNAMICS if is_dynamics else _ROW}\n"
     )
     yield "## Contents\n"
     yield from _table(("split", "rows", "seeds"), _splits(contents, recipe))
     tasks = [(name, place, count) for (name, place), count in contents.tasks.most_common()]
     yield from _table(("task", "map", "rows"), tasks)
     models = [(name or "none: a scripted player or a policy", count) for name, count in contents.models.most_common()]
-    yield from _table(("model", "rows"), models)
+    if not is_dynamics:
+        yield from _table(("model", "rows"), models)
     yield from _table(("outcome of the episode", "rows"), contents.outcomes.most_common())
     yield "Games and versions: " + "; ".join(map(_cell, sorted(contents.versions)[:MOST_LISTED])) + ".\n"
     yield "## Lengths\n"
@@ -158,7 +168,7 @@ def _body(contents: Contents, recipe: Recipe, form: RowForm) -> Iterator[str]:
     yield "## How it was made\n"
     yield from _making(contents, recipe)
     yield "## Columns\n"
-    yield COLUMNS[form].format(gamma=recipe.gamma)
+    yield DYNAMICS_COLUMNS if is_dynamics and form is RowForm.PARQUET else COLUMNS[form].format(gamma=recipe.gamma)
     yield "## Training\n"
     yield TRAINING[form]
     yield "## Licence\n"
@@ -211,18 +221,31 @@ def _making(contents: Contents, recipe: Recipe) -> Iterator[str]:
     yield f"* Splits by {split.by}: {shares}. Its hash says into which a {split.by} falls; see Repeats."
     if recipe.detail:
         yield f"* Prompts are made with `detail: {recipe.detail}`, whatever they were when they were sent."
-    yield f"* Worked example in the prompts: {_EXAMPLE_WORDS[recipe.example]}."
+    if recipe.horizon_s is not None:
+        yield (
+            f"* Next observation: the first one of the agent at least {recipe.horizon_s:g} s of the game later. "
+            "The row says how much later it is."
+        )
+    else:
+        yield f"* Worked example in the prompts: {_EXAMPLE_WORDS[recipe.example]}."
     left_out = ", ".join(f"{reason}: {count}" for reason, count in sorted(contents.left_out.items()) if count)
-    yield f"* Decisions left out: {left_out or 'none'}."
-    yield f"* Prompts of {contents.rebuilt} rows were sent to no model: they are made as a model would have got them."
-    yield f"* Pictures: {contents.pictures if recipe.images else 'not exported'}."
+    yield f"* Left out: {left_out or 'none'}."
+    if recipe.horizon_s is None:
+        rebuilt = contents.rebuilt
+        yield f"* Prompts of {rebuilt} rows were sent to no model: they are made as a model would have got them."
+        yield f"* Pictures: {contents.pictures if recipe.images else 'not exported'}."
     if contents.unrewarded:
-        yield f"* The recordings do not say what {_plural(contents.unrewarded, 'decision')} gained: reward is null."
+        yield f"* The recordings do not say what {_plural(contents.unrewarded, 'row')} gained: reward is null."
     if contents.unread:
         yield f"* Files that are no recordings of a match: {contents.unread}."
     yield ""
 
 
+_ROW = "One row is one decision: the prompt, the reply, what became of its actions, and what they were worth."
+_ROW_OF_DYNAMICS = (
+    "One row is what an agent saw, the joint orders of its side after it, and what the agent saw next: a chat whose "
+    "reply is the next observation."
+)
 _EXAMPLE_WORDS: Mapping[ExampleRule, str] = {
     "weighted": "kept, as the agent got it; its reply is not to be trained on",
     "none": "left out, so the prompts are not those that agents play with",
@@ -265,6 +288,20 @@ COLUMNS: Mapping[RowForm, str] = {
 * `outcome`, `valid`: of the episode; `unfinished` if its recording ends before it does.
 """,
 }
+
+DYNAMICS_COLUMNS = """\
+* `id`, `run`, `task`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which observation it is.
+* `prompt`: the request to a world model, with `role` and `content`: clock, observation, orders, time of the next one.
+* `observation`, `next_observation`: what the agent was shown, in the fog of war, at `game_loop` and at
+  `next_game_loop` (22.4 loops are a second) or `next_step`. `view` and `next_view`: the same as data, in JSON.
+* `orders`: the actions of all agents of the side that took effect between the two, each with its game loop and agent;
+  `rejected`: those that were refused, with the reason.
+* `clock`: how thinking time maps to game time: its rule, and the game loops between observations.
+* `fog`: the whole map as the side saw it: a byte for each cell, row after row from the north-west, 2 where it saw, 1
+  where it once saw, 0 elsewhere, deflated (zlib), in base64. Null if the recording has no scenes.
+* `reward`: minerals + vespene of what the side destroyed between the two, minus those of what it lost.
+* `outcome`, `valid`: of the episode; `unfinished` if its recording ends before it does.
+"""
 
 _ONLY_LAST = "Train on the last reply alone: the replies within a prompt are the worked example, or rows of their own."
 

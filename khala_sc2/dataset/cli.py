@@ -21,6 +21,7 @@ Examples:\n
     khala dataset export runs --out my_data\n
     khala dataset export runs --out my_data --format parquet --format openai --split 0.8,0.1,0.1\n
     khala dataset export runs --out my_data --format trl --dedupe --tokenizer Qwen/Qwen3-0.6B\n
+    khala dataset export runs --out my_data --dynamics --horizon 5\n
     khala dataset export runs/first/recording.mcap --out my_data --only wins --only accepted --agent Stalkers
 """
 
@@ -57,9 +58,31 @@ def export(
         list[str] | None,
         typer.Option(help="Only this agent, such as Stalkers or red/Captain; may be given several times."),
     ] = None,
+    dynamics: Annotated[
+        bool,
+        typer.Option(
+            "--dynamics",
+            help="Export rows for a world model instead of decisions: what an agent saw, the joint orders of its side "
+            "after it, and what the agent saw next.",
+        ),
+    ] = False,
+    horizon: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=600.0,
+            help="With --dynamics: seconds of the game to the next observation, at least; 0 for the very next one.",
+            metavar="SECONDS",
+        ),
+    ] = 5.0,
     split: Annotated[
-        str, typer.Option(help="Shares of train and test, or of train, validation and test.", metavar="SHARES")
-    ] = "1",
+        str | None,
+        typer.Option(
+            help="Shares of train and test, or of train, validation and test.",
+            metavar="SHARES",
+            show_default="1; with --dynamics 0.8,0.1,0.1",
+        ),
+    ] = None,
     split_by: Annotated[
         SplitBy,
         typer.Option(
@@ -101,6 +124,8 @@ def export(
 ) -> None:
     """Export recorded decisions: each row has a prompt, a reply, its actions, their fate and their reward.
 
+    With --dynamics a row has an observation, the orders after it, and the next observation.
+
     The directory holds a folder for each format, with a file for each split and a README for the Hugging Face hub. Each
     folder is a data set that `datasets.load_dataset` reads. The README says what is in it, how long the rows are, what
     repeats, and which setting of a trainer trains on the reply alone.
@@ -113,13 +138,14 @@ def export(
     recipe = Recipe(
         forms,
         choice,
-        Split.of(split, split_by),
+        Split.of(split or ("0.8,0.1,0.1" if dynamics else "1"), split_by),
         gamma=gamma,
         images=images,
         example=example,
         detail=detail,
         dedupe=dedupe,
         tokenizer=tokenizer,
+        horizon_s=horizon if dynamics else None,
     )
     contents = write(sources, out, recipe)
     if as_json:
@@ -144,7 +170,8 @@ def _summary(contents: "Contents") -> dict[str, object]:
 
 def _print(contents: "Contents", out: Path, recipe: "Recipe") -> None:
     parts = ", ".join(f"{name} {count}" for name, count in contents.rows.items())
-    say(f"{contents.rows.total()} decisions are in {out}: {parts}")
+    what = "decisions" if recipe.horizon_s is None else "observations with the next one"
+    say(f"{contents.rows.total()} {what} are in {out}: {parts}")
     left_out = [f"{reason} {count}" for reason, count in contents.left_out.items() if count]
     if left_out:
         say("left out: " + ", ".join(left_out))
@@ -156,5 +183,5 @@ def _print(contents: "Contents", out: Path, recipe: "Recipe") -> None:
     reply = contents.lengths.fields()["reply"]
     say(
         f"tokens of a row, {contents.lengths.counter.name}: median {row.median}, longest {row.longest}; "
-        f"{reply.share:.1%} are of replies"
+        f"{reply.share:.1%} are of {'replies' if recipe.horizon_s is None else 'next observations'}"
     )

@@ -12,6 +12,7 @@ from khala_protocol.files import replacing_directory, write_private
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recording
 from khala_sc2.dataset.card import NAME, Contents, card
+from khala_sc2.dataset.dynamics import Transitions
 from khala_sc2.dataset.files import Files
 from khala_sc2.dataset.lengths import Lengths, token_counter
 from khala_sc2.dataset.read import check_splits
@@ -52,7 +53,8 @@ def export(sources: Sequence[Path], out: Path, recipe: Recipe) -> Contents:
     contents.shared = len(shared)
     try:
         with replacing_directory(out) as part:
-            with Files(part, recipe.formats, images=_has_pictures(recordings, recipe)) as files:
+            shown = _has_pictures(recordings, recipe)
+            with Files(part, recipe.formats, images=shown, dynamics=recipe.horizon_s is not None) as files:
                 for row in _new_rows(recordings, recipe, contents):
                     own = recipe.split.part(row)
                     split = shared.get(chat_digest(row.prompt), own)
@@ -101,7 +103,11 @@ def _fingerprint(directory: Path) -> str:
 def _rows(recording: Recording, recipe: Recipe, contents: Contents) -> Iterator[Row]:
     """Yield the rows of a recording that pass the filters; count the other decisions."""
     assert recording.run is not None
-    rows = Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images, detail=recipe.detail)
+    rows = (
+        Rows(recording, recording.run, gamma=recipe.gamma, images=recipe.images, detail=recipe.detail)
+        if recipe.horizon_s is None
+        else Transitions(recording, recording.run, horizon_s=recipe.horizon_s, detail=recipe.detail)
+    )
     for row in rows:
         if why := recipe.choice.why_not(row):
             contents.left_out[why] += 1
@@ -159,7 +165,7 @@ def _match(path: Path) -> Recording:
 def _has_pictures(recordings: Sequence[Recording], recipe: Recipe) -> bool:
     """Return whether the data set has pictures: a column has one type, in rows without any, too."""
     keys = (key for recording in recordings for key in recording.counts)
-    return recipe.images and any(f"/{Topic.IMAGE}/" in key for key in keys)
+    return recipe.images and recipe.horizon_s is None and any(f"/{Topic.IMAGE}/" in key for key in keys)
 
 
 def _require_empty(out: Path) -> None:

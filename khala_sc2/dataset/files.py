@@ -60,10 +60,12 @@ class Files:
         directory: of the data set.
         formats: each form once.
         images: whether it has pictures.
+        dynamics: whether its rows are of `khala_sc2.dataset.dynamics`.
     """
 
-    def __init__(self, directory: Path, formats: tuple[RowForm, ...], *, images: bool) -> None:
+    def __init__(self, directory: Path, formats: tuple[RowForm, ...], *, images: bool, dynamics: bool = False) -> None:
         self._directory, self._formats, self._images = directory, formats, images
+        self._new_writer = _WRITERS | ({RowForm.PARQUET: DynamicsParquet} if dynamics else {})
         self._writers: dict[tuple[RowForm, str], Writer] = {}
         self._stack = ExitStack()
         if PARQUET_FORMS & set(formats):
@@ -82,7 +84,7 @@ class Files:
             if writer is None:
                 path = self._directory / form / f"{split}.{form.suffix}"
                 make_private(path.parent)
-                writer = self._writers[form, split] = _WRITERS[form](path, self._images)
+                writer = self._writers[form, split] = self._new_writer[form](path, self._images)
                 self._stack.callback(writer.close)
             writer.write(row)
 
@@ -181,6 +183,39 @@ class TRL(Parquet):
         return forms.trl(row, images=self._images) | ({"images": _pictures(row)} if self._images else {})
 
 
+class DynamicsParquet(Parquet):
+    """Observations, joint orders and next observations as columns."""
+
+    def _columns(self, pa: Any) -> dict[str, Any]:
+        text = pa.string()
+        whole = pa.int64()
+        columns = _columns(pa)
+        order = pa.struct({"game_loop": whole, "agent": text, "action": text})
+        clock = pa.struct({"rule": text, "step_loops": whole, "thinking_loops": whole, "speed": pa.float64()})
+        return {name: columns[name] for name in (*_PLACE, "prompt", *_OF_EPISODE)} | {
+            "observation": text, "orders": pa.list_(order), "rejected": columns["rejected"], "next_observation": text,
+            "next_step": whole, "next_game_loop": whole, "clock": clock, "fog": text, "view": text, "next_view": text,
+        }  # fmt: skip
+
+    def _plain(self, row: Row) -> dict[str, Any]:
+        following = row.following
+        assert following is not None
+        plain = _plain(row, images=False)
+        return {name: plain[name] for name in (*_PLACE, "prompt", "rejected", *_OF_EPISODE)} | {
+            "observation": following.observation,
+            "orders": [order._asdict() for order in following.orders],
+            "next_observation": row.reply,
+            "next_step": following.step,
+            "next_game_loop": following.game_loop,
+            "clock": following.clock.model_dump(include={"rule", "step_loops", "thinking_loops", "speed"}),
+            "fog": following.fog,
+            "view": following.view.model_dump_json(),
+            "next_view": following.next_view.model_dump_json(),
+        }
+
+
+_PLACE = ("id", "run", "task", "map", "game", "seed", "side", "agent", "episode", "step", "game_loop")
+_OF_EPISODE = ("reward", "outcome", "valid")
 _WRITERS: dict[RowForm, Callable[[Path, bool], Writer]] = {
     RowForm.PARQUET: Parquet,
     RowForm.OPENAI: OpenAI,

@@ -18,6 +18,8 @@ _ROLES = {"system": "system", "human": "user", "gpt": "assistant"}
 _PICTURE = f"{PLACEHOLDER}\n"
 """In ShareGPT's form, the end of a picture; the text of a message stands after its pictures."""
 _BATCH_ROWS = 32
+_REPLIES = ("reply", "completion", "next_observation")
+"""Names of the column with what is to be learned: of all that is known, of TRL's form, of dynamics."""
 
 Chat = list[tuple[str, str]]
 
@@ -63,10 +65,10 @@ def check_splits(directory: Path, forms: Sequence[RowForm]) -> None:
 def _parquet(path: Path) -> Iterator[WrittenRow]:
     _, pq = import_pyarrow()
     file = pq.ParquetFile(path)
-    reply = "reply" if "reply" in file.schema_arrow.names else "completion"
+    reply = next(name for name in _REPLIES if name in file.schema_arrow.names)
     for batch in file.iter_batches(_BATCH_ROWS, columns=["id", "prompt", reply]):
         for row in batch.to_pylist():
-            said = row[reply] if reply == "reply" else _text(row[reply][0]["content"])
+            said = _text(row[reply][0]["content"]) if reply == "completion" else row[reply]
             yield WrittenRow(row["id"], _chat(row["prompt"]), said)
 
 

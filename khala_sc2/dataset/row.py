@@ -1,4 +1,4 @@
-"""One row of a data set: a decision of an agent, with all that is known of it."""
+"""One row of a data set: a decision of an agent with all that is known of it, or two observations of a world model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from khala_sc2.dataset.prompts import without_example
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_protocol.messages import ChatMessage, Fate, ImageRef, Rejection, TokenTrace, Usage
+    from khala_protocol.messages import ChatMessage, Clock, Fate, ImageRef, Rejection, TokenTrace, Usage, View
     from khala_sc2.dataset.rewards import Reward
 
 UNFINISHED = "unfinished"
@@ -30,9 +30,35 @@ class RowPicture(NamedTuple):
         return f"{sha256(self.data).hexdigest()[:32]}.{self.ref.media_type.partition('/')[2]}"
 
 
+class OrderOfSide(NamedTuple):
+    """An action that was carried out, when it took effect."""
+
+    game_loop: int
+    agent: str
+    action: str
+    """With its team in front, `Zealot-1 <Attack_Unit(0x100280000)>`."""
+
+
+class NextObservation(NamedTuple):
+    """The observation that followed, in a data set of dynamics (`khala_sc2.dataset.dynamics`)."""
+
+    step: int
+    game_loop: int
+    observation: str
+    """The words of the observation before; the reply of the row has those of the next."""
+    orders: tuple[OrderOfSide, ...]
+    """Of the whole side, between the two observations."""
+    clock: Clock
+    fog: str | None
+    """What the side saw of the map at the observation before, as `Scene.fog` has it; None if it was not recorded."""
+    view: View
+    """The data that the words before were made from."""
+    next_view: View
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One decision of one agent."""
+    """One decision of one agent; in a data set of dynamics, one observation, and the next one as its reply."""
 
     run: str
     task: str
@@ -70,6 +96,8 @@ class Row:
     """Of the request whose answer the reply is; empty as far as the endpoint told none, or there was none."""
     outcome: str
     valid: bool
+    following: NextObservation | None = None
+    """Only in a data set of dynamics."""
 
     @property
     def id(self) -> str:

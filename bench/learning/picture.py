@@ -1,0 +1,65 @@
+"""The picture of a course: what it won in the tests, and what it lost and won while it learned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+def draw(
+    results: Sequence[dict[str, Any]], steps: Sequence[dict[str, Any]], references: Sequence[str], path: Path
+) -> None:
+    """Draw the tests beside the steps.
+
+    Args:
+        results: of the tests, as `summary` in `bench.learning.learns` gives them.
+        steps: of both stages.
+        references: players that are lines and no points.
+        path: of the picture.
+    """
+    import matplotlib as mpl  # noqa: PLC0415  # loads fonts, which only a picture needs
+    from matplotlib.figure import Figure  # noqa: PLC0415  # see above
+
+    mpl.rcParams["svg.hashsalt"] = "khala"
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    tests, learning = figure.subplots(1, 2)
+    _draw_tests(tests, results, references)
+    _draw_steps(learning, steps)
+    figure.savefig(path, metadata={"Date": None})
+
+
+def _draw_tests(axes: Any, results: Sequence[dict[str, Any]], references: Sequence[str]) -> None:
+    points = [result for result in results if result["player"] not in references]
+    names = [result["player"] for result in points]
+    won = [result["won"] for result in points]
+    bounds = [
+        [result["won"] - result["low"] for result in points],
+        [result["high"] - result["won"] for result in points],
+    ]
+    axes.errorbar(names, won, yerr=bounds, marker="o", capsize=4, label="SmolLM2-135M")
+    for result, style in zip([r for r in results if r["player"] in references], (":", "-.", "--"), strict=False):
+        axes.axhline(result["won"], linestyle=style, color="gray", label=result["player"])
+    battles = max((result["battles"] for result in results), default=0)
+    axes.set(ylabel=f"won of {battles} test battles", ylim=(-0.03, 1.03))
+    axes.tick_params(axis="x", labelrotation=30)
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def _draw_steps(axes: Any, steps: Sequence[dict[str, Any]]) -> None:
+    taught = [step for step in steps if step["stage"] == "taught"]
+    practised = [step for step in steps if step["stage"] == "practised"]
+    axes.plot([step["step"] + 1 for step in taught], [step["loss"] for step in taught], label="loss, taught")
+    last = taught[-1]["step"] + 1 if taught else 0
+    axes.plot(
+        [last + step["step"] + 1 for step in practised],
+        [step["reward"] for step in practised],
+        marker=".",
+        label="reward of a group, practised",
+    )
+    axes.set(xlabel="step")
+    axes.grid(alpha=0.3)
+    axes.legend()

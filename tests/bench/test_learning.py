@@ -1,0 +1,91 @@
+"""A course that was killed loses no line, and what it learns from is as short and as fair as it says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bench.learning.battles import Answer, Answered, PlayedBattle, Scripted, play, shortest
+from bench.learning.journal import (
+    Journal,
+    advantages,
+    read_battle,
+    steps_of_tests,
+    summary,
+    write_battle,
+)
+from bench.paths import ROOT
+from khala_orchestrator.config import load_task
+from khala_protocol.messages import ChatMessage
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_shortest_form_of_a_reply_is_its_calls() -> None:
+    reply = (
+        "Analysis: <Stop()> would be wrong.\nActions:\n    Team Marine:\n"
+        "        <Select_Unit_Move_Screen(0x100040000, [4.5, 12.0])>\n        <Attack_Unit(0x100180000)>\n"
+    )
+    assert shortest(reply) == "<Select_Unit_Move_Screen(0x100040000, [4.5, 12.0])>\n<Attack_Unit(0x100180000)>"
+    assert shortest("Analysis: I watch.\nActions:\n") == ""
+
+
+def test_advantages_of_a_group_sum_up_to_nothing_and_are_none_if_all_battles_were_alike() -> None:
+    found = advantages([1.0, -1.0, -1.0, -1.0])
+    assert found == pytest.approx([3**0.5, *[-(3**-0.5)] * 3])
+    assert advantages([0.3, 0.3, 0.3]) == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("steps", "parts", "expected"), [(6, 1, {0, 6}), (10, 2, {0, 5, 10}), (5, 2, {0, 3, 5}), (0, 2, {0})]
+)
+def test_a_stage_is_tested_at_its_beginning_and_at_its_end(steps: int, parts: int, expected: set[int]) -> None:
+    assert steps_of_tests(steps, parts) == expected
+
+
+def test_a_line_that_was_not_written_to_its_end_is_left_out_and_the_next_one_stands_alone(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "new")
+    journal.add("tests", {"seed": 1})
+    with (tmp_path / "new" / "tests.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"seed": 2, "wo')
+    journal = Journal(tmp_path / "new")
+    journal.add("tests", {"seed": 3})
+    assert journal.lines("tests") == [{"seed": 1}, {"seed": 3}]
+
+
+def test_a_battle_of_a_group_is_read_as_it_was_written(tmp_path: Path) -> None:
+    prompt = (ChatMessage(role="system", content="S"), ChatMessage(role="user", content="U"))
+    battle = PlayedBattle(7, [Answered(prompt, Answer("<Stop()>", (5, 2)))], reward=0.25, won=True, obeyed=1)
+    journal = Journal(tmp_path)
+    journal.add("practice-0", write_battle(battle))
+    assert [read_battle(line) for line in journal.lines("practice-0")] == [battle]
+
+
+def test_a_step_that_is_done_again_after_a_kill_counts_once(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for step, loss in ((0, 3.0), (1, 2.0), (1, 2.5)):
+        journal.add("steps", {"stage": "taught", "step": step, "loss": loss})
+    assert [line["loss"] for line in journal.steps()] == [3.0, 2.5]
+
+
+def test_results_are_counted_by_player(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for player, won in (("silent", False), ("taught 6", True), ("taught 6", False)):
+        journal.add("tests", {"player": player, "won": won, "reward": float(won), "answers": 4, "obeyed": 2 * won})
+    silent, taught = summary(journal)
+    assert (silent["player"], silent["won"], silent["battles"]) == ("silent", 0.0, 1)
+    assert (taught["won"], taught["reward"], taught["obeyed"]) == (0.5, 0.5, 0.25)
+    assert taught["low"] < 0.5 < taught["high"]
+
+
+@pytest.mark.slow
+@pytest.mark.game
+def test_the_teacher_wins_with_the_shortest_answers_and_a_silent_player_does_not() -> None:
+    task = load_task(str(ROOT / "bench" / "learning" / "learns_3m.yaml"))
+    (won,) = play(task, Scripted("skilled"), [1], 1)
+    (lost,) = play(task, Scripted("silent"), [1], 1)
+    assert (won.won, won.obeyed) == (True, len(won.answered))
+    assert (lost.won, lost.obeyed) == (False, 0)
+    assert {len(answered.prompt) for answered in won.answered} == {2}
