@@ -128,7 +128,7 @@ class SmallModel:
 
     # answers ----------------------------------------------------------------------------------------------------------
 
-    @torch.no_grad()
+    @torch.no_grad()  # type: ignore[untyped-decorator, unused-ignore]  # without torch
     def complete(self, prompts: Sequence[list[int]], *, most: int, temperature: float) -> list[list[int]]:
         """Return the tokens of an answer to each prompt, with the end of the turn if it was reached.
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_agents.prompt import Prompt
 from khala_orchestrator.roster import Seat
-from khala_protocol.messages import LOOPS_PER_S, Briefing, ChatMessage, Observation, Report, Scene, Usage
+from khala_protocol.messages import LOOPS_PER_S, Briefing, ChatMessage, Observation, Report, Scene, TokenTrace, Usage
 from khala_sc2.dataset.rewards import UNKNOWN, Reward, value_of
 from khala_sc2.dataset.row import UNFINISHED, NextObservation, OrderOfSide, Row
 
@@ -180,6 +180,8 @@ class Transitions:
             fate=None,
             age_loops=0,
             reward=_reward(episode, range(before.step, after.step)),
+            own_reward=UNKNOWN,
+            tokens=TokenTrace(),
             outcome=result.outcome if result else UNFINISHED,
             valid=result.valid if result else False,
             following=NextObservation(
