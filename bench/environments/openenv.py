@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 CLIENTS = (1, 8, 32)
 LOOK_S = 0.25
+PASS = {"type": "call_tool", "tool_name": "reply", "arguments": {"text": ""}}
 
 
 @dataclass(slots=True)
@@ -106,7 +107,7 @@ async def client(address: str, number: int, steps: int, end_s: float, counts: Co
             done = False
             while not done:
                 before_s = time.monotonic()
-                done = (await env.step({"reply": ""})).done
+                done = (await env.step(PASS)).done
                 counts.step_s.append(time.monotonic() - before_s)
         counts.sessions += 1
         seed += 1000
@@ -129,7 +130,7 @@ async def stepping(env: GenericEnvClient, end_s: float) -> int:
     steps = 0
     while time.monotonic() < end_s:
         steps += 1
-        if (await env.step({"reply": ""})).done:
+        if (await env.step(PASS)).done:
             await env.reset()
     return steps
 

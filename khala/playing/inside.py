@@ -60,5 +60,4 @@ class InsideGames:
         """Do nothing: none was made ahead."""
 
     def close(self) -> None:
-        """End the threads; a game ends with its match."""
-        self.threads.shutdown(wait=False)
+        """Do nothing: a game ends with its match, and the threads when no match has them any more."""

@@ -32,6 +32,10 @@ def skilled(text: str) -> str:
     return PLAYERS["skilled"](text, random.Random(f"0 {text}"))
 
 
+def answer(text: str) -> dict[str, object]:
+    return {"type": "call_tool", "tool_name": "reply", "arguments": {"text": text}}
+
+
 def replies(seen: KhalaObservation) -> KhalaAction:
     return KhalaAction(replies={name: skilled(view.text) for name, view in seen.agents.items()})
 
@@ -63,9 +67,9 @@ async def test_a_team_plays_over_a_websocket_what_the_host_recorded(serving: Ser
     assert base64.b64decode(stalkers.pictures[0].data).startswith(b"\xff\xd8")
     assert all(view.briefing == [] for one in seen[1:] for view in one.agents.values())
     assert (last.agents, last.text, last.step) == ({}, "", 3)
-    assert last.result is not None
-    assert (last.result.outcome, last.result.cause) == ("cut", "step limit")
-    assert sum(one.elapsed_s for one in seen) == pytest.approx(last.result.game_s, abs=0.1)
+    assert last.outcome is not None
+    assert (last.outcome.outcome, last.outcome.cause) == ("cut", "step limit")
+    assert sum(one.elapsed_s for one in seen) == pytest.approx(last.outcome.game_s, abs=0.1)
     assert last.reward == pytest.approx(-0.1 * last.elapsed_s / 60)
     assert then.agents["Stalkers"].briefing
     assert (next_state.seed, next_state.recording) == (4, state.recording)
@@ -127,16 +131,16 @@ async def test_an_episode_over_http_has_a_name(serving: Serving) -> None:
         assert began.status_code == 200, began.text
         name = began.json()["observation"]["episode_id"]
         text = began.json()["observation"]["agents"]["CombatGroupSmac"]["text"]
-        stepped = (await client.post("/step", json={"action": {"reply": skilled(text)}})).json()
+        stepped = (await client.post("/step", json={"action": answer(skilled(text))})).json()
         assert (stepped["done"], stepped["observation"]["step"]) == (False, 1)
         assert (await client.get("/state")).json()["step_count"] == 1
         await client.post("/reset", json={"episode_id": "mine", "seed": 2, "task": "2s3z"})
-        unclear = await client.post("/step", json={"action": {"reply": ""}})
+        unclear = await client.post("/step", json={"action": answer("")})
         assert unclear.status_code == 409
         assert unclear.json()["detail"].startswith("there are several episodes: say which one with episode_id")
         full = await client.post("/reset", json={})
         assert (full.status_code, "capacity" in full.json()["detail"]) == (503, True)
         assert (await client.post("/close", json={"episode_id": "mine"})).json() == {"episode_id": "mine"}
-        ended = (await client.post("/step", json={"action": {"reply": ""}, "episode_id": name})).json()
-        assert ended["observation"]["result"]["cause"] == "step limit"
+        ended = (await client.post("/step", json={"action": answer(""), "episode_id": name})).json()
+        assert ended["observation"]["outcome"]["cause"] == "step limit"
         assert (await client.get("/state", params={"episode_id": "mine"})).status_code == 409
