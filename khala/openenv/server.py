@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from khala.playing.inside import InsideGames
     from khala_bridge.game.processes import IdleGames
 
-SESSIONS: Final = 8
+SESSIONS: Final = 64
 IDLE_S: Final = 3600.0
 MOST_WAITING: Final = 32
 """Sessions that do not play, beyond as many as may play; when one more comes, the oldest is closed."""
