@@ -131,7 +131,7 @@ async def stepping(envs: Sequence[GenericEnvClient], seconds: float, pause_s: fl
     end_s = time.monotonic() + seconds
 
     async def play(env: GenericEnvClient) -> list[float]:
-        taken = []
+        taken: list[float] = []
         await asyncio.sleep(draws.uniform(0, pause_s))
         while time.monotonic() < end_s or not taken:
             taken.append(await step(env))

@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING, Any, Self
 
 from openenv.core.env_server.mcp_types import CallToolAction
 
+from khala.openenv.models import KhalaObservation
 from khala.openenv.tools import tools
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Awaitable, Callable, Mapping
 
-    from khala.openenv.environment import KhalaEnvironment
-    from khala.openenv.models import KhalaObservation
+    from openenv.core.env_server.types import Observation
 
 
 class DirectTools:
     """The tools of one session."""
 
-    def __init__(self, environment: KhalaEnvironment) -> None:
-        self._environment = environment
+    def __init__(self, step: Callable[[CallToolAction], Awaitable[Observation]]) -> None:
+        """Take what calls a tool in the session."""
+        self._step = step
 
     async def __aenter__(self) -> Self:
         return self
@@ -48,7 +49,8 @@ class DirectTools:
             KhalaError: no episode goes on, or the match failed.
         """
         action = CallToolAction(tool_name=name, arguments=dict(arguments or {}))
-        seen: KhalaObservation = await self._environment.step_async(action)  # type: ignore[assignment]
+        seen = await self._step(action)
+        assert isinstance(seen, KhalaObservation)
         text = seen.result if seen.error is None else seen.error.message
         return {
             "content": [{"type": "text", "text": text}],

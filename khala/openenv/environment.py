@@ -23,7 +23,18 @@ from khala.openenv.direct import DirectTools
 from khala.openenv.models import KhalaAction, KhalaObservation, KhalaState, ResetOptions
 from khala.openenv.places import ServerPlaces
 from khala.openenv.settings import ServerSettings
-from khala.openenv.tools import Act, LookUp, Observe, PlayTool, Reply, ToolFault, names, read_call, reply_of, tools
+from khala.openenv.tools import (
+    Act,
+    LookUp,
+    Observe,
+    PlayTool,
+    ReplyInText,
+    ToolFault,
+    names,
+    read_call,
+    reply_of,
+    tools,
+)
 from khala.openenv.views import outcome_of, page_of, view_of
 from khala.playing.inside import InsideGames
 from khala.playing.loop_thread import LoopThread
@@ -66,7 +77,7 @@ class KhalaEnvironment(Environment[ToolAction, Observation, KhalaState]):
         self._games = games or InsideGames()
         self._owns_games = games is None
         super().__init__(rubric=self._settings.rubric())
-        self.mcp_client = DirectTools(self)
+        self.mcp_client = DirectTools(self.step_async)
         self._choice = ResetOptions()
         self._match: SeatedMatch | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -322,19 +333,19 @@ class KhalaEnvironment(Environment[ToolAction, Observation, KhalaState]):
         """
         self._playing()
         if isinstance(tool, Act):
-            return {self._named(tool.agent): reply_of(tool)}
-        assert isinstance(tool, Reply)
+            return {self._agent(tool.agent): reply_of(tool)}
+        assert isinstance(tool, ReplyInText)
         for name in tool.replies:
-            self._named(name)
+            self._agent(name)
         if tool.text is None:
             return tool.replies
         if len(self._seats) > 1:
             raise ToolFault(
                 f"this session plays {names(list(self._seats))}: give `replies`, by agent, in place of one reply"
             )
-        return {self._named(""): tool.text}
+        return {self._agent(""): tool.text}
 
-    def _named(self, name: str) -> str:
+    def _agent(self, name: str) -> str:
         if not name and len(self._seats) == 1:
             return next(iter(self._seats))
         if name not in self._seats:

@@ -65,7 +65,7 @@ class Act(PlayTool):
     agent: str = Field(default="", description="Who acts; needed only where you play several agents.")
 
 
-class Reply(PlayTool):
+class ReplyInText(PlayTool):
     """Answer in the text language that your briefing teaches, and play until you are asked again."""
 
     name = "reply"
@@ -98,7 +98,7 @@ class LookUp(PlayTool):
             raise ToolFault(str(error)) from error
 
 
-TOOLS: Final[Mapping[str, type[PlayTool]]] = {tool.name: tool for tool in (Observe, Act, Reply, LookUp)}
+TOOLS: Final[Mapping[str, type[PlayTool]]] = {tool.name: tool for tool in (Observe, Act, ReplyInText, LookUp)}
 
 
 def tools() -> list[Tool]:

@@ -40,7 +40,7 @@ Call `act` with your orders, again and again: it plays on, and returns what you 
 unit, an upgrade or an ability. Go on until you read that the episode is over."""
 
 
-def environment_factory(server: str | None = None, **options: Any) -> Callable[[], Battle]:
+def environment_factory(server: str | None = None, **options: Any) -> Callable[[], ToolBattle]:
     """Return what makes battles for TRL; it can be pickled.
 
     Args:
@@ -54,10 +54,10 @@ def environment_factory(server: str | None = None, **options: Any) -> Callable[[
         raise ConfigError(
             f"reset has no option {min(unknown)!r}: it has {', '.join(ResetOptions.model_fields)}", source="options"
         )
-    return functools.partial(Battle, server, options)
+    return functools.partial(ToolBattle, server, options)
 
 
-class Battle:
+class ToolBattle:
     """One agent of a battle, for a model that plays it with tools: the public methods but `reset` and `get_reward`."""
 
     def __init__(self, server: str | None, options: Mapping[str, Any]) -> None:
@@ -158,7 +158,7 @@ class _Here:
     """A session of this process; all of them share a thread, and the threads of their games."""
 
     def __init__(self) -> None:
-        self._thread, settings, games, places = _shared()
+        self._thread, settings, games, places = _common()
         self._environment = KhalaEnvironment(settings, games, places)
 
     def reset(self, options: Mapping[str, Any]) -> KhalaObservation:
@@ -177,6 +177,6 @@ class _Here:
 
 
 @functools.cache
-def _shared() -> tuple[LoopThread, ServerSettings, InsideGames, ServerPlaces]:
+def _common() -> tuple[LoopThread, ServerSettings, InsideGames, ServerPlaces]:
     """Return what sessions of this process share, made when the first battle is."""
     return LoopThread(), ServerSettings(), InsideGames(), ServerPlaces(MOST_HERE)

@@ -20,7 +20,8 @@ NO_PORT = 0
 class InsideProcess:
     """What PySC2 takes for a process of the game that it started, and its connection."""
 
-    host, port = "", NO_PORT
+    host = ""
+    port = NO_PORT
 
     def __init__(self, answer: Callable[[bytes], bytes]) -> None:
         """Take what answers a request of the SC2 API, as bytes of its messages; one thread at a time calls it."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala.openenv.tools import TOOLS, ToolFault
-from khala.openenv.trl import Battle, environment_factory
+from khala.openenv.trl import ToolBattle, environment_factory
 from khala_protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def test_a_model_plays_one_agent() -> None:
 async def test_a_battle_on_a_server_is_the_same(serving: Serving) -> None:
     here = environment_factory(task="2s3z", max_steps=1)()
 
-    def play(battle: Battle) -> list[object]:
+    def play(battle: ToolBattle) -> list[object]:
         said = [battle.reset(seed=1)]
         with pytest.raises((ToolFault, RuntimeError), match="act: orders"):
             battle.act("all")  # type: ignore[arg-type]  # as a model may
