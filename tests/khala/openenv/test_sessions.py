@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import psutil
 import pytest
+from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
 from khala.openenv.settings import ServerSettings
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.messages import Observation, Reply
 from khala_protocol.recording import Recording
+from khala_simulator.process.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.game
 RAISES = pytest.raises
+BROKEN_SEED = 666
 
 
 def skilled(text: str) -> str:
@@ -140,3 +143,28 @@ async def test_an_episode_over_http_has_a_name(serving: Serving) -> None:
         ended = (await client.post("/step", json={"action": answer(""), "episode_id": name})).json()
         assert ended["observation"]["outcome"]["cause"] == "step limit"
         assert (await client.get("/state", params={"episode_id": "mine"})).status_code == 409
+
+
+async def test_a_fault_in_a_game_ends_its_session_and_no_other(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer_request = Session.handle
+    broken: list[Session] = []
+
+    def handle(self: Session, data: bytes) -> bytes:
+        request = sc_pb.Request.FromString(data)
+        if request.create_game.random_seed == BROKEN_SEED:
+            broken.append(self)
+        if self in broken and request.HasField("step"):
+            raise ZeroDivisionError("a fault of the simulator")
+        return answer_request(self, data)
+
+    monkeypatch.setattr(Session, "handle", handle)
+    async with serving() as address, KhalaEnv(address) as healthy, KhalaEnv(address) as failing:
+        await healthy.reset(seed=1, task="2s3z")
+        with RAISES(RuntimeError, match="a fault of the simulator"):
+            await played(failing, seed=BROKEN_SEED, task="2s3z")
+        assert (await healthy.step(KhalaAction(reply=""))).observation.step == 1
+        with RAISES(RuntimeError, match="no episode has begun: call reset first"):
+            await failing.step(KhalaAction(reply=""))
+        assert (await failing.reset(seed=2, task="2s3z")).observation.text
