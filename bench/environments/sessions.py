@@ -62,7 +62,7 @@ def main() -> None:
 
 def of_clients(count: int, seconds: float) -> dict[str, Any]:
     """Return what a number of clients got from a server of its own."""
-    command = [sys.executable, "-m", "khala", "openenv", "2s3z", "--port", "0", "--sessions", str(count + 1)]
+    command = [sys.executable, "-m", "khala_sc2", "openenv", "2s3z", "--port", "0", "--sessions", str(count + 1)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
         assert server.stderr is not None
         address = server.stderr.readline().strip()

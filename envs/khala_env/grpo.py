@@ -15,7 +15,7 @@ import argparse
 from datasets import Dataset
 from trl import GRPOConfig, GRPOTrainer
 
-from khala.openenv.trl import environment_factory
+from khala_sc2.openenv.trl import environment_factory
 
 SYSTEM = "You command units of StarCraft II, together with other agents. You play with tools."
 

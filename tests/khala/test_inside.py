@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala.playing.inside import InsideGames
-from khala.playing.seats import SeatedMatch, seats_of
 from khala_bridge.compat import protocol
 from khala_bridge.errors import GameError
 from khala_bridge.game.inside import InsideProcess
 from khala_bridge.game.processes import settle_flags
 from khala_orchestrator.config import MatchConfig, load_task
+from khala_sc2.playing.inside import InsideGames
+from khala_sc2.playing.seats import SeatedMatch, seats_of
 from khala_simulator.process.session import Session
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig, TaskConfig
     from khala_orchestrator.config import MatchConfig
 
-_PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
+_PACKAGES = ("pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
 
 
 def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episodes: int = 1) -> Briefing:

@@ -13,16 +13,16 @@ import pytest
 from openenv.core.env_server.mcp_types import CallToolAction
 from openenv.core.rubrics import Rubric
 
-from khala.env.rewards import battle
-from khala.openenv.commands import WantedServer, rubric_of, run_openenv, settings_of
-from khala.openenv.environment import KhalaEnvironment
-from khala.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
-from khala.openenv.rubrics import Battle
-from khala.openenv.server import app_of
-from khala.openenv.settings import ServerSettings
-from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Casualties, Report, Result
+from khala_sc2.env.rewards import battle
+from khala_sc2.openenv.commands import WantedServer, rubric_of, run_openenv, settings_of
+from khala_sc2.openenv.environment import KhalaEnvironment
+from khala_sc2.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
+from khala_sc2.openenv.rubrics import Battle
+from khala_sc2.openenv.server import app_of
+from khala_sc2.openenv.settings import ServerSettings
+from khala_sc2.playing.seats import Seat
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -187,6 +187,6 @@ def test_the_command_finds_what_is_wrong_before_it_serves() -> None:
 
 
 def test_openenv_is_named_if_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala.openenv.server", None)
-    with pytest.raises(ConfigError, match=re.escape("pip install 'khala[openenv]'")):
+    monkeypatch.setitem(sys.modules, "khala_sc2.openenv.server", None)
+    with pytest.raises(ConfigError, match=re.escape("pip install 'khala-sc2[openenv]'")):
         run_openenv(wanted())

@@ -12,11 +12,11 @@ import psutil
 import pytest
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
-from khala.openenv.settings import ServerSettings
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.messages import Observation, Reply
 from khala_protocol.recording import Recording
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
+from khala_sc2.openenv.settings import ServerSettings
 from khala_simulator.process.session import Session
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
 
-from khala.openenv.client import KhalaAction, KhalaEnv
-from khala.openenv.tools import TOOLS
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv
+from khala_sc2.openenv.tools import TOOLS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable

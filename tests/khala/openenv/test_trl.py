@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.openenv.tools import TOOLS, ToolFault
-from khala.openenv.trl import ToolBattle, environment_factory
 from khala_protocol.errors import ConfigError
+from khala_sc2.openenv.tools import TOOLS, ToolFault
+from khala_sc2.openenv.trl import ToolBattle, environment_factory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
