@@ -72,7 +72,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("matches.games_per_hour", "Games per hour", "figures"),
         Benchmark("environments.env", "Environments for training", "figures"),
         Benchmark("environments.vector", "Environments for training", "figures"),
-        Benchmark("environments.openenv", "docs/how-to/openenv.md", "figures"),
+        Benchmark("environments.sessions", "docs/how-to/openenv.md", "figures"),
         Benchmark("simulator.simulator_memory", "The simulator", "table"),
         Benchmark("language.recognition", "Accuracy of the parser", "table"),
         Benchmark("language.forms", "Forms of answers"),

@@ -64,6 +64,7 @@ INITIALIZE: Final = json.dumps({
     "jsonrpc": "2.0", "id": 1, "method": "initialize",
     "params": {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "doors", "version": "1"}},
 }).encode()  # fmt: skip
+PASS: Final = {"tool_name": "reply", "arguments": {"text": ""}}
 EVIL: Final = "http://evil.example"
 
 
@@ -448,7 +449,7 @@ async def _end_the_episode(target: Target) -> str:
     async with httpx.AsyncClient(base_url=address, timeout=60) as owner, httpx.AsyncClient(base_url=address) as other:
         begun = await owner.post("/reset", json={"task": "2s3z", "seed": 3, "max_steps": 4, "episode_id": "1"})
         begun.raise_for_status()
-        step: dict[str, Any] = {"action": {"reply": ""}}
+        step: dict[str, Any] = {"action": PASS}
         named = {"episode_id": "1"}
         tries = {
             "/close {}": ("/close", {}), "/step": ("/step", step), "/close": ("/close", named),
@@ -484,7 +485,8 @@ async def _send_much(target: Target) -> str:
 async def _talk_nonsense(target: Target) -> str:
     """Send what is no message, of every kind."""
     async with connect(f"ws://{target.host}/ws") as strange:
-        for text in ("", "{", "null", "[]", '{"type":"step"}', '{"type":"step","data":{"reply":5}}', '{"type":"x"}'):
+        no_call = '{"type":"step","data":{"tool_name":5}}'
+        for text in ("", "{", "null", "[]", '{"type":"step"}', no_call, '{"type":"x"}'):
             with contextlib.suppress(ConnectionClosed):
                 await strange.send(text)
                 await asyncio.wait_for(strange.recv(), ANSWER_S)
@@ -499,7 +501,7 @@ async def _play_left_sessions(directory: Path) -> str:
         address = f"http://{target.host}"
         async with httpx.AsyncClient(base_url=address, timeout=60) as gone:
             (await gone.post("/reset", json={"task": "2s3z", "seed": 1, "max_steps": 1})).raise_for_status()
-            (await gone.post("/step", json={"action": {"reply": ""}})).raise_for_status()
+            (await gone.post("/step", json={"action": PASS})).raise_for_status()
         before, places.OVER_YIELD_S = places.OVER_YIELD_S, 0.0  # type: ignore[misc]  # the minute is over
         try:
             async with KhalaEnv(address) as env:

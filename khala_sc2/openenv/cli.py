@@ -11,7 +11,7 @@ from khala_sc2.commands.run_options import Game
 OPENENV_EPILOG = """
 Examples:\n
     khala openenv\n
-    khala openenv pvz_task6_level1 --sessions 16 --port 8000\n
+    khala openenv pvz_task6_level1 --sessions 256 --port 8000\n
     khala openenv duel_3m --others focus-fire --allow openai\n
     KHALA_OPENENV_TOKEN=... khala openenv 2s3z --host 0.0.0.0\n
     khala openenv 2s3z --rubric my_rewards:Mine --out runs\n
@@ -36,7 +36,7 @@ def openenv(
             "--open", envvar="KHALA_OPENENV_OPEN", help="Let everybody who reaches the port play, without a token."
         ),
     ] = False,
-    sessions: Annotated[int, typer.Option(min=1, help="Most sessions at a time; each has its own game.")] = 8,
+    sessions: Annotated[int, typer.Option(min=1, help="Most sessions at a time; each has its own game.")] = 64,
     idle: Annotated[float, typer.Option(min=1, help="End a session that does nothing for this many seconds.")] = 3600.0,
     others: Annotated[
         str,

@@ -6,8 +6,8 @@
             result = await env.step(KhalaAction(reply=decide(result.observation.text)))
 
 `KhalaEnv(…).sync()` is the same without `await`. The token of a server stands in its address,
-`http://khala:TOKEN@host:8000`, or in KHALA_OPENENV_TOKEN. The client needs `openenv-core`, and neither a game nor a
-server.
+`http://khala:TOKEN@host:8000`, or in KHALA_OPENENV_TOKEN. The client needs `openenv`, and neither a game nor a server.
+OpenEnv's own `MCPToolClient` and `GenericEnvClient` call the same tools.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from khala_protocol.extras import needs
 with needs("openenv", source="khala_sc2.openenv.client"):
     from openenv.core.client_types import StepResult
     from openenv.core.env_client import EnvClient
+    from openenv.core.env_server.mcp_types import CallToolAction
     from websockets.exceptions import ConnectionClosed
 
     from khala_sc2.openenv.models import KhalaAction, KhalaObservation, KhalaState
@@ -29,8 +30,11 @@ with needs("openenv", source="khala_sc2.openenv.client"):
 __all__ = ["KhalaAction", "KhalaEnv", "KhalaObservation", "KhalaState"]
 
 
-class KhalaEnv(EnvClient[KhalaAction, KhalaObservation, KhalaState]):
-    """A session. `reset` takes the fields of `khala_sc2.openenv.models.ResetOptions`."""
+class KhalaEnv(EnvClient[KhalaAction | CallToolAction, KhalaObservation, KhalaState]):
+    """A session. `reset` takes the fields of `khala_sc2.openenv.models.ResetOptions`.
+
+    `step` takes replies, or a call of any tool, and raises a `RuntimeError` if the call was wrong.
+    """
 
     def __init__(self, base_url: str, *arguments: Any, **options: Any) -> None:
         """Take the address of a server; all else is as in `EnvClient`."""
@@ -46,12 +50,16 @@ class KhalaEnv(EnvClient[KhalaAction, KhalaObservation, KhalaState]):
         ):  # a server that is full says so, and closes: `_receive` has its words
             await super()._send(message)
 
-    def _step_payload(self, action: KhalaAction) -> dict[str, Any]:
+    def _step_payload(self, action: KhalaAction | CallToolAction) -> dict[str, Any]:
+        if isinstance(action, KhalaAction):
+            action = CallToolAction(tool_name="reply", arguments={"text": action.reply, "replies": action.replies})
         return action.model_dump()
 
     def _parse_result(self, payload: dict[str, Any]) -> StepResult[KhalaObservation]:
         outside = {"reward": payload.get("reward"), "done": payload.get("done", False)}
         observation = KhalaObservation.model_validate(payload.get("observation", {}) | outside)
+        if observation.error is not None:
+            raise RuntimeError(observation.error.message)
         return StepResult(observation=observation, **outside)
 
     def _parse_state(self, payload: dict[str, Any]) -> KhalaState:

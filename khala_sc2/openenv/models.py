@@ -1,17 +1,22 @@
-"""What travels between a client and the server: the action, the observation, the state, and the options of a reset."""
+"""What travels between a client and the server: the observation, the state, the options of a reset; and the action.
+
+An action on the wire is OpenEnv's own, a call of a tool of `khala_sc2.openenv.tools`; `KhalaAction` is the short form of
+one, for clients and rubrics.
+"""
 
 from __future__ import annotations
 
 from typing import Literal
 
-from openenv.core.env_server.types import Action, Observation, State
+from openenv.core.env_server.mcp_types import CallToolObservation
+from openenv.core.env_server.types import Action, State
 from pydantic import BaseModel, ConfigDict, Field
 
 from khala_protocol.messages import Ending  # pydantic evaluates it
 
 
 class KhalaAction(Action):
-    """The replies of the agents, in the text language."""
+    """The replies of the agents, in the text language: a call of the tool `reply`, and what a rubric judges."""
 
     reply: str | None = Field(default=None, description="Of the agent, if the session plays one.")
     replies: dict[str, str] = Field(
@@ -61,9 +66,14 @@ class Outcome(BaseModel):
     game_s: float
 
 
-class KhalaObservation(Observation):
-    """What the agents of a session see, and what has happened since its observation before."""
+class KhalaObservation(CallToolObservation):
+    """What the agents of a session see, and what has happened since its observation before.
 
+    `result` is what a model reads: the texts of the agents, or the answer of a tool that does not play. `error` is what
+    was wrong with a call; the game did not move then.
+    """
+
+    tool_name: str = Field(default="", description='The tool that was called; "" after a reset.')
     episode_id: str = ""
     agents: dict[str, AgentView] = Field(
         default_factory=dict, description="Those who are asked, by name. The others are dead, or have nothing to say."
@@ -74,7 +84,7 @@ class KhalaObservation(Observation):
     accepted: int = Field(default=0, description="Calls of the session's agents that were carried out.")
     refused: int = Field(default=0, description="Calls that were not.")
     elapsed_s: float = Field(default=0.0, description="Seconds of the game.")
-    result: Outcome | None = Field(default=None, description="At the end of an episode.")
+    outcome: Outcome | None = Field(default=None, description="At the end of an episode.")
     scores: dict[str, float] = Field(default_factory=dict, description="What each rubric gave, by its name.")
 
     @property

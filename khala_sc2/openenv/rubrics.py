@@ -1,8 +1,8 @@
 """What a step is worth to the agents of a session, by OpenEnv's rubrics.
 
 `Battle` is the server's own: a weighted sum of four. `khala openenv --rubric my_rewards:Mine` takes one of yours: any
-`Rubric`, or a function that makes one. It is called with the action and the observation after it, and reset with each
-episode.
+`Rubric`, or a function that makes one. It is called with what the agents said, as a `KhalaAction`, and the observation
+after it, and reset with each episode.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Win(Rubric):
     def forward(self, action: Action, observation: KhalaObservation) -> float:  # noqa: ARG002  # the standard's
         """Return the score."""
         ends = {"win": WIN, "loss": -WIN}
-        return ends.get(observation.result.outcome, 0.0) if observation.result else 0.0
+        return ends.get(observation.outcome.outcome, 0.0) if observation.outcome else 0.0
 
 
 class Value(Rubric):

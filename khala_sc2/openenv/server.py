@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 from fastapi import FastAPI, HTTPException, Request, Response, status
 from openenv.core.env_server.exceptions import SessionCapacityError
 from openenv.core.env_server.http_server import HTTPEnvServer
+from openenv.core.env_server.mcp_types import CallToolAction, ListToolsAction
 from openenv.core.env_server.serialization import serialize_observation
 from openenv.core.env_server.types import (
     ConcurrencyConfig,
@@ -32,7 +33,6 @@ from openenv.core.env_server.types import (
 from pydantic import BaseModel
 from starlette.websockets import WebSocketDisconnect
 
-from khala_bridge.game.processes import IdleGames
 from khala_protocol.bus.config import is_loopback
 from khala_protocol.errors import KhalaError
 from khala_protocol.listening import MOST_CONNECTIONS
@@ -41,9 +41,10 @@ from khala_sc2.doors.asgi import Guarded
 from khala_sc2.doors.rules import Door, is_same, token_of
 from khala_sc2.doors.serving import uvicorn_config
 from khala_sc2.openenv.environment import KhalaEnvironment, NoEpisode
-from khala_sc2.openenv.models import KhalaAction, KhalaObservation, KhalaState
+from khala_sc2.openenv.models import KhalaObservation, KhalaState
 from khala_sc2.openenv.places import ServerPlaces
 from khala_sc2.openenv.settings import ServerSettings
+from khala_sc2.playing.inside import games_of
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
@@ -52,9 +53,11 @@ if TYPE_CHECKING:
     from openenv.core.env_server.interfaces import Environment
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+    from khala_bridge.game.processes import IdleGames
     from khala_sc2.doors.asgi import Application
+    from khala_sc2.playing.inside import InsideGames
 
-SESSIONS: Final = 8
+SESSIONS: Final = 64
 IDLE_S: Final = 3600.0
 MOST_WAITING: Final = 32
 """Sessions that do not play, beyond as many as may play; when one more comes, the oldest is closed."""
@@ -108,11 +111,12 @@ def app_of(
 
     Args:
         settings: what the server decides.
-        sessions: most that play at a time; each has a process of the game, which waits for the next one when it ends.
+        sessions: most that play at a time, each with a game in this process; a real game has a process of its own.
         idle_s: seconds after which a session ends that does nothing.
         door: who may ask; by default programs of this machine.
     """
-    games = IdleGames(sessions)
+    settings = settings or ServerSettings()
+    games = games_of(settings.game, sessions)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -127,7 +131,7 @@ def app_of(
     )
     # those that play, those that wait, and those that are told to leave and have not left yet
     limits = ConcurrencyConfig(max_concurrent_envs=2 * (sessions + MOST_WAITING), session_timeout=idle_s)
-    _Server(settings or ServerSettings(), games, ServerPlaces(sessions), limits).register_routes(app)
+    _Server(settings, games, ServerPlaces(sessions), limits).register_routes(app)
     app.add_middleware(_Leaving)
     app.add_middleware(Guarded, door=door or openenv_door("127.0.0.1"))
     return app
@@ -180,7 +184,7 @@ def _until(leaves: asyncio.Event, receive: Receive) -> Receive:
 class NamedStep(StepRequest):
     """A request for a step."""
 
-    action: KhalaAction  # type: ignore[assignment]  # OpenEnv's is any JSON
+    action: CallToolAction | ListToolsAction  # type: ignore[assignment]  # OpenEnv's is any JSON
     episode_id: str | None = None
 
 
@@ -208,12 +212,19 @@ class _Server(HTTPEnvServer):
     """OpenEnv's server, with sessions over HTTP."""
 
     def __init__(
-        self, settings: ServerSettings, games: IdleGames, places: ServerPlaces, limits: ConcurrencyConfig
+        self, settings: ServerSettings, games: IdleGames | InsideGames, places: ServerPlaces, limits: ConcurrencyConfig
     ) -> None:
         def environment() -> KhalaEnvironment:
             return KhalaEnvironment(settings, games, places)
 
-        super().__init__(environment, KhalaAction, KhalaObservation, concurrency_config=limits)
+        super().__init__(
+            environment,
+            CallToolAction,
+            KhalaObservation,
+            concurrency_config=limits,
+            env_name="khala",
+            state_cls=KhalaState,
+        )
         self._places = places
         self._episodes: dict[str, _Episode] = {}
         self._leaves: dict[str, asyncio.Event] = {}
@@ -293,7 +304,14 @@ class _Server(HTTPEnvServer):
         return isinstance(environment, KhalaEnvironment) and self._places.holds(environment)
 
     def _environment(self, session: str) -> KhalaEnvironment:
-        environment = self._sessions[session]
+        """Return the environment of a session.
+
+        Raises:
+            NoEpisode: the session was closed over `/mcp`.
+        """
+        environment = self._sessions.get(session)
+        if environment is None:
+            raise NoEpisode("the session was closed: call reset to begin anew")
         assert isinstance(environment, KhalaEnvironment)
         return environment
 

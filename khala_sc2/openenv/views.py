@@ -9,6 +9,8 @@ from khala_agents.prompt import Prompt
 from khala_sc2.openenv.models import AgentView, ChatTurn, Outcome, Picture
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from khala_protocol.messages import Briefing, Result
     from khala_sc2.playing.seats import Seen
 
@@ -32,6 +34,22 @@ def _briefing(briefing: Briefing) -> list[ChatTurn]:
     prompt = Prompt(briefing)
     stable = prompt.messages("")[: prompt.stable]
     return [ChatTurn(role=message.role, content=message.content) for message in stable]
+
+
+def page_of(views: Mapping[str, AgentView], outcome: Outcome | None) -> str:
+    """Return what a model reads of an observation."""
+    if outcome is not None:
+        return (
+            f"The episode is over: {outcome.outcome}, {outcome.cause}, after {outcome.game_s:.0f} s of game time. "
+            f"Value destroyed {outcome.killed_value:.0f}, lost {outcome.lost_value:.0f}."
+        )
+    if len(views) == 1:
+        return "".join(map(_page, views.values()))
+    return "\n\n".join(f"# {name}\n\n{_page(view)}" for name, view in views.items())
+
+
+def _page(view: AgentView) -> str:
+    return "\n\n".join([*(turn.content for turn in view.briefing), view.text])
 
 
 def outcome_of(result: Result) -> Outcome:

@@ -42,4 +42,8 @@ def with_model(model: ModelConfig, environ: Mapping[str, str] = os.environ) -> d
 
 
 def _only(environ: Mapping[str, str], *patterns: str) -> dict[str, str]:
-    return {name: value for name, value in environ.items() if any(fnmatch.fnmatchcase(name, p) for p in patterns)}
+    wanted = [name for name in environ if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
+    found = {
+        name: environ.get(name) for name in wanted
+    }  # a game that starts in another thread sets and takes variables
+    return {name: value for name, value in found.items() if value is not None}

@@ -12,6 +12,8 @@ from khala_simulator.native.engine import describe
 from khala_simulator.process.install import InstallError, install, is_installed
 
 STARCRAFT = "StarCraft II"
+_unpacked: dict[Path, Path] = {}
+"""By the directory that was wanted, the install in it."""
 
 
 def cache() -> Path:
@@ -32,7 +34,7 @@ def find(source: str) -> tuple[Path, str]:
     """
     if source == "simulator":
         try:
-            path = find_sc2(source, simulator=install(cache() / "StarCraftII"))
+            path = find_sc2(source, simulator=_unpack(cache() / "StarCraftII"))
         except InstallError as error:
             raise GameMissing(f"the simulator cannot be laid out: {error}; KHALA_CACHE names another place") from None
     else:
@@ -43,6 +45,13 @@ def find(source: str) -> tuple[Path, str]:
 def name_of(source: str) -> str:
     """Return the name of a game for the run card, and do not unpack the simulator for it; errors as in `find`."""
     return _simulator() if source == "simulator" else find(source)[1]
+
+
+def _unpack(directory: Path) -> Path:
+    """Unpack the simulator, once in this process: to look at its files takes 20 ms."""
+    if directory not in _unpacked or not is_installed(directory):
+        _unpacked[directory] = install(directory)
+    return _unpacked[directory]
 
 
 def _simulator() -> str:

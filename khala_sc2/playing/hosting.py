@@ -36,6 +36,8 @@ log = logging.getLogger(__name__)
 
 MAX_RESTARTS = 3
 """A game that dies more often in one run would die for ever, at the same decision."""
+INSIDE = GamePatience(unknown_s=3600.0, least_s=3600.0, remark_s=60.0)
+"""With a game in this process, which waits for its turn among the others, and which nothing can end from outside."""
 
 
 async def host_match(
@@ -97,10 +99,13 @@ def game_of(config: MatchConfig, sc2path: Path, *, first_episode: int = 0, proce
         render_px=task.render_px,
         environment=environment.plain() | named_parent(),
     )
+    is_alone = len(sides) == 1 and not task.opponent.joins and task.render_px is None
+    threads = processes.threads if processes and is_alone else None
     thread = GameThread(
         lambda: PySC2Game(started, processes, invitation),
-        patience=GamePatience().against(task.opponent),
+        patience=INSIDE if threads else GamePatience().against(task.opponent),
         give_up=invitation.withdrawn.set,
+        threads=threads,
     )
     return Sides(thread, [executor_of(side) for side in sides])
 

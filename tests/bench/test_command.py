@@ -29,7 +29,7 @@ SHORT = {
     "act": (),
     "abilities": (),
     "games_per_hour": ("--tasks", "2s3z_pair", "--games", "2", "--jobs", "2"),
-    "openenv": ("--clients", "2", "--steps", "2", "--seconds", "1"),
+    "sessions": ("--clients", "2", "--seconds", "1"),
     "env": ("--maps", "2s3z", "--seconds", "0.1", "--rounds", "1", "--at-once", "1"),
 }
 """By measurement, the options of its shortest run."""

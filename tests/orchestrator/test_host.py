@@ -96,8 +96,11 @@ async def test_who_watches_sees_the_card_every_report_and_every_result(hall: Hal
     assert hall.game.calls == ["reset", "act", "act", "reset", "act", "act"]
 
 
-async def test_a_process_of_many_matches_keeps_none_of_them(hall: Hall, config: MakeConfig) -> None:
+async def test_a_process_of_many_matches_keeps_none_of_them(
+    hall: Hall, config: MakeConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     await hall.play(config(max_steps=1))
+    monkeypatch.setattr("khala_protocol.garbage._next_s", 0.0)  # as long after the first match as it takes
     first = Left()
     gone = weakref.finalize(first, lambda: None)
     del first

@@ -1,4 +1,4 @@
-"""The directory that OpenEnv's own tools read: `openenv validate` passes, and image and manifest belong together."""
+"""The directory that OpenEnv's own tools read: `openenv validate` passes; image and manifest belong together."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from openenv.cli.__main__ import app as openenv
 from typer.testing import CliRunner
 
 from khala_sc2.cli import app
+from khala_sc2.openenv.tools import TOOLS
 
 HERE = Path(__file__).resolve().parents[2] / "envs" / "khala_env"
 MANIFEST: dict[str, Any] = yaml.safe_load((HERE / "openenv.yaml").read_text())
@@ -26,11 +27,15 @@ def instruction(name: str) -> str:
     return str(found)
 
 
-def test_openenv_validate_passes_and_finds_every_way_to_deploy() -> None:
-    done = CliRunner().invoke(openenv, ["validate", str(HERE), "--verbose"], catch_exceptions=False)
+def test_openenv_validate_passes() -> None:
+    """The checks of a running server are `tests/khala/openenv/test_standard.py`: here is no Docker to build it in."""
+    done = CliRunner().invoke(openenv, ["validate", str(HERE), "--level", "static"], catch_exceptions=False)
     assert done.exit_code == 0, done.output
-    assert "Ready for multi-mode deployment" in done.output
-    assert done.output.count("[YES]") == 4
+    assert re.search(r"PASS +static.manifest", done.output)
+
+
+def test_the_manifest_declares_the_tools_that_there_are() -> None:
+    assert MANIFEST["validation"]["capabilities"]["declared_tools"] == list(TOOLS)
 
 
 def test_the_manifest_names_an_application_that_serves_openenv() -> None:

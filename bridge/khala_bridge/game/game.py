@@ -31,6 +31,7 @@ from khala_protocol.messages import Frozen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from concurrent.futures import Executor as Threads
     from types import TracebackType
 
     from khala_bridge.act import Command, Executor
@@ -183,6 +184,7 @@ class GameThread:
         *,
         patience: GamePatience | None = None,
         give_up: Callable[[], None] = lambda: None,
+        threads: Threads | None = None,
     ) -> None:
         """Prepare a game without starting it.
 
@@ -190,13 +192,15 @@ class GameThread:
             start: makes the game; runs in the thread.
             patience: longest time that one call may take before the game is ended and `GameHangs` is raised.
             give_up: ends the wait for a player, if the game is no longer wanted while it starts.
+            threads: those that games in this process share, in place of a thread of its own.
         """
         self._start = start
         self._give_up = give_up
         self._patience = patience or GamePatience()
         self._slowest_s: float | None = None
         self._slowest_reset_s: float | None = None
-        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")
+        self._shares = threads is not None
+        self._threads = threads or ThreadPoolExecutor(max_workers=1, thread_name_prefix="game")
         self._game: Game | None = None
 
     async def __aenter__(self) -> Self:
@@ -205,7 +209,7 @@ class GameThread:
             self._game = await asyncio.get_running_loop().run_in_executor(self._threads, self._start)
         except BaseException:
             self._give_up()
-            self._threads.shutdown(wait=False)
+            self._leave_threads()
             raise
         return self
 
@@ -217,6 +221,10 @@ class GameThread:
             with contextlib.suppress(GameHangs):  # it is gone, as wanted
                 await self._run(self._playing.close, self._patience.limit_s(self._slowest_s))
         finally:
+            self._leave_threads()
+
+    def _leave_threads(self) -> None:
+        if not self._shares:
             self._threads.shutdown(wait=False)
 
     @property

@@ -21,6 +21,7 @@ from khala_bridge.game.ports import pick_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from concurrent.futures import Executor
     from pathlib import Path
 
 _environment = threading.RLock()
@@ -31,6 +32,10 @@ _LISTENS_AFTER_S = 0.2
 
 class Processes(Protocol):
     """Where a match gets the process of its game, and may leave it afterwards."""
+
+    @property
+    def threads(self) -> Executor | None:
+        """The threads that games share; None if each game has a thread of its own."""
 
     def take(self, sc2path: Path) -> Any:
         """Return a process of this install that waits for a game, connected; None if there is none.
@@ -51,6 +56,8 @@ class Launched:
     PySC2 tries to connect as soon as it has started a process, is refused, and sleeps for a second. Here it connects
     when the process is taken, which most often listens by then.
     """
+
+    threads = None
 
     def __init__(self, sc2path: Path, environment: dict[str, str] | None = None) -> None:
         """Start the process; arguments and errors as in `GameConfig` and `PySC2Game`."""
@@ -100,6 +107,8 @@ class IdleGames:
     A new match of 2s3z sees its first observation after 0.06 s in a process that is there, and after 0.6 s in a new
     one; the game is the same (`tests/khala/test_one_process.py`). Threads may share it.
     """
+
+    threads = None
 
     def __init__(self, most: int = 1) -> None:
         """Keep so many at most; each has the memory of a game, 70 MB with the simulator."""

@@ -188,6 +188,7 @@ class PySC2Game:
                 )
             )
             self._creep[index] = made[-1].creep
+            step.observation.clear()  # it is its own attributes, a circle that would keep 2 MB until a collection
         if self._battle:
             made[0] = self._battle.judge(made[0])
         self._ended = made[0].ended

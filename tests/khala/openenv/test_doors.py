@@ -18,7 +18,6 @@ from openenv.core.generic_client import GenericEnvClient
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from khala_bridge.game.processes import IdleGames
 from khala_sc2.openenv.client import KhalaAction, KhalaEnv
 from khala_sc2.openenv.places import OVER_YIELD_S, YIELD_S, ServerPlaces
 from khala_sc2.openenv.server import (
@@ -31,6 +30,7 @@ from khala_sc2.openenv.server import (
     server_config,
 )
 from khala_sc2.openenv.settings import ServerSettings
+from khala_sc2.playing.inside import InsideGames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -147,7 +147,7 @@ async def test_episodes_over_http_that_their_clients_left_do_not_fill_the_server
 ) -> None:
     monkeypatch.setattr("khala_sc2.openenv.server.MOST_WAITING", 2)
     server = _Server(
-        ServerSettings(), IdleGames(1), ServerPlaces(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
+        ServerSettings(), InsideGames(), ServerPlaces(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
     )
     made = [(await server._create_session())[0] for _ in range(20)]
     assert list(server._sessions) == made[-3:]
@@ -274,7 +274,7 @@ async def test_another_client_cannot_end_or_move_an_episode(serving: Serving) ->
         httpx.AsyncClient(base_url=address, timeout=60) as other,
     ):
         await owner.post("/reset", json=SHORT | {"episode_id": "mine"})
-        step: dict[str, Any] = {"action": {"reply": ""}}
+        step: dict[str, Any] = {"action": {"tool_name": "reply", "arguments": {"text": ""}}}
         named = {"episode_id": "mine"}
         tries: list[tuple[str, dict[str, Any]]] = [
             ("/close", {}), ("/step", step), ("/close", named), ("/step", step | named), ("/reset", SHORT | named),

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import psutil
 import pytest
+from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.messages import Observation, Reply
 from khala_protocol.recording import Recording
 from khala_sc2.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
 from khala_sc2.openenv.settings import ServerSettings
+from khala_simulator.process.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,10 +28,15 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.game
 RAISES = pytest.raises
+BROKEN_SEED = 666
 
 
 def skilled(text: str) -> str:
     return PLAYERS["skilled"](text, random.Random(f"0 {text}"))
+
+
+def answer(text: str) -> dict[str, object]:
+    return {"type": "call_tool", "tool_name": "reply", "arguments": {"text": text}}
 
 
 def replies(seen: KhalaObservation) -> KhalaAction:
@@ -63,9 +70,9 @@ async def test_a_team_plays_over_a_websocket_what_the_host_recorded(serving: Ser
     assert base64.b64decode(stalkers.pictures[0].data).startswith(b"\xff\xd8")
     assert all(view.briefing == [] for one in seen[1:] for view in one.agents.values())
     assert (last.agents, last.text, last.step) == ({}, "", 3)
-    assert last.result is not None
-    assert (last.result.outcome, last.result.cause) == ("cut", "step limit")
-    assert sum(one.elapsed_s for one in seen) == pytest.approx(last.result.game_s, abs=0.1)
+    assert last.outcome is not None
+    assert (last.outcome.outcome, last.outcome.cause) == ("cut", "step limit")
+    assert sum(one.elapsed_s for one in seen) == pytest.approx(last.outcome.game_s, abs=0.1)
     assert last.reward == pytest.approx(-0.1 * last.elapsed_s / 60)
     assert then.agents["Stalkers"].briefing
     assert (next_state.seed, next_state.recording) == (4, state.recording)
@@ -111,13 +118,9 @@ async def test_sessions_are_apart_seeded_and_no_more_than_the_server_has(serving
         assert untimed(first) == untimed(second)
         with RAISES(RuntimeError, match=r"at capacity: 2/2"):
             await third.reset()
-        games = [child for child in psutil.Process().children(recursive=True) if child not in before]
-        assert len(games) == 2
         assert untimed(await played(one, **options)) == untimed(first)
         now = psutil.Process().children(recursive=True)
-        assert [child for child in now if child not in before] == games, "a seed is played in a process that is there"
-    _, alive = await asyncio.to_thread(psutil.wait_procs, games, 10)
-    assert not alive
+        assert [child for child in now if child not in before] == [], "games are in the server's process"
 
 
 @pytest.mark.slow
@@ -127,16 +130,41 @@ async def test_an_episode_over_http_has_a_name(serving: Serving) -> None:
         assert began.status_code == 200, began.text
         name = began.json()["observation"]["episode_id"]
         text = began.json()["observation"]["agents"]["CombatGroupSmac"]["text"]
-        stepped = (await client.post("/step", json={"action": {"reply": skilled(text)}})).json()
+        stepped = (await client.post("/step", json={"action": answer(skilled(text))})).json()
         assert (stepped["done"], stepped["observation"]["step"]) == (False, 1)
         assert (await client.get("/state")).json()["step_count"] == 1
         await client.post("/reset", json={"episode_id": "mine", "seed": 2, "task": "2s3z"})
-        unclear = await client.post("/step", json={"action": {"reply": ""}})
+        unclear = await client.post("/step", json={"action": answer("")})
         assert unclear.status_code == 409
         assert unclear.json()["detail"].startswith("there are several episodes: say which one with episode_id")
         full = await client.post("/reset", json={})
         assert (full.status_code, "capacity" in full.json()["detail"]) == (503, True)
         assert (await client.post("/close", json={"episode_id": "mine"})).json() == {"episode_id": "mine"}
-        ended = (await client.post("/step", json={"action": {"reply": ""}, "episode_id": name})).json()
-        assert ended["observation"]["result"]["cause"] == "step limit"
+        ended = (await client.post("/step", json={"action": answer(""), "episode_id": name})).json()
+        assert ended["observation"]["outcome"]["cause"] == "step limit"
         assert (await client.get("/state", params={"episode_id": "mine"})).status_code == 409
+
+
+async def test_a_fault_in_a_game_ends_its_session_and_no_other(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer_request = Session.handle
+    broken: list[Session] = []
+
+    def handle(self: Session, data: bytes) -> bytes:
+        request = sc_pb.Request.FromString(data)
+        if request.create_game.random_seed == BROKEN_SEED:
+            broken.append(self)
+        if self in broken and request.HasField("step"):
+            raise ZeroDivisionError("a fault of the simulator")
+        return answer_request(self, data)
+
+    monkeypatch.setattr(Session, "handle", handle)
+    async with serving() as address, KhalaEnv(address) as healthy, KhalaEnv(address) as failing:
+        await healthy.reset(seed=1, task="2s3z")
+        with RAISES(RuntimeError, match="a fault of the simulator"):
+            await played(failing, seed=BROKEN_SEED, task="2s3z")
+        assert (await healthy.step(KhalaAction(reply=""))).observation.step == 1
+        with RAISES(RuntimeError, match="no episode has begun: call reset first"):
+            await failing.step(KhalaAction(reply=""))
+        assert (await failing.reset(seed=2, task="2s3z")).observation.text
