@@ -60,6 +60,7 @@ class Tally:
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
         self._rethinks = Counter[str]()
+        self._humans = Counter[str]()
         self._incidents: list[str] = []
         self._advisers: Counter[str] = Counter()
         self._lag_s = 0.0
@@ -77,6 +78,8 @@ class Tally:
             self._rejections.update(count_refusals(agent.rejections))
             if agent.rethinks:
                 self._rethinks[name] += agent.rethinks
+            if agent.human:
+                self._humans[name] += 1
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:
@@ -132,6 +135,7 @@ class Tally:
             accepted_of=dict(self._deeds.accepted),
             fallbacks={name: dict(count) for name, count in self._deeds.causes.items()},
             rethinks=dict(self._rethinks),
+            humans=dict(self._humans),
             incidents=tuple(self._incidents[:MAX_INCIDENTS]),
             advisers=dict(self._advisers),
             age_p50_loops=_quantile(self._ages_loops, 0.5),
