@@ -214,9 +214,11 @@ async def _unless_one_dies(
     seats: Sequence[Coroutine[Any, Any, None]],
 ) -> list[Result]:
     """Return the results of the match. A child that fails before the first step, or for good, ends it."""
-    playing, keeping = asyncio.create_task(match), asyncio.gather(children.keep(begun), *seats)
+    playing = asyncio.create_task(match)
+    keeping: asyncio.Future[Any] = asyncio.gather(children.keep(begun), *seats)
+    both: set[asyncio.Future[Any]] = {playing, keeping}
     try:
-        await asyncio.wait({playing, keeping}, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
         if not playing.done():
             await keeping
         results = await playing
@@ -224,9 +226,9 @@ async def _unless_one_dies(
             await asyncio.wait({keeping}, timeout=LAST_S)
         return results
     finally:
-        for task in (playing, keeping):
+        for task in both:
             task.cancel()
-        await asyncio.gather(playing, keeping, return_exceptions=True)
+        await asyncio.gather(*both, return_exceptions=True)
 
 
 def _prepare(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from khala.view.seats import SeatPlace
     from khala_agents.commands import BusPlace, Link
+    from khala_protocol.bus import Bus
 
 
 def play_persons(names: Sequence[str], run: str, side: str, bus: BusPlace, place: SeatPlace) -> None:
@@ -44,7 +45,7 @@ def play_persons(names: Sequence[str], run: str, side: str, bus: BusPlace, place
 
 async def _play(seats: dict[str, PersonSeat], run: str, links: Sequence[Link], place: SeatPlace) -> None:
     async with AsyncExitStack() as stack:
-        sessions = {}
+        sessions: dict[str, Bus] = {}
         for link in links:
             session = await open_bus(link.config)
             stack.push_async_callback(session.close)

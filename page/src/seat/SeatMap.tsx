@@ -9,8 +9,13 @@ import { choose, chooseTeam, offers, pick, picking, team } from "./seat";
 
 type Pair = readonly [number, number];
 
-/** Whether the map shows all of it; else the screen of the chosen team. */
-const whole = signal(false);
+/** What the map shows: the units in sight of the chosen team, its screen, or all of it. */
+const shown = signal<Reach>("units");
+type Reach = "units" | "screen" | "map";
+const REACHES: readonly (readonly [Reach, string])[] = [["units", "Units"], ["screen", "Screen"], ["map", "Whole map"]];
+/** Room around the units, and the least that is shown, in world units. */
+const ROOM = 2;
+const LEAST = 12;
 /** A unit is as wide as this, in world units: an observation does not tell its size. */
 const UNIT = 0.9;
 /** Steps of the cross for a key, in world units; with shift the larger one. */
@@ -31,7 +36,7 @@ export function SeatMap({ asked }: { asked: SeatQuestion }) {
   const view = asked.view;
   const open = picking.value;
   const kind = open && wanted(open);
-  const box = boxOf(now, asked, kind === "minimap");
+  const box = boxOf(now, asked, kind === "minimap" ? "map" : kind === "screen" && shown.value === "units" ? "screen" : shown.value);
   const offered = offers.value.filter((one) => one.at);
   const spots = spotsOf(asked);
   const lit = new Set(spoken.value?.tags ?? []);
@@ -102,9 +107,13 @@ export function SeatMap({ asked }: { asked: SeatQuestion }) {
         <path class="cross" d={`M${aim[0] - size} ${aim[1]}h${2 * size}M${aim[0]} ${aim[1] - size}v${2 * size}`} stroke-width={0.12 * size} />
       </svg>
       <div class="seat-map-tools">
-        <button aria-pressed={whole.value} onClick={() => (whole.value = !whole.value)}>
-          Whole map
-        </button>
+        <div class="joined" role="group" aria-label="What the map shows">
+          {REACHES.map(([reach, name]) => (
+            <button key={reach} aria-pressed={shown.value === reach} onClick={() => (shown.value = reach)}>
+              {name}
+            </button>
+          ))}
+        </div>
         <output aria-live="polite">{cross.value && (whatIsAt(cross.value, spots, size) ?? (open && pointWords(pointAt(cross.value, open, view))))}</output>
       </div>
     </section>
@@ -135,13 +144,20 @@ function nearest<T>(all: readonly T[], at: Pair, place: (one: T) => Pair, within
   return all.filter((one) => far(one) <= within).sort((a, b) => far(a) - far(b))[0];
 }
 
-/** Return what is shown: the screen of a team, or the whole map. */
-function boxOf(now: TeamView | undefined, asked: SeatQuestion, all: boolean): [number, number, number, number] {
+/** Return the box of the minimap frame that is shown: x, y, width, height. */
+function boxOf(now: TeamView | undefined, asked: SeatQuestion, reach: Reach): [number, number, number, number] {
   const [x0, y0, x1, y1] = asked.view.bounds;
-  if (all || whole.value || !now?.minimap) return [x0, y0, x1 - x0, y1 - y0];
-  const size = SCREEN / asked.view.cell;
-  return [now.minimap[0] - size / 2, now.minimap[1] - size / 2, size, size];
+  if (reach === "map" || !now?.minimap) return [x0, y0, x1 - x0, y1 - y0];
+  const cell = asked.view.cell;
+  if (reach === "screen") return square(now.minimap, SCREEN / cell);
+  const places = [...now.units, ...now.allies, ...now.enemies].map((unit) => unit.minimap);
+  const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
+  const [left, top, right, bottom] = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+  if (!places.length) return square(now.minimap, SCREEN / cell);
+  return square([(left + right) / 2, (top + bottom) / 2], Math.max(right - left + (2 * ROOM) / cell, bottom - top + (2 * ROOM) / cell, LEAST / cell));
 }
+
+const square = ([x, y]: Pair, size: number): [number, number, number, number] => [x - size / 2, y - size / 2, size, size];
 
 /** Return each unit once: as one of its team, if it is the agent's own. */
 function spotsOf(asked: SeatQuestion): Spot[] {
