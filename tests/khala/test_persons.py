@@ -38,7 +38,7 @@ class Host:
 
     async def listen(self) -> None:
         self.replies = await self.bus.subscribe(every_agent(RUN, Topic.REPLY), Delivery.SPEECH)
-        self.present = await self.bus.watch(every_agent(RUN, Topic.ALIVE) + "/*")
+        self.present = await self.bus.watch(every_agent(RUN, Topic.ALIVE))
 
     async def say(self, message: Wire) -> None:
         topic = Topic(str(message.model_dump()["kind"]))
