@@ -216,12 +216,9 @@ def _briefing(briefing: Briefing) -> SeatBriefing:
         episode=briefing.episode,
         episodes=briefing.episodes,
         text="\n\n".join(texts),
-        teams=briefing.teams,
-        correspondents=briefing.correspondents,
+        actions=tuple(action.name for action in briefing.actions),
+        correspondents=tuple(contact.name for contact in briefing.correspondents),
         channels=briefing.channels,
-        frames=briefing.frames,
-        clock=briefing.clock,
-        max_actions=briefing.max_actions,
     )
 
 

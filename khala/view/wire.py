@@ -33,11 +33,8 @@ from pydantic import Field
 from khala_protocol.messages import (
     AgentKind,
     AgentStatus,
-    Clock,
-    Contact,
     Ending,
     Fate,
-    Frames,
     Frozen,
     ImageRef,
     ModelCall,
@@ -46,7 +43,6 @@ from khala_protocol.messages import (
     Rejection,
     RejectionReason,
     Scene,
-    TeamSpec,
     Timings,
     Unasked,
     Usage,
@@ -424,12 +420,10 @@ class SeatBriefing(Frozen):
     episodes: int
     text: str
     """What a model reads before its observations, word for word."""
-    teams: tuple[TeamSpec, ...]
-    correspondents: tuple[Contact, ...]
+    actions: tuple[str, ...]
+    """Names of all that its teams may ever do; the page gives each a key that stays."""
+    correspondents: tuple[str, ...]
     channels: tuple[str, ...]
-    frames: Frames
-    clock: Clock
-    max_actions: int
 
 
 class SeatQuestion(Frozen):

@@ -94,39 +94,6 @@ export interface ChatMessage {
   images: ImageRef[];
 }
 
-/** How game time and thinking time relate in this run. */
-export interface Clock {
-  /**
-   * `frozen`: the game stands still while agents decide. `budget`: each decision takes effect `thinking_loops` after
-   * its observation. `token`: as many loops later as `pace` says of the tokens that were read and written. `realtime`:
-   * the game goes on at `speed` and waits for nobody; a decision takes effect when it arrives.
-   */
-  rule: "frozen" | "budget" | "token" | "realtime";
-  /** Longest time the host waits for the answer to an observation; None for no limit. */
-  max_wait_s: number | null;
-  /**
-   * Game loops from a decision's effect to the agent's next observation; with `realtime`, also those between two
-   * looks of the host at the game and at its inbox.
-   */
-  step_loops: number;
-  /** With `budget`: game loops that each decision costs. */
-  thinking_loops: number;
-  /** With `token`: the pace of models whose model file gives none. */
-  pace: Pace;
-  /** With `realtime`: 1 is 22.4 game loops in a second. */
-  speed: number;
-  /** A decision that takes effect more game loops after its observation is refused; None for no limit. */
-  max_age_loops: number | null;
-  /** How long a required agent may be away: the host waits for it as long, and then ends the match. */
-  grace_s: number;
-}
-
-/** An agent or channel that an agent may write to. */
-export interface Contact {
-  name: string;
-  role: string;
-}
-
 /** Everything that a side has, makes and knows of. */
 export interface Counts {
   units: TypeCount[];
@@ -273,12 +240,6 @@ export interface ExperimentView {
   runs: RunLine[];
 }
 
-/** Sizes of the two frames that positions are given in; x right, y down, from 0 to below the size. */
-export interface Frames {
-  screen: number;
-  minimap: number;
-}
-
 /** A grid of cells over the whole map, seen from above. */
 export interface GridView {
   /** Cells from west to east. */
@@ -414,18 +375,6 @@ export interface OrderView {
   minimap: [number, number] | null;
   /** Progress, 0 to 1, of training, research or morphing; None for orders without progress. */
   progress: number | null;
-}
-
-/**
- * How long a model takes, as a function of what it reads and writes, so that the same reply always costs the same.
- * 
- * seconds = requests * latency_s + tokens read / read_tokens_per_s + tokens written / write_tokens_per_s
- */
-export interface Pace {
-  /** Seconds of each request, whatever its length. */
-  latency_s: number;
-  read_tokens_per_s: number;
-  write_tokens_per_s: number;
 }
 
 /** Server → page: what became of an advice, or why something cannot be had. */
@@ -639,12 +588,10 @@ export interface SeatBriefing {
   episodes: number;
   /** What a model reads before its observations, word for word. */
   text: string;
-  teams: TeamSpec[];
-  correspondents: Contact[];
+  /** Names of all that its teams may ever do; the page gives each a key that stays. */
+  actions: string[];
+  correspondents: string[];
   channels: string[];
-  frames: Frames;
-  clock: Clock;
-  max_actions: number;
 }
 
 /** Server → page: an observation to answer. */
@@ -811,13 +758,6 @@ export interface TeamReport {
   units: Record<string, number>;
   /** Health and shield of all of them, 0 to 1 of their maximum. */
   health: number;
-}
-
-/** One team of an agent, as configured. */
-export interface TeamSpec {
-  name: string;
-  unit_types: string[];
-  task: string;
 }
 
 /** One team of an agent: its units, and what they see on their screen. */

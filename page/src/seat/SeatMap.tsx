@@ -73,7 +73,7 @@ export function SeatMap({ asked }: { asked: SeatQuestion }) {
         ref={svg}
         viewBox={box.join(" ")}
         role="application"
-        tabIndex={0}
+        tabindex={0} // of an element of SVG, whose attributes have no capitals
         aria-label={`Map of ${now?.name ?? "the match"}. Arrow keys move the cross, Enter picks what is there.`}
         onClick={click}
         onKeyDown={key}

@@ -8,7 +8,7 @@ import { theme, toggleTheme } from "../theme";
 import { spaced, whole } from "../words";
 import type { SeatQuestion, SeatResult } from "../wire";
 import { Countdown } from "./Countdown";
-import { ACTION_KEYS, HINTS, listen } from "./keys";
+import { HINTS, keyOf, listen } from "./keys";
 import { question as asks, SCREEN } from "./picking";
 import * as seat from "./seat";
 import { SeatMap } from "./SeatMap";
@@ -119,15 +119,15 @@ function Orders({ asked }: { asked: SeatQuestion }) {
       <div class="seat-row" role="group" aria-label="Teams">
         {asked.view.teams.map((team, i) => (
           <button key={team.name} aria-pressed={team.name === now?.name} onClick={() => seat.chooseTeam(team.name)}>
-            {i < 9 && !open && <kbd>{i + 1}</kbd>} {team.name} <span class="muted">{team.units.length || ""}</span>
+            {i < 9 && !open && <kbd aria-hidden="true">{i + 1}</kbd>} {team.name} <span class="muted">{team.units.length || ""}</span>
           </button>
         ))}
       </div>
       {now && (
         <div class="seat-row" role="group" aria-label={`Actions of ${now.name}`}>
-          {now.actions.map((action, i) => (
+          {now.actions.map((action) => (
             <button key={action.name} title={action.description} aria-pressed={open?.action.name === action.name} onClick={() => seat.choose(action)}>
-              {i < ACTION_KEYS.length && <kbd>{ACTION_KEYS[i]}</kbd>} {spaced(action.name)}
+              {keyOf(action) && <kbd aria-hidden="true">{keyOf(action)}</kbd>} {spaced(action.name)}
             </button>
           ))}
         </div>
@@ -139,11 +139,11 @@ function Orders({ asked }: { asked: SeatQuestion }) {
           </p>
           {seat.offers.value.map((one, i) => (
             <button key={String(one.argument)} onClick={() => seat.pick(one.argument)}>
-              {i < 9 && <kbd>{i + 1}</kbd>} {one.name}
+              {i < 9 && <kbd aria-hidden="true">{i + 1}</kbd>} {one.name}
             </button>
           ))}
           <button onClick={() => (seat.picking.value = null)}>
-            <kbd>esc</kbd> Cancel
+            <kbd aria-hidden="true">esc</kbd> Cancel
           </button>
         </div>
       )}
@@ -223,7 +223,7 @@ function Letters({ mine }: { mine: boolean }) {
   const about = seat.briefing.value;
   const to = useSignal("");
   const text = useSignal("");
-  const known = [...(about?.correspondents.map((contact) => contact.name) ?? []), ...(about?.channels ?? [])];
+  const known = [...(about?.correspondents ?? []), ...(about?.channels ?? [])];
   if (!known.length && !seat.letters.value.length) return null;
   const add = (event: Event) => {
     event.preventDefault();

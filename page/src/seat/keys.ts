@@ -1,12 +1,16 @@
 /** Keys of a seat: those that no field takes, and ctrl and enter everywhere. */
 
-import { offers, picking, pick, question, choose, chooseTeam, send, team, undo } from "./seat";
+import type { ActionSpec } from "../wire";
+import { briefing, choose, chooseTeam, offers, pick, picking, question, send, team, undo } from "./seat";
 
-export const ACTION_KEYS = "qwertyuiop";
+const ACTION_KEYS = "qwertyuiopasdfghjklxcvbnm";
+
+/** Return the key of an action, the same in all steps; "" if there are more actions than keys. */
+export const keyOf = (action: Pick<ActionSpec, "name">) => ACTION_KEYS[briefing.value?.actions.indexOf(action.name) ?? -1] ?? "";
 
 export const HINTS: readonly (readonly [string, string])[] = [
   ["1 … 9", "choose a team; while you pick a target, the target of that number"],
-  ["q w e r …", "choose an action of the team, in the order of the buttons"],
+  ["letters", "choose the action whose button has the letter"],
   ["arrows, enter", "on the map: move the cross, pick what is there"],
   ["esc", "pick nothing"],
   ["z", "undo"],
@@ -31,7 +35,7 @@ function onKey(event: KeyboardEvent): void {
 function plain(key: string): boolean {
   if (/^[1-9]$/.test(key)) return numbered(Number(key) - 1);
   if (key === "z") undo();
-  const action = key.length === 1 ? team.value?.actions[ACTION_KEYS.indexOf(key)] : undefined;
+  const action = team.value?.actions.find((one) => keyOf(one) === key);
   if (action) choose(action);
   return key === "z" || action !== undefined;
 }
