@@ -108,12 +108,12 @@ class PersonSeat(Policy):
         self.over = False
         self._owner = ""
         self._windows = Counter[str]()
-        self._changed = asyncio.Event()
+        self._news = asyncio.Event()
 
     @property
-    def changed(self) -> asyncio.Event:
+    def news(self) -> asyncio.Event:
         """An event that is set with the next change. Take it before you look, and no change is missed."""
-        return self._changed
+        return self._news
 
     # --- as a policy --------------------------------------------------------------------------------
 
@@ -204,13 +204,13 @@ class PersonSeat(Policy):
     async def until_taken(self) -> None:
         """Wait until a window is open, or the match is over."""
         while not (self._windows.total() or self.over):
-            await self._changed.wait()
+            await self._news.wait()
 
     async def until_left(self) -> None:
         """Wait until no window has been open for `AWAY_S`, or the match is over."""
         while not self.over:
             if self._windows.total():
-                await self._changed.wait()
+                await self._news.wait()
                 continue
             try:
                 async with asyncio.timeout(AWAY_S):
@@ -219,8 +219,8 @@ class PersonSeat(Policy):
                 return
 
     def _tell(self) -> None:
-        self._changed.set()
-        self._changed = asyncio.Event()
+        self._news.set()
+        self._news = asyncio.Event()
 
 
 def with_persons(config: MatchConfig, seats: Collection[Seat]) -> MatchConfig:

@@ -178,7 +178,7 @@ class SeatServer:
         question: PersonQuestion | None = None
         with contextlib.suppress(ConnectionError):
             while True:
-                changed = seat.changed
+                news = seat.news
                 if seat.briefing is not None and seat.briefing is not briefing:
                     briefing = seat.briefing
                     await socket.send_str(_briefing(briefing).model_dump_json())
@@ -189,7 +189,7 @@ class SeatServer:
                 if seat.over:
                     await socket.close()
                     return
-                await changed.wait()
+                await news.wait()
 
     def _hear(self, window: str, text: str) -> PageNote:
         """Take what the person says; return what became of it."""

@@ -75,7 +75,7 @@ async def host() -> AsyncIterator[tuple[Host, PersonSeat]]:
 async def asked(seat: PersonSeat, step: int) -> None:
     """Wait until a step is asked."""
     while seat.question is None or seat.question.place != (0, step) or not seat.question.waits:
-        await seat.changed.wait()
+        await seat.news.wait()
 
 
 async def test_an_answer_is_the_reply_of_the_agent_and_says_that_it_is_human(host: tuple[Host, PersonSeat]) -> None:
@@ -186,7 +186,7 @@ async def test_the_last_result_of_the_own_side_ends_the_seat(host: tuple[Host, P
     with seat.window("a"):
         assert (await anext(bus.present)).alive
         while seat.briefing is None:
-            await seat.changed.wait()
+            await seat.news.wait()
         for side in ("red", "blue"):
             await bus.say(
                 Result(
@@ -195,7 +195,7 @@ async def test_the_last_result_of_the_own_side_ends_the_seat(host: tuple[Host, P
                 )
             )  # fmt: skip
         while not seat.over:
-            await seat.changed.wait()
+            await seat.news.wait()
         assert [result.side for result in seat.results] == ["blue"]
         assert not (await anext(bus.present)).alive
 
@@ -204,4 +204,4 @@ def test_a_host_waits_longer_for_persons_and_its_card_names_them() -> None:
     config = MatchConfig(task=load_task("2s3z_pair"), run=RUN)
     assert with_persons(config, ()) is config
     with_one = with_persons(config, {STALKERS})
-    assert (with_one.humans, with_one.assemble_s) == ({("blue", "Stalkers")}, COME_S)
+    assert (with_one.humans, with_one.assemble_s) == (frozenset({("blue", "Stalkers")}), COME_S)
