@@ -46,6 +46,8 @@ export const team = computed(() => {
 export const offers = computed(() => (picking.value && question.value ? candidates(picking.value, question.value.view) : []));
 
 let socket: WebSocket | null = null;
+/** Whether the connection was lost while an answer was on its way. */
+let unsure = false;
 
 /** Connect, and again whenever the connection is lost, until the match is over. */
 export function begin(): void {
@@ -59,6 +61,7 @@ function connect(): void {
   socket.onopen = () => (connected.value = true);
   socket.onmessage = (event) => hear(JSON.parse(String(event.data)) as SeatBriefing | SeatQuestion | SeatState | PageNote);
   socket.onclose = () => {
+    unsure = sending.value;
     batch(() => {
       connected.value = false;
       sending.value = false;
@@ -75,6 +78,8 @@ export function hear(told: SeatBriefing | SeatQuestion | SeatState | PageNote): 
     else if (told.kind === "state") {
       state.value = told;
       deadline.value = told.left_s === null ? null : performance.now() + told.left_s * 1000;
+      if (unsure && told.sent === draft.value) finish();
+      unsure = false;
     } else settle(told);
   });
 }
@@ -83,7 +88,7 @@ function ask(told: SeatQuestion): void {
   const known = question.value;
   question.value = told;
   if (known?.episode !== told.episode || known.step !== told.step) {
-    const read = told.messages.map((m) => ({ step: told.step, from: m.sender, to: m.recipient, text: m.text }));
+    const read = told.messages.filter((m) => !m.again).map((m) => ({ step: told.step, from: m.sender, to: m.recipient, text: m.text }));
     letters.value = [...letters.value, ...read].slice(-MOST_LETTERS);
   }
   const open = picking.value;
@@ -96,7 +101,11 @@ function settle(told: PageNote): void {
   note.value = told;
   if (!sending.value) return;
   sending.value = false;
-  if (!told.ok) return;
+  if (told.ok) finish();
+}
+
+/** Begin a new draft: the one before has arrived. */
+function finish(): void {
   lastSent.value = draft.value;
   draft.value = "";
   before.value = [];
