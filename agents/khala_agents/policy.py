@@ -117,7 +117,7 @@ class Policy(ABC):
         pace: how fast its model is, for the clock `token`; None: the task says.
         rethink: how often it wants to decide again on one observation, if nothing of its reply is possible. The
             observation then has a verdict.
-        human: whether a person decides.
+        human: whether a person plays the agent.
     """
 
     pace: Pace | None = None

@@ -296,7 +296,7 @@ UNASKED = {"no_units": "not asked, without units", "not_due": "not asked, not du
 def _steps_of(result: Result, agent: str) -> str:
     """Return how an agent's steps ended: `177 ok, 23 not asked, without units`."""
     counts = sorted(result.statuses.get(agent, {}).items())
-    counts += [("by a human", count)] if (count := result.humans.get(agent)) else []
+    counts += [("by a human", result.humans[agent])] if agent in result.humans else []
     counts += [("asked to rethink", count)] if (count := result.rethinks.get(agent)) else []
     counts += [(UNASKED[why], count) for why, count in sorted(result.unasked.get(agent, {}).items())]
     return ", ".join(f"{count} {words}" for words, count in counts)

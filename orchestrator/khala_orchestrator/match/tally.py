@@ -79,7 +79,7 @@ class Tally:
             if agent.rethinks:
                 self._rethinks[name] += agent.rethinks
             if agent.human:
-                self._humans[name] += 1
+                self._humans[name] += agent.status == "ok"
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:

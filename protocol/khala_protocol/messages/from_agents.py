@@ -82,7 +82,7 @@ class Reply(Wire):
     pace: Pace | None = None
     """The pace of its model, if the model file gives one; see `Clock.pace`."""
     human: bool = Field(default=False, exclude_if=lambda human: not human)
-    """Whether a person decided; absent if not."""
+    """Whether a person plays the agent; absent if not."""
 
     @model_validator(mode="before")
     @classmethod

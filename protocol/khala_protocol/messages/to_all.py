@@ -141,7 +141,7 @@ class AgentReport(Frozen):
     rethinks: int = 0
     """How many replies it gave before this one, of which nothing was possible (`Reply.rethink`)."""
     human: bool = Field(default=False, exclude_if=lambda human: not human)
-    """Whether a person decided; absent if not."""
+    """Whether a person plays it; absent if not."""
     usage: Usage = Usage()
     asked_step: int | None = Field(default=None, ge=0)
     """Step of the observation that it answers; None for the step of the report."""
@@ -264,7 +264,7 @@ class Result(Wire):
     rethinks: dict[str, int] = {}
     """By agent that was asked to rethink: how often, over all steps."""
     humans: dict[str, int] = Field(default={}, exclude_if=lambda humans: not humans)
-    """By agent for which a person decided: how often; absent if none did."""
+    """By agent that a person plays: how many decisions the person made in time; absent if persons play none."""
     incidents: tuple[str, ...] = ()
     """The first incidents of its reports, each with its step."""
     advisers: dict[str, int] = {}

@@ -160,6 +160,15 @@ def test_other_machines_reach_a_seat_over_https_or_if_that_is_wanted() -> None:
 
 
 @pytest.mark.game
+async def test_a_decision_that_a_person_did_not_make_in_time_is_not_counted_as_a_human_s() -> None:
+    seat = PersonSeat(STALKERS)
+    config = MatchConfig(task=change(load_task("2s3z_pair"), max_steps=2, max_wait_s=0.3), run="people")
+    minds = {"blue": Minds().with_name("skilled")}
+    (result,) = await one_process.play(config, minds, game="simulator", callers={STALKERS: seat})
+    assert (result.statuses["Stalkers"], result.humans) == ({"late": 2}, {"Stalkers": 0})
+
+
+@pytest.mark.game
 async def test_a_person_plays_a_match_beside_an_agent_and_everything_says_that_it_was_a_human(tmp_path: Path) -> None:
     seat = PersonSeat(STALKERS)
     record = tmp_path / "recording.mcap"
