@@ -1,4 +1,4 @@
-// Made by `python -m page.typescript` from khala/view/wire.py: change it there.
+// Made by `python -m page.typescript` from khala_sc2/view/wire.py: change it there.
 
 /** The cost of a valid action. */
 export interface ActionCost {

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing.persons import AWAY_S, COME_S, PersonSeat, play_seat, with_persons
-from khala.playing.seats import NotAsked, Seat
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.keys import RUN_TOPICS, Topic, agent_key, every_agent, run_key
 from khala_protocol.messages import Briefing, Casualties, Observation, Reply, Result, View
+from khala_sc2.playing.persons import AWAY_S, COME_S, PersonSeat, play_seat, with_persons
+from khala_sc2.playing.seats import NotAsked, Seat
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

@@ -43,7 +43,7 @@ def browser() -> Iterator[Browser]:
 def match(out: Path, *options: str) -> Iterator[tuple[list[str], subprocess.Popen[str]]]:
     """Start a match with persons; yield their links, and its process."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "khala", "run", *options, "--run", "people", "--out", str(out)],
+        [sys.executable, "-m", "khala_sc2", "run", *options, "--run", "people", "--out", str(out)],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stderr is not None

@@ -10,11 +10,6 @@ from typing import TYPE_CHECKING, Any
 import aiohttp
 import pytest
 
-from khala.playing import one_process
-from khala.playing.minds import Minds
-from khala.playing.persons import PersonSeat, with_persons
-from khala.playing.seats import Seat
-from khala.view.seats import SeatPlace, serve_seats
 from khala_agents.pictures import PictureStore
 from khala_agents.policy import Context
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -22,6 +17,11 @@ from khala_orchestrator.past.replay import recorded_config
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Briefing, ImageRef, Observation, Reply, Report, Result, Run, View
 from khala_protocol.recording import Recording
+from khala_sc2.playing import one_process
+from khala_sc2.playing.minds import Minds
+from khala_sc2.playing.persons import PersonSeat, with_persons
+from khala_sc2.playing.seats import Seat
+from khala_sc2.view.seats import SeatPlace, serve_seats
 from tests.khala.view.made import opened
 
 if TYPE_CHECKING:
