@@ -34,6 +34,8 @@ from khala_sc2.commands.run_options import (
     MatchOptions,
     MindOptions,
     Out,
+    PageOptions,
+    Person,
     Resume,
     RunName,
     Task,
@@ -46,7 +48,7 @@ from khala_sc2.knowledge.cli import app as knowledge
 from khala_sc2.mcp.cli import MCP_EPILOG, mcp
 from khala_sc2.openenv.cli import OPENENV_EPILOG, openenv
 from khala_sc2.service.cli import SERVE_EPILOG, SUBMIT_EPILOG, matches, serve, stop, submit, watch
-from khala_sc2.view.cli import VIEW_EPILOG, view
+from khala_sc2.view.cli import PERSON_EPILOG, VIEW_EPILOG, person, view
 
 app = typer.Typer(
     name="khala",
@@ -70,6 +72,8 @@ Examples:\n
     khala run simple64_eceb --level 5 --agents my_agents.yaml\n
     khala run simple64_duel --blue openai --red anthropic\n
     khala run simple64_eceb_terran --opponent "guest:python my_bot/run.py"\n
+    khala run 2s3z_pair --person Stalkers
+
     khala run --resume runs/2s3z-20260101-120000-ab12
 """
 TRY_EPILOG = """
@@ -98,6 +102,9 @@ def run(
     *,
     resume: Resume = None,
     minds: MindOptions,
+    person: Person = None,
+    pages: PageOptions,
+    insecure: Insecure = False,
     game: Game = "simulator",
     trust: Trust = False,  # noqa: ARG001  # its callback has done it
     match: MatchOptions,
@@ -108,12 +115,20 @@ def run(
     """Play a task on this machine: game, host, agents and, if need be, the scripted model.
 
     Agents run in their own processes and talk to the host over the bus, as they would from other machines. All
-    messages go into a recording, see `khala replay`.
+    messages go into a recording, see `khala replay`. With --person, the match begins when the person has opened the
+    link.
     """
     from khala_sc2.commands.run import WantedRun  # noqa: PLC0415  # see there
     from khala_sc2.commands.run import run as play  # noqa: PLC0415
 
-    play(WantedRun(task, resume, run, out, game, asdict(match), minds), as_json=as_json)
+    wanted = WantedRun(task, resume, run, out, game, asdict(match), minds, tuple(person or ()))
+    if not person:
+        play(wanted, as_json=as_json)
+        return
+    from khala_sc2.view.seats import SeatPlace, serve_seats  # noqa: PLC0415  # a web server, only for this
+
+    place = SeatPlace("khala run", pages.page_host, pages.page_port, pages.page_https, insecure)
+    play(wanted, as_json=as_json, serve=lambda seats: serve_seats(seats, place))
 
 
 @with_options
@@ -269,6 +284,7 @@ for command, epilog in (
     (watch, None),
     (stop, None),
     (view, VIEW_EPILOG),
+    (person, PERSON_EPILOG),
     (mcp, MCP_EPILOG),
     (openenv, OPENENV_EPILOG),
     (calibrate, CALIBRATE_EPILOG),

@@ -117,10 +117,12 @@ class Policy(ABC):
         pace: how fast its model is, for the clock `token`; None: the task says.
         rethink: how often it wants to decide again on one observation, if nothing of its reply is possible. The
             observation then has a verdict.
+        human: whether a person plays the agent.
     """
 
     pace: Pace | None = None
     rethink: int = 0
+    human: bool = False
 
     async def check(self) -> None:  # noqa: B027  # a hook, not a duty
         """Look for what is wrong, before the agent joins a run.

@@ -296,6 +296,7 @@ class Worker:
             attempts=attempts or decision.attempts,
             usage=usage if attempts or usage.requests else decision.usage,
             pace=self._policy.pace,
+            human=self._policy.human,
         )
         self._last_reply = reply
         await links.replies.put(encode(reply))

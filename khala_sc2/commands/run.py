@@ -22,13 +22,17 @@ from khala_sc2.commands.exit_codes import SIGNALLED
 from khala_sc2.playing.spare import Spares
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from contextlib import AbstractAsyncContextManager
     from pathlib import Path
 
     from khala_bridge.game.processes import Launched
     from khala_orchestrator.config import MatchConfig
     from khala_protocol.messages import Result
     from khala_sc2.commands.run_options import MindOptions
+    from khala_sc2.playing.persons import PersonSeat
+
+    Serve = Callable[[Sequence[PersonSeat]], AbstractAsyncContextManager[object]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +47,20 @@ class WantedRun:
     match: Mapping[str, Any]
     """How it is played, as `khala_sc2.playing.matches.new_or_resumed` takes it."""
     minds: MindOptions
+    persons: Sequence[str] = ()
+    """Agents that persons play."""
 
 
-def run(wanted: WantedRun, *, as_json: bool) -> None:
-    """Play a match on this machine, print the results, and end in order on SIGINT and SIGTERM."""
+def run(wanted: WantedRun, *, as_json: bool, serve: Serve = lambda _: contextlib.nullcontext()) -> None:
+    """Play a match on this machine, print the results, and end in order on SIGINT and SIGTERM.
+
+    Args:
+        wanted: the match.
+        as_json: whether results are printed as JSON.
+        serve: shows their seats to persons for as long as its context lasts.
+    """
     known: list[MatchConfig] = []
-    results = asyncio.run(cancelled_by_signal(_play(wanted, known)))
+    results = asyncio.run(cancelled_by_signal(_play(wanted, known, serve)))
     if not known:
         assert isinstance(results, signal.Signals)
         say("interrupted before the match began", err=True)
@@ -58,7 +70,7 @@ def run(wanted: WantedRun, *, as_json: bool) -> None:
     end(known[0], results, as_json=as_json)
 
 
-async def _play(wanted: WantedRun, known: list[MatchConfig]) -> list[Result]:
+async def _play(wanted: WantedRun, known: list[MatchConfig], serve: Serve) -> list[Result]:
     """Return the results; `known` gets the match as soon as it is known."""
     async with Spares(1) as stock:
         with _game_for(wanted) as launched:
@@ -66,6 +78,8 @@ async def _play(wanted: WantedRun, known: list[MatchConfig]) -> list[Result]:
             from khala_sc2.playing.local import Supplies, play  # noqa: PLC0415  # a second, in which the others import as well
             from khala_sc2.playing.matches import new_or_resumed  # noqa: PLC0415
             from khala_sc2.playing.minds import Minds, minds_of, trust_options  # noqa: PLC0415
+            from khala_sc2.playing.persons import PersonSeat  # noqa: PLC0415
+            from khala_sc2.playing.seats import seat_named, seats_of  # noqa: PLC0415
 
             config, past = new_or_resumed(wanted.task, wanted.resume, wanted.run, wanted.out, **wanted.match)
             named = wanted.minds.of_sides()
@@ -75,11 +89,15 @@ async def _play(wanted: WantedRun, known: list[MatchConfig]) -> list[Result]:
             known.append(config)
             supplies = Supplies(spawn=stock, processes=launched)
             logs = wanted.out / config.run
-            with Progress(stderr_console(), config.task.max_steps, logs) as progress:
-                return await play(
-                    config, minds, logs, game=wanted.game, watch=progress, past=past,
-                    supplies=supplies,
-                )  # fmt: skip
+            there_are = seats_of(config.task)
+            seats = dict.fromkeys(seat_named(name, there_are, source="--person") for name in wanted.persons)
+            persons = [PersonSeat(seat) for seat in seats]
+            async with serve(persons):
+                with Progress(stderr_console(), config.task.max_steps, logs) as progress:
+                    return await play(
+                        config, minds, logs, game=wanted.game, watch=progress, past=past,
+                        supplies=supplies, persons=persons,
+                    )  # fmt: skip
 
 
 @contextlib.contextmanager

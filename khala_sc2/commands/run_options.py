@@ -178,6 +178,32 @@ BudgetUsd = Annotated[
 Latency = Annotated[float, typer.Option("--latency", min=0, help="Seconds that the scripted model takes to answer.")]
 
 
+Person = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Agent that a person plays in a browser, at the link that is printed; may be given several times.",
+        metavar="[SIDE/]AGENT",
+    ),
+]
+PageHost = Annotated[
+    str, typer.Option(help="Address for persons' pages; one that other machines reach needs --page-https.")
+]
+PagePort = Annotated[int, typer.Option(min=0, max=65535, help="Port for persons' pages.", show_default="a free one")]
+PageHttps = Annotated[
+    tuple[Path, Path] | None,
+    typer.Option(help="Serve persons' pages over HTTPS with this certificate.", metavar="CERT KEY"),
+]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class PageOptions:
+    """Where the pages of persons are served."""
+
+    page_host: PageHost = "127.0.0.1"
+    page_port: PagePort = 0
+    page_https: PageHttps = None
+
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class MatchOptions:
     """How a match is played; the names are those of `khala_sc2.playing.matches.new`."""

@@ -82,7 +82,7 @@ class Row:
     reply: str
     status: str
     model: str
-    """As its endpoint calls it; "" if no model gave the reply."""
+    """As its endpoint calls it; `human` for a person, "" if neither gave the reply."""
     usage: Usage
     accepted: tuple[str, ...]
     rejections: tuple[Rejection, ...]

@@ -236,7 +236,7 @@ class Rows:
             pictures=tuple(RowPicture(ref, decision.pictures[ref.sha256]) for ref in shown),
             reply=reply.text,
             status=reply.status,
-            model=(call.answered_by or call.model) if call is not None and answered else "",
+            model=_model_of(call, reply),
             usage=reply.usage,
             accepted=report.accepted,
             rejections=report.rejections,
@@ -248,3 +248,10 @@ class Rows:
             outcome=result.outcome if result else UNFINISHED,
             valid=result.valid if result else False,
         )
+
+
+def _model_of(call: ModelCall | None, reply: Reply) -> str:
+    """Return what gave a reply: a model, `human` for a person, "" for neither."""
+    if reply.human:
+        return "human"
+    return (call.answered_by or call.model) if call is not None and reply.status == "ok" else ""

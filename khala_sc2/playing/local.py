@@ -20,12 +20,14 @@ from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.errors import RecordingError
 from khala_protocol.files import make_private
+from khala_protocol.joining import client_config
 from khala_protocol.messages import Report
 from khala_sc2.playing import games
 from khala_sc2.playing.children import Children, Spawn, spawn
 from khala_sc2.playing.hosting import host_match
 from khala_sc2.playing.local_bus import local_endpoint
 from khala_sc2.playing.minds import declare_rethink, groups_of, scripted_endpoint
+from khala_sc2.playing.persons import LAST_S, play_seat, with_persons
 from khala_sc2.playing.spending import ledger_of
 
 if TYPE_CHECKING:
@@ -37,8 +39,10 @@ if TYPE_CHECKING:
     from khala_bridge.game.processes import Processes
     from khala_orchestrator.config import MatchConfig
     from khala_orchestrator.past.resume import Unfinished
+    from khala_protocol.bus import Bus
     from khala_protocol.messages import Result, Wire
     from khala_sc2.playing.minds import Minds
+    from khala_sc2.playing.persons import PersonSeat
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +76,7 @@ async def play(
     watch: Callable[[Wire], None] = lambda _: None,
     past: Unfinished | None = None,
     supplies: Supplies | None = None,
+    persons: Sequence[PersonSeat] = (),
 ) -> list[Result]:
     """Play a match with everything it needs on this machine.
 
@@ -83,27 +88,31 @@ async def play(
         watch: is called with the run card, every report and every result.
         past: what was played of this match before its host was lost.
         supplies: what is ready for it.
+        persons: seats that persons take, in place of minds.
 
     Raises:
         KhalaError: the user can fix something; the text says what.
     """
-    for _, mind, _ in groups_of(config.task, minds):
+    taken = {person.seat for person in persons}
+    groups = list(groups_of(config.task, minds, taken=taken))
+    for _, mind, _ in groups:
         mind.check(config.task.clock)
     supplies = supplies or Supplies()
     config, sc2path = _prepare(config, directory, game)
-    groups = [(side, mind, names) for side, mind, names in groups_of(config.task, minds) if not mind.policy]
-    config = declare_rethink(config, {Seat(side, name): mind.rethink for side, mind, names in groups for name in names})
+    asking = [(side, mind, names) for side, mind, names in groups if not mind.policy]
+    config = declare_rethink(config, {Seat(side, name): mind.rethink for side, mind, names in asking for name in names})
+    config = with_persons(config, taken)
     async with contextlib.AsyncExitStack() as stack:
         joined = supplies.bus or BusConfig(mode="router", listen=(stack.enter_context(local_endpoint()),))
         bus = await open_bus(joined)
         stack.push_async_callback(bus.close)
-        base_url = await scripted_endpoint(stack, groups_of(config.task, minds))
+        base_url = await scripted_endpoint(stack, groups)
         ledger = stack.enter_context(ledger_of(config.record or directory / "recording", past))
         if past is not None and (before := spent_before(ledger, minds)):
             log.warning("%s", before)
         common = ["--run", config.run, "--connect", bus.endpoints[0], "--ledger", str(ledger.path)]
         children = await stack.enter_async_context(Children(directory, supplies.spawn))
-        for share in _shares_of(list(groups_of(config.task, minds)), common, base_url):
+        for share in _shares_of(groups, common, base_url):
             await children.start(share.process, *share.arguments, environ=share.environ)
         begun = asyncio.Event()
 
@@ -112,8 +121,10 @@ async def play(
                 begun.set()
             watch(message)
 
+        sessions = [await _join(bus.endpoints[0], stack) for _ in persons]
+        seats = [play_seat(person, session, config.run) for person, session in zip(persons, sessions, strict=True)]
         match = host_match(config, sc2path, bus, watch=see, past=past, processes=supplies.processes)
-        return await _unless_one_dies(match, children, begun)
+        return await _unless_one_dies(match, children, begun, seats)
 
 
 async def play_hosted(
@@ -189,20 +200,35 @@ def _shares_of(
             yield _Share(process, side, names, [*joined, *mind.options(base_url)], mind.environ, mind.budget_usd)
 
 
+async def _join(endpoint: str, stack: contextlib.AsyncExitStack) -> Bus:
+    """Return a session of its own for a person's seat, as an agent on another machine would have."""
+    session = await open_bus(client_config([endpoint], tls=None, insecure=False))
+    stack.push_async_callback(session.close)
+    return session
+
+
 async def _unless_one_dies(
-    match: Coroutine[Any, Any, list[Result]], children: Children, begun: asyncio.Event
+    match: Coroutine[Any, Any, list[Result]],
+    children: Children,
+    begun: asyncio.Event,
+    seats: Sequence[Coroutine[Any, Any, None]],
 ) -> list[Result]:
     """Return the results of the match. A child that fails before the first step, or for good, ends it."""
-    playing, keeping = asyncio.create_task(match), asyncio.create_task(children.keep(begun))
+    playing = asyncio.create_task(match)
+    keeping: asyncio.Future[Any] = asyncio.gather(children.keep(begun), *seats)
+    both: set[asyncio.Future[Any]] = {playing, keeping}
     try:
-        await asyncio.wait({playing, keeping}, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
         if not playing.done():
             await keeping
-        return await playing
+        results = await playing
+        if seats:  # persons read how it ended
+            await asyncio.wait({keeping}, timeout=LAST_S)
+        return results
     finally:
-        for task in (playing, keeping):
+        for task in both:
             task.cancel()
-        await asyncio.wait({playing, keeping})
+        await asyncio.gather(*both, return_exceptions=True)
 
 
 def _prepare(config: MatchConfig, directory: Path, game: str) -> tuple[MatchConfig, Path]:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from khala_orchestrator.cli import Insecure, Tls
+from khala_sc2.commands.run_options import PageOptions, with_options
 
 VIEW_EPILOG = """
 Examples:\n
@@ -15,6 +16,13 @@ Examples:\n
     khala view my_experiment\n
     khala view first --connect tls/10.0.0.5:7447 --tls keys --adviser Adviser\n
     khala view first --export match.html --steps 0-400
+"""
+
+PERSON_EPILOG = """
+Examples:\n
+    khala person Stalkers --run first\n
+    khala person Captain --side red --run first --connect tls/10.0.0.5:7447 --tls keys\n
+    khala person Stalkers --run first --page-host 0.0.0.0 --page-https page.crt page.key
 """
 
 
@@ -88,3 +96,35 @@ def view(
         run_export(options, export, steps=steps, agents=agents or ())
     else:
         run_view(options)
+
+
+@with_options
+def person(
+    names: Annotated[
+        list[str], typer.Argument(help="Agents that persons play, as the task file names them.", metavar="AGENT...")
+    ],
+    *,
+    run: Annotated[str, typer.Option(envvar="KHALA_RUN", help="Name of the run; the host prints it.", metavar="NAME")],
+    side: Annotated[str, typer.Option(help="Side of the agents, as the task file names it.")] = "blue",
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Endpoint of the router, may be given several times.",
+            show_default="tcp/127.0.0.1:7447, with --tls tls/127.0.0.1:7447",
+        ),
+    ] = None,
+    tls: Tls = None,
+    pages: PageOptions,
+    insecure: Insecure = False,
+) -> None:
+    """Let persons play agents of a run: like `khala agent`, with a page in place of a model.
+
+    Each agent gets a link of its own. It shows what the agent is shown, with the same deadlines; the answers are
+    recorded as a human's. The agent joins the run when its person opens the link.
+    """
+    from khala_agents.commands import BusPlace  # noqa: PLC0415
+    from khala_sc2.view.person import play_persons  # noqa: PLC0415  # a web server and the bus, which --help can do without
+    from khala_sc2.view.seats import SeatPlace  # noqa: PLC0415
+
+    place = SeatPlace("khala person", pages.page_host, pages.page_port, pages.page_https, insecure)
+    play_persons(names, run, side, BusPlace(connect or (), tls, insecure=insecure), place)

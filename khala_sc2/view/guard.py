@@ -29,10 +29,12 @@ _STYLE = re.compile(r"<style[^>]*>(?P<body>.*?)</style\s*>", re.DOTALL | re.IGNO
 _DATA = re.compile(r"type\s*=\s*[\"']?application/json", re.IGNORECASE)
 
 
-def view_door(*, password: str = "", is_near: bool = True, is_secure: bool = False) -> Door:
+def view_door(
+    *, password: str = "", is_near: bool = True, is_secure: bool = False, command: str = "khala view"
+) -> Door:
     """Return the rules of a view, with a new token; arguments are those of `Door`."""
     return Door(
-        command="khala view",
+        command=command,
         is_near=is_near,
         token=secrets.token_urlsafe(24),
         password=password,
@@ -41,12 +43,18 @@ def view_door(*, password: str = "", is_near: bool = True, is_secure: bool = Fal
     )
 
 
-def welcoming(door: Door) -> Middleware:
-    """Return the middleware that gives whoever came in the cookie, and takes the token out of the address."""
+def welcoming(door: Door, *, redirects: bool = True) -> Middleware:
+    """Return the middleware that gives whoever came in the cookie, and takes the token out of the address.
+
+    Args:
+        door: whose token it is.
+        redirects: whether another address takes it out. A link that somebody follows from another site reaches that
+            address without the cookie; there the page itself takes the token out.
+    """
 
     @web.middleware
     async def welcome(request: web.Request, handler: Handler) -> web.StreamResponse:
-        response = _without_token(request) or await handler(request)
+        response = (_without_token(request) if redirects else None) or await handler(request)
         if not response.prepared and not is_same(request.cookies.get(door.cookie, ""), door.token):
             response.set_cookie(
                 door.cookie, door.token, httponly=True, samesite="Strict", secure=door.is_secure, path="/"

@@ -45,6 +45,8 @@ POLL_S = 0.1
 BATCH_S = 0.25
 """Work between two transactions; the first one is shorter, so that the first answers come at once."""
 FIRST_BATCH_S = 0.05
+HUMAN = "human"
+"""Stands for the model of an agent that a person plays."""
 LEASE_S = 5.0
 BUSY_S = 0.5
 """Between two tries to get the lease that another viewer has."""
@@ -209,6 +211,9 @@ class Scanner:
                 batch.models[address.side or "", address.agent or ""] = str(name)[:100]
             case Topic.OBSERVATION | Topic.SCENE | Topic.REPORT | Topic.MESSAGE | Topic.RESULT:
                 getattr(batch.digest, address.topic.value)(said)
+                if address.topic is Topic.REPORT:
+                    people = (agent for agent in said["agents"] if agent.get("human"))
+                    batch.models |= {(str(agent["side"]), str(agent["agent"])): HUMAN for agent in people}
         return place
 
     def _is_read(self, batch: _Batch, address: Address) -> bool:

@@ -73,7 +73,7 @@ def run_view(options: ViewOptions) -> None:
     Raises:
         KhalaError: there is nothing to be seen, or it cannot be served so.
     """
-    context = _tls(options)
+    context = tls_context(options.https)
     door = door_of(options)
     sys.setswitchinterval(SWITCH_S)
     ended = asyncio.run(cancelled_by_signal(_view(options, door, context)))
@@ -135,15 +135,20 @@ def is_near(host: str) -> bool:
     return is_loopback(host.strip("[]").casefold())
 
 
-def _tls(options: ViewOptions) -> ssl.SSLContext | None:
-    if options.https is None:
+def tls_context(https: tuple[Path, Path] | None, *, option: str = "--https") -> ssl.SSLContext | None:
+    """Return the context of a server with a certificate and its key; None without them.
+
+    Raises:
+        ConfigError: they are not in PEM; it names the option.
+    """
+    if https is None:
         return None
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     try:
-        context.load_cert_chain(*options.https)
+        context.load_cert_chain(*https)
     except (OSError, ssl.SSLError) as error:
-        names = " and ".join(map(str, options.https))
-        raise ConfigError(f"--https: {names} are not a certificate and its key in PEM: {error}") from None
+        names = " and ".join(map(str, https))
+        raise ConfigError(f"{option}: {names} are not a certificate and its key in PEM: {error}") from None
     return context
 
 
@@ -161,9 +166,9 @@ async def _view(options: ViewOptions, door: Door, context: ssl.SSLContext | None
         runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
         stack.push_async_callback(runner.cleanup)
         await runner.setup()
-        port = await stack.enter_async_context(_listening(runner, options, context))
+        port = await stack.enter_async_context(serving(runner, options.host, options.port, context))
         scheme = "https" if door.is_secure else "http"
-        place = options.published or f"{_name(options.host)}:{port}"
+        place = options.published or f"{name_of(options.host)}:{port}"
         address = f"{scheme}://{place}/?{TOKEN}={door.token}"
         stderr_console().print(f"{sources.title}: {address}\nCtrl-C ends it", soft_wrap=True, highlight=False)
         if options.opens:
@@ -172,7 +177,7 @@ async def _view(options: ViewOptions, door: Door, context: ssl.SSLContext | None
         await asyncio.Event().wait()
 
 
-def _name(host: str) -> str:
+def name_of(host: str) -> str:
     """Return the name under which a browser finds the server."""
     if host in EVERYWHERE:
         return socket.gethostname()
@@ -180,11 +185,13 @@ def _name(host: str) -> str:
 
 
 @contextlib.asynccontextmanager
-async def _listening(runner: web.AppRunner, options: ViewOptions, context: ssl.SSLContext | None) -> AsyncIterator[int]:
+async def serving(
+    runner: web.AppRunner, host: str, port: int, context: ssl.SSLContext | None, *, option: str = "--port"
+) -> AsyncIterator[int]:
     """Take connections for the application, and yield the port."""
     assert runner.server is not None
     patience = Patience(runner.server)
-    listening = bind(options.host.strip("[]"), options.port)
+    listening = bind(host.strip("[]"), port, option=option)
     handshake_s = None if context is None else HANDSHAKE_S
     server = await asyncio.get_running_loop().create_server(
         patience, sock=listening, ssl=context, ssl_handshake_timeout=handshake_s

@@ -13,6 +13,13 @@
 | `experiments/{experiment}` | `ExperimentView`: its table with intervals, and its matches |
 | `runs/{run}/live` | a websocket: `Progress` down, `AdviceNote` up |
 
+The page of a seat that a person takes is another server (`khala_sc2.view.seats`), which has no recording:
+
+| path below `/seat/{side}/{agent}/api` | answer |
+|---|---|
+| `live` | a websocket: `SeatBriefing`, `SeatQuestion`, `SeatState` down, `SeatReply` and `SeatTake` up |
+| `images/{sha256}` | a picture of the newest observation |
+
 A static export holds the same answers by the same paths. Times are in seconds of the game unless a name says otherwise,
 positions are in the minimap frame, in which agents think.
 """
@@ -20,6 +27,8 @@ positions are in the minimap frame, in which agents think.
 from __future__ import annotations
 
 from typing import Any, Literal
+
+from pydantic import Field
 
 from khala_protocol.messages import (
     AgentKind,
@@ -30,11 +39,14 @@ from khala_protocol.messages import (
     ImageRef,
     ModelCall,
     Point,
+    Received,
+    Rejection,
     RejectionReason,
     Scene,
     Timings,
     Unasked,
     Usage,
+    View,
 )
 
 MOST_SCENES = 64
@@ -42,6 +54,9 @@ MOST_SCENES = 64
 SCENES_AT_ONCE = 16
 """Scenes that the page asks for: always `from` a multiple of it `to` the last step before the next multiple, also
 beyond the end of the episode, so that an export can hold the same paths."""
+
+MOST_REPLY_CHARACTERS = 32_768
+"""Of a person's answer; it is kept in the recording."""
 
 CurveName = Literal[
     "army_value", "workers", "supply_used", "supply_cap", "minerals", "vespene", "income_minerals", "income_vespene",
@@ -390,3 +405,84 @@ class PageNote(Frozen):
     kind: Literal["note"] = "note"
     ok: bool
     text: str
+
+
+# --- a person's seat --------------------------------------------------------------------------------
+
+
+class SeatBriefing(Frozen):
+    """Server → page: who the person is, and what it may do."""
+
+    kind: Literal["briefing"] = "briefing"
+    agent: str
+    side: str
+    episode: int
+    episodes: int
+    text: str
+    """What a model reads before its observations, word for word."""
+    actions: tuple[str, ...]
+    """Names of all that its teams may ever do; the page gives each a key that stays."""
+    correspondents: tuple[str, ...]
+    channels: tuple[str, ...]
+
+
+class SeatQuestion(Frozen):
+    """Server → page: an observation to answer."""
+
+    kind: Literal["question"] = "question"
+    episode: int
+    step: int
+    time_s: float | None
+    """Seconds to answer in all; None for no limit."""
+    text: str
+    view: View
+    images: tuple[ImageRef, ...]
+    accepted: tuple[str, ...]
+    """Calls of the answer before that were carried out, as written."""
+    rejections: tuple[Rejection, ...]
+    messages: tuple[Received, ...]
+
+
+class SeatResult(Frozen):
+    """How an episode ended for the person's side."""
+
+    episode: int
+    ending: str
+    """In words: `win, enemy defeated`."""
+    valid: bool
+    invalid_because: str
+    killed: float
+    """Minerals and vespene."""
+    lost: float
+
+
+class SeatState(Frozen):
+    """Server → page: how the seat is, whenever that changes."""
+
+    kind: Literal["state"] = "state"
+    mine: bool
+    """Whether this window plays the seat."""
+    waits: bool
+    """Whether the newest question waits for an answer."""
+    left_s: float | None
+    """Seconds until its time is over; None for no limit, or if it does not wait."""
+    sent: str | None
+    """The answer to the newest question; None without one."""
+    results: tuple[SeatResult, ...]
+    over: bool
+    """Whether the match is over."""
+
+
+class SeatReply(Frozen):
+    """Page → server: the answer to a question."""
+
+    kind: Literal["reply"] = "reply"
+    episode: int
+    step: int
+    text: str = Field(max_length=MOST_REPLY_CHARACTERS)
+
+
+class SeatTake(Frozen):
+    """Page → server: this window plays the seat from now on."""
+
+    kind: Literal["take"] = "take"

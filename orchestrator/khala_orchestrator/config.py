@@ -48,6 +48,8 @@ class MatchConfig(Frozen):
     """For the run card: what an experiment calls this match."""
     rethink: dict[str, int] = Field(default_factory=dict)
     """For the run card: by agent that rethinks, how often in a step (`khala run --rethink`)."""
+    humans: frozenset[tuple[str, str]] = frozenset()
+    """For the run card: side and name of each agent that a person plays (`khala run --person`)."""
     forked: Forked | None = None
     """Where it was forked from another match."""
 

@@ -232,7 +232,8 @@ def card(run: Run) -> Panel:
         rows.add_row("rethink", ", ".join(f"{name} {count} a step" for name, count in run.rethink.items()))
     sides: dict[str, list[str]] = {}
     for agent in run.agents:
-        sides.setdefault(agent.side, []).append(f"{agent.name} ({', '.join(agent.teams)})")
+        who = f"{agent.name}, human" if agent.human else agent.name
+        sides.setdefault(agent.side, []).append(f"{who} ({', '.join(agent.teams)})")
     for name, agents in sides.items():
         rows.add_row(side(name) if two_sides(run) else "agents", ", ".join(agents))
     seeing = {", ".join(agent.pictures): None for agent in run.agents if agent.pictures}
@@ -300,6 +301,7 @@ UNASKED = {"no_units": "not asked, without units", "not_due": "not asked, not du
 def _steps_of(result: Result, agent: str) -> str:
     """Return how an agent's steps ended: `177 ok, 23 not asked, without units`."""
     counts = sorted(result.statuses.get(agent, {}).items())
+    counts += [("by a human", result.humans[agent])] if agent in result.humans else []
     counts += [("asked to rethink", count)] if (count := result.rethinks.get(agent)) else []
     counts += [(UNASKED[why], count) for why, count in sorted(result.unasked.get(agent, {}).items())]
     return ", ".join(f"{count} {words}" for words, count in counts)

@@ -62,7 +62,11 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
         opponent=game.opponent or task.against,
         executor=task.executor,
         clock=task.clock,
-        agents=tuple(card for side in task.per_side() for card in side.cards()),
+        agents=tuple(
+            card.but(human=True) if (card.side, card.name) in config.humans else card
+            for side in task.per_side()
+            for card in side.cards()
+        ),
         rethink=config.rethink,
         advisers=tuple(dict.fromkeys(adviser.name for side in task.per_side() for adviser in side.advisers)),
         catalogue_sha256=catalogue_sha256(),

@@ -74,6 +74,7 @@ class Tally:
         self._latencies_s: list[float] = []
         self._ages_loops: list[float] = []
         self._rethinks = Counter[str]()
+        self._humans = Counter[str]()
         self._incidents: list[str] = []
         self._advisers: Counter[str] = Counter()
         self._lag_s = 0.0
@@ -93,6 +94,8 @@ class Tally:
                 self._hallucinations.update(count_hallucinations(refusals))
             if agent.rethinks:
                 self._rethinks[name] += agent.rethinks
+            if agent.human:
+                self._humans[name] += agent.status == "ok"
             if agent.fate is not None:
                 self._fates[name][agent.fate] += 1
             if agent.latency_s is not None:
@@ -150,6 +153,7 @@ class Tally:
             accepted_of=dict(self._deeds.accepted),
             fallbacks={name: dict(count) for name, count in self._deeds.causes.items()},
             rethinks=dict(self._rethinks),
+            humans=dict(self._humans),
             incidents=tuple(self._incidents[:MAX_INCIDENTS]),
             advisers=dict(self._advisers),
             age_p50_loops=_quantile(self._ages_loops, 0.5),

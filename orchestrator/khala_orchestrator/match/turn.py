@@ -77,6 +77,11 @@ class Answer:
         return self.reply is not None and self.reply.cut
 
     @property
+    def human(self) -> bool:
+        """Whether a person decided."""
+        return self.reply is not None and self.reply.human
+
+    @property
     def usage(self) -> Usage:
         """The usage of the reply."""
         return self.reply.usage if self.reply else Usage()

@@ -54,7 +54,7 @@ def recorded_config(recording: Recording, *, modules: Collection[str] = ()) -> M
         game, _, _version = run.game.rpartition(" ")
         config = MatchConfig(
             task=task, run=run.run, game=game, seed=run.seed, episodes=run.episodes, labels=run.labels,
-            forked=run.forked,
+            humans=frozenset((agent.side, agent.name) for agent in run.agents if agent.human), forked=run.forked,
         )  # fmt: skip
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]

@@ -155,7 +155,8 @@ def _agent(agent: AgentReport, *, named: bool) -> Iterator[Text]:
     why = ": ".join(filter(None, (agent.detail, agent.reason)))
     detail = f" ({visible_line(why)})" if why else ""
     status = (agent.status, style_of(agent.status))
-    yield Text.assemble("  ", _speaker(agent, named=named), ": ", status, f"{detail}{latency}{rethinks}{ignored}")
+    who = Text.assemble(_speaker(agent, named=named), " (human)" if agent.human else "")
+    yield Text.assemble("  ", who, ": ", status, f"{detail}{latency}{rethinks}{ignored}")
     yield from (Text(f"    {call}", "green") for call in agent.accepted)
     for fault in agent.rejections:
         kind = f" ({fault.hallucination.replace('_', '-')})" if fault.hallucination else ""

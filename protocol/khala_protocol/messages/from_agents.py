@@ -81,6 +81,8 @@ class Reply(Wire):
     """Of all requests since the observation first arrived."""
     pace: Pace | None = None
     """The pace of its model, if the model file gives one; see `Clock.pace`."""
+    human: bool = Field(default=False, exclude_if=lambda human: not human)
+    """Whether a person plays the agent; absent if not."""
 
     @model_validator(mode="before")
     @classmethod

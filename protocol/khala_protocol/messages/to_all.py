@@ -53,6 +53,9 @@ class AgentCard(Frozen):
     pictures: tuple[str, ...] = ()
     """Kinds of its pictures. They show what its text does not: all that its side sees on a minimap, the ground, and
     what reaches into a screen from outside."""
+    human: bool = Field(default=False, exclude_if=lambda human: not human)
+    """Whether a person plays it (`khala run --person`); absent if not. `Result.humans` also has persons who joined from
+    elsewhere."""
 
 
 class Forked(Frozen):
@@ -145,6 +148,8 @@ class AgentReport(Frozen):
     """Replies that arrived and were not executed: duplicates, late or foreign ones."""
     rethinks: int = 0
     """How many replies it gave before this one, of which nothing was possible (`Reply.rethink`)."""
+    human: bool = Field(default=False, exclude_if=lambda human: not human)
+    """Whether a person plays it; absent if not."""
     usage: Usage = Usage()
     asked_step: int | None = Field(default=None, ge=0)
     """Step of the observation that it answers; None for the step of the report."""
@@ -270,6 +275,8 @@ class Result(Wire):
     """By agent: how often it did not decide itself, by reason."""
     rethinks: dict[str, int] = {}
     """By agent that was asked to rethink: how often, over all steps."""
+    humans: dict[str, int] = Field(default={}, exclude_if=lambda humans: not humans)
+    """By agent that a person plays: how many decisions the person made in time; absent if persons play none."""
     incidents: tuple[str, ...] = ()
     """The first incidents of its reports, each with its step."""
     advisers: dict[str, int] = {}
