@@ -6,9 +6,9 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from khala.dataset.credit import by_agent
-from khala.rollout import RolloutSpec, TeamRollout
 from khala_protocol.errors import ConfigError, KhalaError
+from khala_sc2.dataset.credit import by_agent
+from khala_sc2.rollout import RolloutSpec, TeamRollout
 
 SHORT = RolloutSpec("2s3z_pair", seed=2, max_steps=2)
 

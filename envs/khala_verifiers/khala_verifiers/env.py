@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import verifiers.v1 as vf
 
-from khala.dataset.credit import PARTS, WEIGHTS, by_agent, own_reward, rewards_to_go
-from khala.rollout import TeamRollout
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.errors import ConfigError
+from khala_sc2.dataset.credit import PARTS, WEIGHTS, by_agent, own_reward, rewards_to_go
+from khala_sc2.rollout import TeamRollout
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from verifiers.v1.agent import Agents, Interaction
 
-    from khala.dataset.credit import AgentTurn
-    from khala.rollout import AgentPrompt
+    from khala_sc2.dataset.credit import AgentTurn
+    from khala_sc2.rollout import AgentPrompt
     from khala_verifiers.taskset import KhalaTask
 
 GAMMA: Final = 0.99

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import verifiers.v1 as vf
 from pydantic import Field
 
-from khala.rollout import RolloutSpec, TeamRollout
+from khala_sc2.rollout import RolloutSpec, TeamRollout
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,7 +35,7 @@ class KhalaTask(vf.Task[KhalaData]):
 
     @vf.reward
     async def credit(self, trace: vf.Trace) -> dict[str, float]:
-        """Return the weighted parts of the agent's reward, each summed over its turns; `khala.dataset.credit`."""
+        """Return the weighted parts of the agent's reward, each summed over its turns; `khala_sc2.dataset.credit`."""
         return dict(trace.info.get("khala", {}).get("rewards", {"objective": 0.0}))
 
     @vf.metric

@@ -6,18 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from khala.dataset.credit import (
-    AgentTurn,
-    CreditBook,
-    advantages,
-    by_agent,
-    credit,
-    group_mean,
-    leave_one_out,
-    own_reward,
-    rewards_to_go,
-    with_weights,
-)
 from khala_protocol.messages import (
     AgentReport,
     Event,
@@ -30,6 +18,18 @@ from khala_protocol.messages import (
     View,
 )
 from khala_protocol.recording import Recording
+from khala_sc2.dataset.credit import (
+    AgentTurn,
+    CreditBook,
+    advantages,
+    by_agent,
+    credit,
+    group_mean,
+    leave_one_out,
+    own_reward,
+    rewards_to_go,
+    with_weights,
+)
 
 GOLDEN = Path(__file__).parents[1] / "golden.mcap"
 

@@ -4,7 +4,7 @@
 `/seed_session` and `/close_session`, and name it as it likes.
 
 A step's reward is that of the turn before, which is settled once the next observation is there; the last step has both,
-so that the rewards of an episode sum up to the agent's `khala.dataset.credit.own_reward` over all of its turns.
+so that the rewards of an episode sum up to the agent's `khala_sc2.dataset.credit.own_reward` over all of its turns.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from pydantic import PrivateAttr, ValidationError
 from resources_servers.gymnasium import GymnasiumServer, extract_text
 from resources_servers.khala_starcraft.task_data import TaskData
 
-from khala.dataset.credit import own_reward
-from khala.playing.loop_thread import LoopThread
-from khala.rollout import RolloutSpec, TeamRollout
 from khala_bridge.game.processes import IdleGames
 from khala_protocol.errors import KhalaError
+from khala_sc2.dataset.credit import own_reward
+from khala_sc2.playing.loop_thread import LoopThread
+from khala_sc2.rollout import RolloutSpec, TeamRollout
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine, Mapping
 
     from nemo_gym.openai_utils import NeMoGymResponse
 
-    from khala.rollout import AgentPrompt
+    from khala_sc2.rollout import AgentPrompt
 
 IDLE_GAMES = 8
 """Processes of the game that wait for the next episode."""
