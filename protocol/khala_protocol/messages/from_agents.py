@@ -115,9 +115,9 @@ class ChatMessage(Frozen):
 class TokenTrace(Frozen):
     """The tokens of a request and its answer, as far as the endpoint told them; what it did not tell is empty."""
 
-    prompt_ids: tuple[Count, ...] = ()
+    prompt_ids: tuple[int, ...] = ()
     """Of the whole prompt, with what the chat template adds."""
-    reply_ids: tuple[Count, ...] = ()
+    reply_ids: tuple[int, ...] = ()
     """Of all that the model generated, its reasoning as well."""
     logprobs: tuple[float, ...] = ()
     """Natural logarithm of the probability of each generated token; -9999 for 0, as vLLM has it."""
