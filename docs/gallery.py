@@ -45,7 +45,7 @@ def export(commands: Mapping[str, list[str]], out: Path) -> list[Path]:
 
 def khala(directory: str, *arguments: str) -> None:
     """Call khala in a directory; say what it printed if it fails."""
-    command = [sys.executable, "-m", "khala", *arguments]
+    command = [sys.executable, "-m", "khala_sc2", *arguments]
     ended = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)  # noqa: S603  # ours
     if ended.returncode:
         raise SystemExit(f"khala {shlex.join(arguments)} ended with {ended.returncode}:\n{ended.stdout}{ended.stderr}")
