@@ -37,7 +37,7 @@ ENGINE := simulator/pyproject.toml simulator/setup.py simulator/builder.py $(fil
 
 .venv/.ready: pyproject.toml uv.lock $(ENGINE) $(filter .uv/bin/uv,$(UV))
 	@test -n "$(PYTHON)" || { echo "Khala needs Python 3.11 or newer: install it, or say make PYTHON=/path/to/python"; exit 1; }
-	@$(PROGRESS) "Installing what a match needs into .venv: 90 packages, and a compiled simulator (a minute or two on two cores)" \
+	@$(PROGRESS) "Installing what a match needs into .venv: 110 packages, and a compiled simulator (a few minutes on two cores)" \
 	  $(UV) sync --frozen --inexact --python $(PYTHON)
 	@touch $@
 
@@ -143,8 +143,9 @@ limits: install ## Fail if a ratio that is measured within one run is beyond its
 scenarios: install ## Play all 33 maps of the paper with the scripted players, and write the table
 	$(RUN)python -m bench scenarios
 
-docs: install ## Write the generated pages of docs/reference, and build the site with search into site/
+docs: install ## Write the generated pages of docs/reference, play the gallery, and build the site with search into site/
 	$(RUN)python -m docs.generate
+	$(RUN)python -m docs.gallery
 	$(UV) sync --quiet --frozen --inexact --group docs
 	NO_MKDOCS_2_WARNING=1 $(RUN)mkdocs build --strict --quiet
 
@@ -157,4 +158,4 @@ picture: install ## Play a battle and draw docs/images/2s3z.webp from its record
 	$(RUN)python -m docs.picture
 
 clean: ## Remove what make made
-	rm -rf site .coverage .coverage.* .venv .venv-3.* .venv-verifiers .venv-nemo-gym .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist
+	rm -rf site docs/gallery .coverage .coverage.* .venv .venv-3.* .venv-verifiers .venv-nemo-gym .uv .mypy_cache .ruff_cache .pytest_cache .hypothesis dist

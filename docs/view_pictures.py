@@ -6,6 +6,7 @@ Each picture is the page itself in Chromium, at a moment that a link names. Matc
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -20,12 +21,13 @@ from bench.recordings.browser import browsing, go_to, steps_of, viewing
 from khala_protocol.recording import Recorder, Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
 OUT = Path(__file__).parent / "images" / "view"
 WIDE, PHONE = (1440, 900), (390, 844)
+THUMBNAIL = (960, 600)
 QUALITY = 82
 Role = Literal["button", "checkbox", "link"]
 FIT: tuple[Role, str] = ("button", "Fit")
@@ -131,13 +133,35 @@ def draw(browser: Browser, picture: Picture, directory: Path) -> Path:
         for role, name in picture.click:
             page.get_by_role(role, name=name, exact=True).click()
         page.wait_for_timeout(SETTLED_MS)
-        pixels = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+        path = OUT / f"{picture.name}.webp"
+        keep(page, path)
         context.close()
-    OUT.mkdir(parents=True, exist_ok=True)
-    path = OUT / f"{picture.name}.webp"
-    assert pixels is not None
-    cv2.imwrite(str(path), pixels, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
     return path
+
+
+def draw_exports(exports: Sequence[Path], out: Path) -> None:
+    """Draw a thumbnail of each exported page, in the middle of its match."""
+    with browsing() as browser:
+        for export in exports:
+            page = browser.new_page(viewport={"width": WIDE[0], "height": WIDE[1]})
+            page.goto(export.resolve().as_uri())
+            words = page.get_by_text(re.compile(r"step \d+ of \d+")).first.inner_text()
+            last = int(words.split()[-1])
+            go_to(page, last // 2)
+            page.get_by_role("button", name="Fit", exact=True).click()
+            page.wait_for_timeout(SETTLED_MS)
+            keep(page, out / f"{export.stem}.webp", THUMBNAIL)
+            page.close()
+
+
+def keep(page: Page, path: Path, size: tuple[int, int] | None = None) -> None:
+    """Write what a page shows, at its size or smaller."""
+    pixels = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    assert pixels is not None
+    if size is not None:
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), pixels, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
 
 
 def drawn(names: list[str]) -> Iterator[Path]:

@@ -31,7 +31,7 @@ Examples:\n
 """
 COMPARE_EPILOG = """
 Examples:\n
-    khala experiment compare smoke:player=skilled smoke:player=focus-fire\n
+    khala experiment compare smoke:player=skilled smoke:player=silent\n
     khala experiment compare monday tuesday --allow code\n
     khala experiment compare pair:clock=frozen pair:clock=realtime --allow clock --measure win --measure tokens
 """

@@ -88,7 +88,8 @@ def export(sources: Sources, page: str, path: Path, *, steps: StepSelection, age
         raise ConfigError("an export shows one recording or two: name them, `khala view RECORDING --export out.html`")
     packer = _Packer()
     opened = [line for line in library.runs if line.id in library.opened]
-    packer.add("library", library.but(runs=tuple(opened), experiments=()).model_dump_json().encode())
+    title = ", ".join(line.run for line in opened)  # that of the view is a path of this machine
+    packer.add("library", library.but(title=title, runs=tuple(opened), experiments=()).model_dump_json().encode())
     for line in opened:
         run = sources.open(line.id, lambda: None)
         try:

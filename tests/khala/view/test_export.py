@@ -34,9 +34,14 @@ def write(tmp_path: Path, *names: str, **options: Any) -> tuple[str, dict[str, A
     whole: dict[str, Any] = {"steps": StepSelection(), "agents": ()} | options
     assert export(Sources("made", None, paths), PAGE, out, **whole) == out.stat().st_size
     text = out.read_text()
+    return text, answers_of(text)
+
+
+def answers_of(text: str) -> dict[str, Any]:
     found = re.search(r'<script type="application/json" id="khala-data">([A-Za-z0-9+/=]+)</script>', text)
     assert found is not None
-    return text, json.loads(gzip.decompress(base64.b64decode(found[1])))
+    answers: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(found[1])))
+    return answers
 
 
 def test_it_has_the_answers_of_the_server(tmp_path: Path) -> None:
@@ -63,6 +68,13 @@ def test_its_user_alone_reads_it(tmp_path: Path, before: int | None) -> None:
         out.chmod(before)
     write(tmp_path)
     assert stat.S_IMODE(out.stat().st_mode) == 0o600
+
+
+def test_it_names_no_path_of_the_machine(tmp_path: Path) -> None:
+    path = make(tmp_path / "made.mcap")
+    out = tmp_path / "out.html"
+    export(Sources(str(path), None, [path]), PAGE, out, steps=StepSelection(), agents=())
+    assert str(tmp_path) not in json.dumps(answers_of(out.read_text()))
 
 
 def test_two_runs_are_in_one_file(tmp_path: Path) -> None:
