@@ -1,7 +1,7 @@
 """What travels between a client and the server: the observation, the state, the options of a reset; and the action.
 
-An action on the wire is OpenEnv's own, a call of a tool of `khala_sc2.openenv.tools`; `KhalaAction` is the short form of
-one, for clients and rubrics.
+An action on the wire is OpenEnv's own, a call of a tool of `khala_sc2.openenv.tools`; `KhalaAction` is the short form
+of one, for clients and rubrics.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@
 
 TRL makes a battle for each rollout, resets it with the row of the data set, shows the model its public methods as
 tools, and asks for the reward when the model calls no tool any more. The columns of the data set may be any fields of
-`khala_sc2.openenv.models.ResetOptions`: rows of a group with the same seed play the same game. This module needs neither
-TRL nor torch. Below: a session of a server, or of this process.
+`khala_sc2.openenv.models.ResetOptions`: rows of a group with the same seed play the same game. This module needs
+neither TRL nor torch. Below: a session of a server, or of this process.
 """
 
 from __future__ import annotations

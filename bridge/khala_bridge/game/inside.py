@@ -1,7 +1,7 @@
 """A game without a process of its own: PySC2 speaks to it by calls in place of a websocket.
 
-Who makes the game says what answers a request; this module knows no simulator. Above: `khala_sc2.playing.inside`. Beside
-it: `khala_bridge.game.processes`, whose `Processes` hand such a game out as they do a process.
+Who makes the game says what answers a request; this module knows no simulator. Above: `khala_sc2.playing.inside`.
+Beside it: `khala_bridge.game.processes`, whose `Processes` hand such a game out as they do a process.
 """
 
 from __future__ import annotations

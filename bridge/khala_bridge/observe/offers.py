@@ -190,10 +190,14 @@ def _is_paid(action: str, unit_type: str) -> bool:
 
 @functools.lru_cache(1024)
 def _skills(names: tuple[str, ...]) -> dict[str, int]:
-    """Return the abilities of the actions that are skills, by the names of their functions without the prefix."""
+    """Return the abilities of the actions that are skills, by the names of their functions without the prefix.
+
+    To call a skill off is no skill: it would be ready while the skill itself cools down.
+    """
     actions = (catalogue()[name] for name in names)
     functions = (action.pysc2 for action in actions if action.group == "skill")
-    return {f.stem.partition("_")[2] or f.stem: f.ability_id for f in functions if f is not None}
+    skills = [f for f in functions if f is not None and not f.stem.startswith("Cancel_")]
+    return {f.stem.partition("_")[2] or f.stem: f.ability_id for f in skills}
 
 
 @functools.lru_cache(4096)

@@ -102,7 +102,7 @@ _BRIEF: Final[Form] = {
     "at_work": lambda why: _every(why, "every {} is at work", "{} is at work"),
     "power": lambda why: _every(why, "no {} has power", "{} has no power"),
     "cooldown": lambda _: "cooling down",
-    "game": lambda why: _every(why, "every {} is busy or not ready", "not in its present state"),
+    "game": lambda why: _every(why, "the game lets no {} do it now", "not in its present state"),
 }
 _OF_TEAM: Final[Form] = {
     "nobody": lambda why: f"there is no {why.who}",

@@ -121,7 +121,7 @@ def test_it_is_told_which_unit_has_a_skill_ready(unit: Any, team: Any) -> None:
         ([("TwilightCouncil", {})], {}, (), "150 more minerals needed, 150 more vespene needed"),
         ([("TwilightCouncil", {})], RICH, (87,), "researched already"),
         ([("TwilightCouncil", {"orders": (1593,)})], RICH, (), "being researched"),
-        ([("TwilightCouncil", {"is_powered": True})], RICH, (), "every TwilightCouncil is busy or not ready"),
+        ([("TwilightCouncil", {"is_powered": True})], RICH, (), "the game lets no TwilightCouncil do it now"),
         ([("TwilightCouncil", {})], RICH, (), "no TwilightCouncil has power"),
     ],
 )

@@ -283,7 +283,7 @@ MEANINGS = (
     ("at_work", r"is at work"),
     ("cooldown", r"cooling down|cannot again so soon|recharges"),
     ("ability", r"^\w+ cannot$|has no such ability"),
-    ("game", r"not in its present state|is busy or not ready|the game does not"),
+    ("game", r"not in its present state|the game lets no|the game does not"),
 )
 
 

@@ -183,5 +183,3 @@ def test_the_command_finds_what_is_wrong_before_it_serves() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"--port: cannot listen on 127.0.0.1:{port}: "):
             run_openenv(wanted(port=port))
-
-
