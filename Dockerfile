@@ -19,7 +19,7 @@ WORKDIR /src
 COPY . .
 
 FROM source AS build-agents
-RUN --mount=type=cache,target=/var/cache/uv uv sync --frozen --no-dev --no-editable --package khala-agents
+RUN --mount=type=cache,target=/var/cache/uv uv sync --frozen --no-dev --no-editable --package khala-sc2-agents
 
 FROM source AS build-all
 ARG EXTRAS=""

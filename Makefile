@@ -16,7 +16,7 @@ PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
 # What people install is typed as macOS and Windows have it; tests skip there what they lack, and bench runs on Linux.
-INSTALLED := agents bridge configs khala orchestrator protocol simulator
+INSTALLED := agents bridge configs khala_sc2 orchestrator protocol simulator
 
 .PHONY: help install install-tests check format types test pysc2 slow interpreted cover test-all demo bench limits scenarios docs golden page picture clean
 
@@ -105,7 +105,7 @@ test-all: $(filter .uv/bin/uv,$(UV)) ## The tests on every Python: make test-all
 	  $(UV) sync --quiet --frozen --python $$python --group env --group experiments --group tools && .venv-$$version/bin/pytest -q $(PARALLEL) || exit 1; \
 	done
 
-page: install ## Build khala/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
+page: install ## Build khala_sc2/view/assets/index.html, the page of `khala view`, from page/; needs Node 20.19 or newer
 	$(RUN)python -m page.typescript
 	cd page && npm ci --silent --no-audit --no-fund && npm run --silent types && npm test --silent && npm run --silent build
 

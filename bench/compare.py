@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from bench.figures import Better
     from bench.results import Results
-    from khala.experiment.statistics import Interval
+    from khala_sc2.experiment.statistics import Interval
 
 COLUMNS: Final = ("measurement", "figure", "A", "B", "unit", "B / A", "95 %", "")
 QUIET: Final = 0.5

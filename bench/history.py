@@ -17,7 +17,7 @@ from bench.command_line import make_parser
 from bench.paths import RESULTS, ROOT
 from bench.results import SHORT, every
 from docs.pages import markdown
-from khala.experiment.report.figures import COLOURS, FAINT, MARKS, STYLE
+from khala_sc2.experiment.report.figures import COLOURS, FAINT, MARKS, STYLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bench.figures import Figure
-    from khala.experiment.statistics import Interval
+    from khala_sc2.experiment.statistics import Interval
 
 LIMITED: Final = {name: benchmark.limited for name, benchmark in BENCHMARKS.items() if benchmark.limited is not None}
 """By measurement, the options of a short run that has its limited ratios."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from scipy import stats  # type: ignore[import-untyped]
 
-from khala.experiment.statistics import CONFIDENCE, Interval
+from khala_sc2.experiment.statistics import CONFIDENCE, Interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -240,7 +240,7 @@ def save(pictures: list[Image], path: Path) -> None:
 
 def play(task: str) -> Path:
     """Play a task and return its recording."""
-    command = [sys.executable, "-m", "khala", "run", task, "--json"]
+    command = [sys.executable, "-m", "khala_sc2", "run", task, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True)  # noqa: S603  # our own command line
     return Path(json.loads(done.stdout)["recording"])
 

@@ -10,7 +10,6 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala.playing.hosting import game_of
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig
 from khala_orchestrator.match.match import Match, SilentObserver
@@ -18,6 +17,7 @@ from khala_orchestrator.match.side import sides_of
 from khala_orchestrator.match.turn import Answer, Answers
 from khala_orchestrator.roster import Seat
 from khala_protocol.messages import Reply
+from khala_sc2.playing.hosting import game_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

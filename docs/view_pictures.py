@@ -98,7 +98,7 @@ def played(directory: Path, task: str, player: str = "skilled") -> Path:
 
 def khala(*arguments: str) -> None:
     """Call khala."""
-    command = [sys.executable, "-m", "khala", *arguments]
+    command = [sys.executable, "-m", "khala_sc2", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603  # ours
 
 

@@ -1,6 +1,6 @@
 """Write `page/src/wire.ts`, the types of everything the server of `khala view` tells its page.
 
-They come from the JSON schema of `khala.view.wire`, so that the compiler finds what the server does not send. A
+They come from the JSON schema of `khala_sc2.view.wire`, so that the compiler finds what the server does not send. A
 named tuple becomes a labelled tuple.
 """
 
@@ -16,11 +16,11 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from khala.view import wire
 from khala_protocol.messages import Terrain, UnitFlag
+from khala_sc2.view import wire
 
 TYPES = Path(__file__).parent / "src" / "wire.ts"
-_HEAD = """// Made by `python -m page.typescript` from khala/view/wire.py: change it there.
+_HEAD = """// Made by `python -m page.typescript` from khala_sc2/view/wire.py: change it there.
 """
 _SIMPLE = {"string": "string", "integer": "number", "number": "number", "boolean": "boolean", "null": "null"}
 

@@ -29,7 +29,7 @@ export default defineConfig({
   plugins: [oneFile()],
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
   build: {
-    outDir: "../khala/view/assets",
+    outDir: "../khala_sc2/view/assets",
     emptyOutDir: true,
     target: "es2023",
     modulePreload: false,

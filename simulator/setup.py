@@ -52,7 +52,7 @@ def layouts_changed() -> bool:
 def extensions() -> list[Extension]:
     """Return the modules to be compiled: none without a compiler."""
     if ENGINE == "python" or not find_compiler():
-        sys.stderr.write("khala-simulator: no C compiler, so the interpreter plays the rules, slowly\n")
+        sys.stderr.write("khala-sc2-simulator: no C compiler, so the interpreter plays the rules, slowly\n")
         return []
     import numpy as np  # noqa: PLC0415  # only what compiles needs these two
     from Cython.Build import cythonize  # noqa: PLC0415

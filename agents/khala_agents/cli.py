@@ -1,9 +1,9 @@
-"""The commands `khala agent` and `khala llm`, as plain functions that `khala.cli` mounts.
+"""The commands `khala agent` and `khala llm`, as plain functions that `khala_sc2.cli` mounts.
 
 Where only this package is installed they are `khala-agent` and `khala-llm`.
 
 They read options, put things together and run until they are stopped. A mistake of the user is raised
-as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` or `run_command` prints it.
+as a `khala_protocol.errors.KhalaError` of one sentence; `khala_sc2.cli` or `run_command` prints it.
 """
 
 from collections.abc import Callable

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer.main
 
-from khala.cli import app
+from khala_sc2.cli import app
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

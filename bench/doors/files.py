@@ -19,20 +19,6 @@ from unittest import mock
 
 from bench.doors.rows import Row, Skipped
 from bench.paths import ROOT
-from khala.arena import commands as arena
-from khala.dataset.card import Recipe
-from khala.dataset.choose import RowChoice, Split
-from khala.dataset.export import export
-from khala.dataset.files import RowForm
-from khala.experiment import commands, results
-from khala.experiment.store import INDEX, MATCHES, Store
-from khala.playing.matches import new, newest_recording
-from khala.playing.minds import Minds
-from khala.service import client
-from khala.service import commands as service_commands
-from khala.service.book import Book, Limits
-from khala.view.runs import Opened
-from khala.view.scan import whole
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.game.game import GameIdentity
@@ -63,6 +49,20 @@ from khala_protocol.messages import (
 )
 from khala_protocol.recording import Recorder, Recording
 from khala_protocol.service import MatchCard, Matches, Submit
+from khala_sc2.arena import commands as arena
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.choose import RowChoice, Split
+from khala_sc2.dataset.export import export
+from khala_sc2.dataset.files import RowForm
+from khala_sc2.experiment import commands, results
+from khala_sc2.experiment.store import INDEX, MATCHES, Store
+from khala_sc2.playing.matches import new, newest_recording
+from khala_sc2.playing.minds import Minds
+from khala_sc2.service import client
+from khala_sc2.service import commands as service_commands
+from khala_sc2.service.book import Book, Limits
+from khala_sc2.view.runs import Opened
+from khala_sc2.view.scan import whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -31,29 +31,29 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bench.doors.rows import Row, Skipped
-from khala.doors.serving import uvicorn_config
-from khala.mcp.serve import SeatAddress, routes_of
-from khala.mcp.table import Table
-from khala.openenv.client import KhalaAction, KhalaEnv
-from khala.openenv.server import MOST_WAITING, app_of, openenv_door, server_config
-from khala.playing.minds import Minds
-from khala.playing.seats import seats_of, without_time_limit
-from khala.service.metrics import Metrics
-from khala.view.guard import view_door
-from khala.view.server import Server
-from khala.view.sources import Sources
 from khala_agents.scripted.endpoint import MOST_CONNECTIONS as MOST_OF_ENDPOINT
 from khala_agents.scripted.endpoint import Endpoint
 from khala_orchestrator.config import MatchConfig, load_task
 from khala_protocol.listening import HEAD_S, MOST_CONNECTIONS, Patience, bind
+from khala_sc2.doors.serving import uvicorn_config
+from khala_sc2.mcp.serve import SeatAddress, routes_of
+from khala_sc2.mcp.table import Table
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv
+from khala_sc2.openenv.server import MOST_WAITING, app_of, openenv_door, server_config
+from khala_sc2.playing.minds import Minds
+from khala_sc2.playing.seats import seats_of, without_time_limit
+from khala_sc2.service.metrics import Metrics
+from khala_sc2.view.guard import view_door
+from khala_sc2.view.server import Server
+from khala_sc2.view.sources import Sources
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
     from contextlib import AbstractAsyncContextManager
     from pathlib import Path
 
-    from khala.doors.asgi import Application
-    from khala.doors.rules import Door
+    from khala_sc2.doors.asgi import Application
+    from khala_sc2.doors.rules import Door
 
     Serving = Callable[[Path], AbstractAsyncContextManager["Target"]]
 
@@ -493,7 +493,7 @@ async def _talk_nonsense(target: Target) -> str:
 
 async def _play_left_sessions(directory: Path) -> str:
     """Begin episodes over HTTP, leave, and see whether the next client has to wait for an hour."""
-    from khala.openenv import places  # noqa: PLC0415  # its limit is changed below
+    from khala_sc2.openenv import places  # noqa: PLC0415  # its limit is changed below
 
     async with openenv(directory, sessions=1) as target:
         address = f"http://{target.host}"

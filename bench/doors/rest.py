@@ -26,10 +26,6 @@ from cryptography.x509.oid import NameOID
 from bench.doors.files import EVIL, GAME, FullFile, capture
 from bench.doors.rows import Row
 from bench.paths import GOLDEN
-from khala.calibrate import commands as calibrating
-from khala.commands.advise import Adviser, Advising, lines_about
-from khala.knowledge import cli as knowledge
-from khala.knowledge import files as facts
 from khala_agents.scripted.canned import Canned, Given, completion, refusal
 from khala_agents.scripted.endpoint import Endpoint
 from khala_bridge.calibrate.record import Calibration, Measured, Values
@@ -47,6 +43,10 @@ from khala_protocol.errors import BusError, ConfigError
 from khala_protocol.keys import Topic, agent_key, host_key, run_key
 from khala_protocol.messages import AgentReport, Casualties, Received, Report, Result
 from khala_protocol.visible import visible
+from khala_sc2.calibrate import commands as calibrating
+from khala_sc2.commands.advise import Adviser, Advising, lines_about
+from khala_sc2.knowledge import cli as knowledge
+from khala_sc2.knowledge import files as facts
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
@@ -65,7 +65,7 @@ PATIENCE_S: Final = 20.0
 async def _said(*words: str, **environ: str) -> tuple[int, str]:
     """Run a command of `khala`; return its exit code and what it said, or that it said nothing for too long."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-P", "-m", "khala", *words, env={**os.environ, "COLUMNS": "400", **environ},
+        sys.executable, "-P", "-m", "khala_sc2", *words, env={**os.environ, "COLUMNS": "400", **environ},
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
     try:
@@ -180,7 +180,7 @@ async def _evil_words(_: Path) -> str:
 
 async def _lines_of_json(directory: Path) -> str:
     """Read what `khala advise --json` prints of words with escape sequences."""
-    from khala.commands import advise  # noqa: PLC0415  # its session is replaced below
+    from khala_sc2.commands import advise  # noqa: PLC0415  # its session is replaced below
 
     class Stub:
         def __init__(self, *_: Any, show: Callable[[Any], None], **__: Any) -> None:

@@ -16,13 +16,13 @@ import yaml
 
 from bench.doors.rows import Row
 from bench.paths import GOLDEN
-from khala.service.orders import match_of
 from khala_configs import CONFIGS
 from khala_protocol.codec import decode, encode
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import Run
 from khala_protocol.recording import Recorder, Recording
 from khala_protocol.service import Submit
+from khala_sc2.service.orders import match_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -125,7 +125,7 @@ async def _at_the_command(
     words = [file if word == "FILE" else word for word in arguments]
     environ = {name: value for name, value in os.environ.items() if name != "KHALA_TRUST"}
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-P", "-m", "khala", *words, cwd=directory, env=environ, start_new_session=True,
+        sys.executable, "-P", "-m", "khala_sc2", *words, cwd=directory, env=environ, start_new_session=True,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
     said = b""

@@ -71,7 +71,7 @@ async def play(directory: Path, *options: str, answer: Callable[[CannedRequest],
 async def _khala(directory: Path, *arguments: str) -> tuple[int, str, str]:
     """Run `khala` in a directory; return its exit code, and what it printed on stdout and on stderr."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-P", "-m", "khala", *arguments,
+        sys.executable, "-P", "-m", "khala_sc2", *arguments,
         cwd=directory, env={**os.environ, "COLUMNS": "200"}, start_new_session=True,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip

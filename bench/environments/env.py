@@ -27,7 +27,7 @@ from bench.command_line import make_parser
 from bench.environments.smac import package_root
 from bench.figures import Figure
 from bench.paths import ROOT
-from khala.playing import games
+from khala_sc2.playing import games
 
 if TYPE_CHECKING:
     import argparse

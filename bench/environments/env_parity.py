@@ -1,4 +1,4 @@
-"""Play random episodes on SMAC's package and on `khala.env.numeric` at once, and compare everything.
+"""Play random episodes on SMAC's package and on `khala_sc2.env.numeric` at once, and compare everything.
 
     python -m bench env_parity ~/smac                             23 maps, 500 episodes in all
     python -m bench env_parity ~/smac --maps 3m MMM --episodes 50
@@ -22,8 +22,8 @@ import numpy as np
 
 from bench.command_line import make_parser
 from bench.environments.smac import package_root
-from khala.env.numeric import MAPS, StarCraft2Env
-from khala.playing import games
+from khala_sc2.env.numeric import MAPS, StarCraft2Env
+from khala_sc2.playing import games
 from khala_simulator.api.game import HostedGame
 from khala_simulator.process.replay import Replay
 from khala_simulator.tables.versions import DEFAULT_VERSION

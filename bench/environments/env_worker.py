@@ -20,7 +20,7 @@ class Khala:
     """Ours, in this process."""
 
     def __init__(self, map_name: str, seed: int) -> None:
-        from khala.env.numeric import StarCraft2Env  # noqa: PLC0415  # what other workers need not have
+        from khala_sc2.env.numeric import StarCraft2Env  # noqa: PLC0415  # what other workers need not have
 
         self._env: Any = StarCraft2Env(map_name, seed=seed)
 

@@ -66,7 +66,7 @@ def main() -> None:
 
 def of_clients(count: int, steps: int, seconds: float) -> dict[str, Any]:
     """Return what a number of clients got from a server of its own."""
-    command = [sys.executable, "-m", "khala", "openenv", "2s3z", "--port", "0", "--sessions", str(count)]
+    command = [sys.executable, "-m", "khala_sc2", "openenv", "2s3z", "--port", "0", "--sessions", str(count)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
         assert server.stderr is not None
         address = server.stderr.readline().strip()

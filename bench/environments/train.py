@@ -1,4 +1,4 @@
-"""Train a team on a SMAC map through `khala.env.numeric`, and draw how its win rate grows.
+"""Train a team on a SMAC map through `khala_sc2.env.numeric`, and draw how its win rate grows.
 
     python -m bench train                                           3m, one seed, ten minutes
     python -m bench train 3m --minutes 10 --seeds 1 2 3
@@ -24,7 +24,7 @@ import numpy as np
 
 from bench.command_line import make_parser
 from bench.environments.ppo import Learner, Rollout
-from khala.env.numeric import CentralEnv
+from khala_sc2.env.numeric import CentralEnv
 
 if TYPE_CHECKING:
     from collections.abc import Callable

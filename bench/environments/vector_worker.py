@@ -19,7 +19,7 @@ class Batch:
     """Ours, on two worker processes."""
 
     def __init__(self, map_name: str, envs: int) -> None:
-        from khala.env import numeric  # noqa: PLC0415  # what other kinds need not have
+        from khala_sc2.env import numeric  # noqa: PLC0415  # what other kinds need not have
 
         self._envs: Any = numeric.vector_env(map_name, envs, threads=min(2, envs))
         self._rng = np.random.default_rng(1)
@@ -44,7 +44,7 @@ class Single(Batch):
     """Ours, one environment after the other in this process."""
 
     def __init__(self, map_name: str, envs: int) -> None:
-        from khala.env.numeric import StarCraft2Env  # noqa: PLC0415  # see above
+        from khala_sc2.env.numeric import StarCraft2Env  # noqa: PLC0415  # see above
 
         self._envs = [StarCraft2Env(map_name, seed=seed) for seed in range(1, envs + 1)]
         self._rng = np.random.default_rng(1)

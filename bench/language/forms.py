@@ -21,13 +21,13 @@ import yaml
 
 from bench.command_line import make_parser
 from bench.tables import print_table
-from khala.playing.local import play
-from khala.playing.minds import Minds
 from khala_agents.answers.form import AnswerForm
 from khala_agents.config import load_model
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import ModelCall, Observation, Reply, count_refusals
 from khala_protocol.recording import Recording
+from khala_sc2.playing.local import play
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from bench.command_line import make_parser
-from khala.playing import games
 from khala_agents.scripted.players import PLAYERS, random_calls
 from khala_agents.scripted.reading import read
 from khala_bridge.act import Actor, executor_of
@@ -31,6 +30,7 @@ from khala_bridge.game.pysc2_game import PySC2Game
 from khala_bridge.observe import Feedback, Observer
 from khala_orchestrator.config import all_tasks, load_task
 from khala_protocol.speech import parse
+from khala_sc2.playing import games
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

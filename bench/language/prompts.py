@@ -24,9 +24,6 @@ from typing import TYPE_CHECKING, Final
 from bench.command_line import make_parser
 from bench.tables import print_table
 from bench.turns.observe import snapshot
-from khala.dataset.prompts import Prompter
-from khala.playing.minds import Minds
-from khala.playing.one_process import play
 from khala_agents.prompt import Prompt
 from khala_agents.scripted.players import PLAYERS
 from khala_bridge.observe import Observer
@@ -34,6 +31,9 @@ from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.match.cards import briefing
 from khala_protocol.messages import Briefing, Observation
 from khala_protocol.recording import Recording
+from khala_sc2.dataset.prompts import Prompter
+from khala_sc2.playing.minds import Minds
+from khala_sc2.playing.one_process import play
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Battles of a player that answers prompts, several at once, through `khala.env.parallel_env`.
+"""Battles of a player that answers prompts, several at once, through `khala_sc2.env.parallel_env`.
 
 Battles go on in lockstep: the player gets the prompts of all of them that wait for an answer at once, as a language
 model answers fastest. Above: `bench.learning.learns`; below: the environment in words.
@@ -12,16 +12,16 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
-from khala.dataset.prompts import Prompter, count_example, without_example
-from khala.env import parallel_env
 from khala_agents.scripted.players import PLAYERS, PlayerName
+from khala_sc2.dataset.prompts import Prompter, count_example, without_example
+from khala_sc2.env import parallel_env
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from khala.env.text import TextParallelEnv
     from khala_bridge.task.config import TaskConfig
     from khala_protocol.messages import Briefing, ChatMessage, Observation
+    from khala_sc2.env.text import TextParallelEnv
 
 CALL: Final = re.compile(r"^\s*(<\w+\(.*\)>)\s*$", re.MULTILINE)
 
@@ -87,7 +87,7 @@ class PlayedBattle:
     seed: int
     answered: list[Answered] = field(default_factory=list)
     reward: float = 0.0
-    """The sum of `khala.env.rewards.battle`: (destroyed - lost value) / 1000, +1 for a win, -1 for a loss."""
+    """The sum of `khala_sc2.env.rewards.battle`: (destroyed - lost value) / 1000, +1 for a win, -1 for a loss."""
     won: bool = False
     obeyed: int = 0
     """Answers of which at least one order was carried out."""

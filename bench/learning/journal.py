@@ -13,8 +13,8 @@ from statistics import fmean, pstdev
 from typing import TYPE_CHECKING, Any
 
 from bench.learning.battles import Answer, Answered, PlayedBattle
-from khala.experiment.statistics import mean, wilson
 from khala_protocol.messages import ChatMessage
+from khala_sc2.experiment.statistics import mean, wilson
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,9 +20,6 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from bench.command_line import make_parser
 from bench.tables import print_table
-from khala.playing import games
-from khala.playing.hosting import game_of
-from khala.testing import replay_host
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
@@ -34,6 +31,9 @@ from khala_protocol.clock_rule import ClockRule
 from khala_protocol.keys import Topic
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import game_of
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

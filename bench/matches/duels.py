@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.command_line import make_parser
-from khala.experiment.statistics import wilson
 from khala_orchestrator.config import load_task
+from khala_sc2.experiment.statistics import wilson
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -65,7 +65,7 @@ def _half(
 ) -> Iterator[Game]:
     if not episodes:
         return
-    command = [sys.executable, "-m", "khala", "run", task, "--latency", "0", "--max-wait", "60", "--json", *options]
+    command = [sys.executable, "-m", "khala_sc2", "run", task, "--latency", "0", "--max-wait", "60", "--json", *options]
     command += ["--episodes", str(episodes), "--seed", str(seed), "--out", str(out)]
     command += [part for name, model in models.items() for part in ("--side-model", f"{name}={model}")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -27,20 +27,20 @@ import psutil
 from bench.command_line import make_parser
 from bench.figures import Figure
 from bench.tables import print_table
-from khala.experiment.engine import Local, slots_of_this_machine
-from khala.experiment.plan import plan
-from khala.experiment.runner import Runner
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import Store
 from khala_orchestrator.config import load_task
+from khala_sc2.experiment.engine import Local, slots_of_this_machine
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.runner import Runner
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from khala.experiment.engine import Engine
-    from khala.experiment.plan import PlannedMatch
-    from khala.experiment.runner import RunnerEvent
     from khala_bridge.task.config import TaskConfig
+    from khala_sc2.experiment.engine import Engine
+    from khala_sc2.experiment.plan import PlannedMatch
+    from khala_sc2.experiment.runner import RunnerEvent
 
 LOOPS_PER_MINUTE: Final = 22.4 * 60
 FULL_GAME_MINUTES: Final = 7

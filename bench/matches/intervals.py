@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats  # type: ignore[import-untyped]
 
 from bench.command_line import make_parser
-from khala.experiment.statistics import (
+from khala_sc2.experiment.statistics import (
     compare_paired_ratios,
     compare_paired_values,
     compare_paired_wins,

@@ -22,9 +22,6 @@ from itertools import product
 from typing import TYPE_CHECKING, get_args
 
 from bench.command_line import make_parser
-from khala.experiment.statistics import wilson
-from khala.playing import games
-from khala.playing.hosting import host_match
 from khala_agents.scripted.players import PLAYERS, PlayerName
 from khala_bridge.task.maps import Difficulty, Race
 from khala_bridge.task.opponent import Opponent
@@ -34,6 +31,9 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.codec import decode_as, encode
 from khala_protocol.keys import Topic, agent_key, alive_key
 from khala_protocol.messages import Observation, Reply
+from khala_sc2.experiment.statistics import wilson
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import host_match
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

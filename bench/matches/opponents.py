@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from bench.command_line import make_parser
-from khala.experiment.statistics import wilson
+from khala_sc2.experiment.statistics import wilson
 from khala_simulator.economy import supply
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.opponent import player

@@ -25,12 +25,12 @@ from typing import TYPE_CHECKING
 
 from bench.command_line import make_parser
 from bench.tables import print_table
-from khala.playing.local import play
-from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import LOOPS_PER_S, Report
 from khala_protocol.recording import Recording
 from khala_protocol.trust import trust_named
+from khala_sc2.playing.local import play
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -84,7 +84,7 @@ def scenarios(pattern: str = "*") -> list[str]:
 
 def play(task: str, player: str, *, episodes: int, seed: int, out: Path) -> Row:
     """Run a task with a scripted player and return its row; the row of a run that fails says so."""
-    command = [sys.executable, "-m", "khala", "run", task, "--model-name", player, "--latency", "0", "--json"]
+    command = [sys.executable, "-m", "khala_sc2", "run", task, "--model-name", player, "--latency", "0", "--json"]
     command += ["--episodes", str(episodes), "--seed", str(seed), "--out", str(out), "--max-wait", "60"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

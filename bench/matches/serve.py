@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.command_line import make_parser
-from khala.playing.matches import new
-from khala.playing.minds import Minds
-from khala.service import client
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.keys import Topic, every_agent
 from khala_protocol.service import OPEN, Submit
+from khala_sc2.playing.matches import new
+from khala_sc2.playing.minds import Minds
+from khala_sc2.service import client
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -72,7 +72,7 @@ async def _bench(task: str, orders: int, matches: int, settle_s: float, out: Pat
 
 @contextlib.asynccontextmanager
 async def _service(out: Path, *options: str) -> AsyncIterator[Bus]:
-    command = ("-m", "khala", "serve", "--json", "--listen", "tcp/127.0.0.1:0", "--out", str(out), *options)
+    command = ("-m", "khala_sc2", "serve", "--json", "--listen", "tcp/127.0.0.1:0", "--out", str(out), *options)
     process = await asyncio.create_subprocess_exec(
         sys.executable, *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL
     )

@@ -34,10 +34,10 @@ GOAL_HELP_S = 0.25
 GOAL_MATCH_S = 2.5
 GOAL_MB = 350
 IMPORTS = {
-    "khala.cli": "every command",
+    "khala_sc2.cli": "every command",
     "khala_agents.commands": "agents",
     "khala_bridge.game.pysc2_game": "PySC2 and the bridge",
-    "khala.playing.local": "the host",
+    "khala_sc2.playing.local": "the host",
 }
 COUNT = "; import sys; print(len(sys.modules))"
 MATCH = ("run", "2s3z_pair", "--max-steps", "1", "--latency", "0")
@@ -62,7 +62,7 @@ def time_command(command: Sequence[str], times: int) -> dict[str, Any]:
 
 def of_help(times: int) -> dict[str, Any]:
     """Return what `khala --help` takes."""
-    took = time_command([sys.executable, "-m", "khala", "--help"], times)
+    took = time_command([sys.executable, "-m", "khala_sc2", "--help"], times)
     return {"cpu_s": took["cpu_s"], "wall_s": took["wall_s"]}
 
 
@@ -81,7 +81,7 @@ def of_match(times: int, directory: Path) -> dict[str, Any]:
     for number in range(times):
         began_s = time.time()
         run = ["--run", f"m{number}", "--out", str(directory)]
-        took.append(time_command([sys.executable, "-m", "khala", *MATCH, *run], 1))
+        took.append(time_command([sys.executable, "-m", "khala_sc2", *MATCH, *run], 1))
         recording = Recording.open(directory / f"m{number}" / "recording.mcap")
         seen = next(sample for sample in recording if parse(sample.key).topic is Topic.OBSERVATION)
         first_s.append(seen.log_time_ns / 1e9 - began_s)
@@ -91,7 +91,7 @@ def of_match(times: int, directory: Path) -> dict[str, Any]:
 
 def of_memory(directory: Path) -> list[dict[str, Any]]:
     """Return the processes of a match of twelve agents at the moment when they held most."""
-    command = [sys.executable, "-m", "khala", *TWELVE, "--run", "twelve", "--out", str(directory)]
+    command = [sys.executable, "-m", "khala_sc2", *TWELVE, "--run", "twelve", "--out", str(directory)]
     most: list[dict[str, Any]] = []
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as host:
         while host.poll() is None:
@@ -120,7 +120,7 @@ def _name(process: psutil.Process) -> str:
     line = " ".join(process.cmdline())
     known = {
         "khala_simulator": "game",
-        "khala.playing.spare": "agents",
+        "khala_sc2.playing.spare": "agents",
         "khala agent": "agents",
         "khala llm": "endpoint",
     }

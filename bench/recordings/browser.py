@@ -41,7 +41,7 @@ class Viewer:
 def viewing(*arguments: Path | str) -> Iterator[Viewer]:
     """Start `khala view` with some arguments; end it."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "khala", "view", *map(str, arguments), "--no-open"],
+        [sys.executable, "-m", "khala_sc2", "view", *map(str, arguments), "--no-open"],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     try:

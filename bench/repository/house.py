@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-PACKAGES: Final = ("khala", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator")
+PACKAGES: Final = ("khala_sc2", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator")
 LIMITS: Final = {"classes": 6, "participles": 20, "one": 0, "packed": 0, "phrases": 0}
 PHRASES: Final = (
     r"gone on with", r"who has its \w+ can be", r"what there is of it", r"came to nothing", r"what would have been if",

@@ -30,7 +30,7 @@ from rich.console import Console
 
 from bench.command_line import make_parser
 from bench.tables import WIDEST
-from khala.experiment.statistics import wilson
+from khala_sc2.experiment.statistics import wilson
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.maps.game_map import map_from

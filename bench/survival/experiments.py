@@ -25,15 +25,15 @@ from typing import Any
 from aiohttp import web
 
 from bench.command_line import make_parser
-from khala.experiment.commands import words_of
-from khala.experiment.engine import Local
-from khala.experiment.plan import plan
-from khala.experiment.runner import Runner, pilot_of
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_agents.scripted.faults import InjectedFaults, parse_faults
 from khala_protocol.configfile import load
+from khala_sc2.experiment.commands import words_of
+from khala_sc2.experiment.engine import Local
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.runner import Runner, pilot_of
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import Store
 
 MOST_OFF = 0.2
 FILE = """
@@ -64,7 +64,7 @@ def write(directory: Path, *, seeds: int, steps: int, skilled: str = "skilled", 
 
 async def run(file: Path, out: Path, *more: str, kill_after_s: float | None = None) -> int:
     """Run `khala experiment run`; return its exit code, or that of SIGKILL after some seconds."""
-    command = [sys.executable, "-m", "khala", "experiment", "run", str(file), "--out", str(out), "--yes", *more]
+    command = [sys.executable, "-m", "khala_sc2", "experiment", "run", str(file), "--out", str(out), "--yes", *more]
     process = await asyncio.create_subprocess_exec(*command, start_new_session=True)
     try:
         async with asyncio.timeout(kill_after_s):

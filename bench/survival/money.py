@@ -303,7 +303,7 @@ async def play(kind: str, cap_usd: float, jobs: int, directory: Path) -> Spent:
         (place / "billed.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url))
         (place / "grid.yaml").write_text(EXPERIMENT)
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-P", "-m", "khala", "experiment", "run", "grid.yaml", "--budget-usd", str(cap_usd),
+            sys.executable, "-P", "-m", "khala_sc2", "experiment", "run", "grid.yaml", "--budget-usd", str(cap_usd),
             "--jobs", str(jobs), "--json", cwd=place, stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip

@@ -54,7 +54,7 @@ def processes_of(mark: str) -> set[int]:
 
 def kill_after(seconds: float, directory: Path, cache: Path) -> Killed:
     """Start a match of two agents, kill its host, and wait until its processes are gone."""
-    command = [sys.executable, "-m", "khala", "run", "2s3z_pair", "--latency", "0.1", "--episodes", "9"]
+    command = [sys.executable, "-m", "khala_sc2", "run", "2s3z_pair", "--latency", "0.1", "--episodes", "9"]
     environ = os.environ | {"TMPDIR": str(directory), "KHALA_CACHE": str(cache)}
     with subprocess.Popen(command, cwd=directory, env=environ, stderr=subprocess.DEVNULL) as host:
         while not processes_of(f"TMPDIR={directory}") - {host.pid} and host.poll() is None:

@@ -64,7 +64,7 @@ class Processes:
         environ = os.environ | {"TMPDIR": str(self.directory)}
         with (self.directory / f"{log}.log").open("ab") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", "khala", *arguments],
+                [sys.executable, "-m", "khala_sc2", *arguments],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environ,
             )  # fmt: skip
         self._started.append(process)

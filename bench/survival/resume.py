@@ -28,8 +28,6 @@ from typing import TYPE_CHECKING
 from bench.command_line import make_parser
 from bench.survival.processes import Processes, free_port, until_listening
 from bench.tables import print_table
-from khala.playing.local import shares
-from khala.testing import replay_host
 from khala_orchestrator.config import load_task
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
@@ -38,6 +36,8 @@ from khala_protocol.codec import decode_as
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import ModelCall, Observation, Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing.local import shares
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
     import subprocess

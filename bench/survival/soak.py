@@ -26,7 +26,6 @@ from bench.memory import rss_mb
 from bench.survival.orphans import processes_of
 from bench.survival.processes import Processes, free_port
 from bench.tables import print_table
-from khala.playing.local import shares
 from khala_orchestrator.config import change, load_task
 from khala_protocol.bus import Delivery
 from khala_protocol.bus.config import BusConfig
@@ -34,6 +33,7 @@ from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing.local import shares
 
 if TYPE_CHECKING:
     import subprocess

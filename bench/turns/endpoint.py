@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @contextlib.contextmanager
 def endpoint(latency_s: float) -> Iterator[str]:
     """Yield the base URL of an endpoint that answers after this time."""
-    command = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json", "--latency", str(latency_s)]
+    command = [sys.executable, "-m", "khala_sc2", "llm", "--port", "0", "--json", "--latency", str(latency_s)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as llm:
         try:
             assert llm.stdout is not None

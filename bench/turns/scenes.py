@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.command_line import make_parser
-from khala.playing.hosting import game_of
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.match.match import Match, SilentObserver
@@ -38,6 +37,7 @@ from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import Reply
 from khala_protocol.recording import Recorder
+from khala_sc2.playing.hosting import game_of
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:

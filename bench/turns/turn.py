@@ -29,11 +29,6 @@ from bench.figures import Figure
 from bench.tables import print_table
 from bench.turns.endpoint import endpoint
 from bench.turns.original import step_s
-from khala.playing import games
-from khala.playing.children import Children
-from khala.playing.hosting import game_of
-from khala.playing.local import shares
-from khala.playing.local_bus import LOOPBACK, local_endpoint
 from khala_bridge.act import Actor
 from khala_bridge.observe import Observer
 from khala_bridge.state.teams import Team, TeamRoster
@@ -54,6 +49,11 @@ from khala_protocol.keys import Topic, every_agent
 from khala_protocol.keys import parse as parse_key
 from khala_protocol.messages import ModelCall, Observation, Run
 from khala_protocol.speech import parse
+from khala_sc2.playing import games
+from khala_sc2.playing.children import Children
+from khala_sc2.playing.hosting import game_of
+from khala_sc2.playing.local import shares
+from khala_sc2.playing.local_bus import LOOPBACK, local_endpoint
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

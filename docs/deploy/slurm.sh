@@ -3,7 +3,7 @@
 #
 #     sbatch --nodes 4 slurm.sh my_grid.yaml
 #
-# Submit it from a directory that all nodes see, with an environment in which `pip install 'khala[ray]'` was done.
+# Submit it from a directory that all nodes see, with an environment in which `pip install 'khala-sc2[ray]'` was done.
 # Submitted again after its time was up, it plays what is missing.
 #SBATCH --job-name=khala
 #SBATCH --ntasks-per-node=1

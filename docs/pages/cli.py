@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from docs.pages.markdown import anchor, code, fence, head, join, prose, table
-from khala.cli import app
+from khala_sc2.cli import app
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, head, join, prose, table
 from docs.pages.schema import Describer, about, attributes
-from khala.experiment.measures import GROUPS
-from khala.experiment.measures.hallucinations import KINDS, Hallucinations
+from khala_sc2.experiment.measures import GROUPS
+from khala_sc2.experiment.measures.hallucinations import KINDS, Hallucinations
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -21,9 +21,9 @@ DESCRIBER = Describer()
 def page() -> str:
     """Return a table for each group of measures, and the mapping of rejections to kinds of hallucinations."""
     return join(
-        head("Measures", "`khala/experiment/measures`"),
+        head("Measures", "`khala_sc2/experiment/measures`"),
         "The numbers of an experiment: a row for each episode and side, found from its recording alone with "
-        "`khala.experiment.measures.measure`. Every column is a text, a number, true or false, or null, so that a row "
+        "`khala_sc2.experiment.measures.measure`. Every column is a text, a number, true or false, or null, so that a row "
         "fits into SQLite and Parquet.",
         *(block for group in GROUPS for block in _section(group)),
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, head, join, table
-from khala.calibrate.estimates import estimates, of_maps
 from khala_bridge.calibrate.catalogue import PROBES
+from khala_sc2.calibrate.estimates import estimates, of_maps
 
 if TYPE_CHECKING:
     from khala_bridge.calibrate.probe import Probe

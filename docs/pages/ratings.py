@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from docs.pages.markdown import code, head, join, table
-from khala.arena.leaderboard import costs_of, remarks_of
-from khala.arena.ratings import rate
-from khala.arena.results import pool_results
+from khala_sc2.arena.leaderboard import costs_of, remarks_of
+from khala_sc2.arena.ratings import rate
+from khala_sc2.arena.results import pool_results
 
 if TYPE_CHECKING:
-    from khala.arena.ratings import LeaderboardLine, Rating
+    from khala_sc2.arena.ratings import LeaderboardLine, Rating
 
 RESULTS = Path(__file__).parents[2] / "results"
 

@@ -21,7 +21,7 @@ from datasets import Dataset
 from transformers import AutoModelForCausalLM, AutoTokenizer
 from trl import GRPOConfig, GRPOTrainer
 
-from khala.openenv.client import KhalaAction, KhalaEnv
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from openenv.core.sync_client import SyncEnvClient
     from transformers import PreTrainedModel, PreTrainedTokenizerBase
 
-    from khala.openenv.client import KhalaObservation
+    from khala_sc2.openenv.client import KhalaObservation
 
     Session = SyncEnvClient[Any, Any, Any]
 

@@ -1,6 +1,6 @@
-"""The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala.cli` mounts.
+"""The commands `khala router`, `khala tasks` and `khala replay`, as plain functions that `khala_sc2.cli` mounts.
 
-A mistake of the user is raised as a `khala_protocol.errors.KhalaError` of one sentence; `khala.cli` prints it.
+A mistake of the user is raised as a `khala_protocol.errors.KhalaError` of one sentence; `khala_sc2.cli` prints it.
 """
 
 from pathlib import Path

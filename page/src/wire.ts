@@ -1,4 +1,4 @@
-// Made by `python -m page.typescript` from khala/view/wire.py: change it there.
+// Made by `python -m page.typescript` from khala_sc2/view/wire.py: change it there.
 
 /** Page → server: what a person writes to agents. */
 export interface AdviceNote {

@@ -1,6 +1,6 @@
 """Run a command line, and print its lines: what comes from elsewhere does nothing to the terminal.
 
-An error that the user can fix is one sentence on stderr and an exit code, never a traceback. Above: `khala.cli`, and
+An error that the user can fix is one sentence on stderr and an exit code, never a traceback. Above: `khala_sc2.cli`, and
 the commands of packages that are installed alone. It knows no library for options. Tables and colours are printed by
 the consoles of `khala_orchestrator.console`; nothing else writes to a terminal.
 """

@@ -3,7 +3,7 @@
 A parent names itself in the environment of the processes that must not outlive it. A process that was started by hand
 finds no such name, and lives as long as it likes. The simulator, which stands alone, reads the same variable.
 
-Above: `python -m khala`, as which `khala run` starts its processes.
+Above: `python -m khala_sc2`, as which `khala run` starts its processes.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class Submit(Wire):
     match: dict[str, Any] = Field(default={})
     """A `khala_orchestrator.config.MatchConfig`; that of its recording if it is resumed."""
     minds: dict[str, Any] = Field(default={})
-    """A `khala.playing.minds.Minds`: how the agents decide."""
+    """A `khala_sc2.playing.minds.Minds`: how the agents decide."""
     sides: dict[str, str] = Field(default={})
     """By side, the model or policy of agents that decide otherwise, as `khala run --side-model` takes it."""
     resume: bool = False

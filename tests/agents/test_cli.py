@@ -120,7 +120,7 @@ async def start() -> AsyncIterator[Callable[..., Any]]:
 
     async def started(*options: str) -> Command:
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "khala", *options, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+            sys.executable, "-m", "khala_sc2", *options, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
         )
         running.append(process)
         return Command(process)

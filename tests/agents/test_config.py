@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.commands.doctor import keys as keys_found
-from khala.playing.environment import plain, with_model
 from khala_agents.build import Workshop, client_for, load_policy
 from khala_agents.config import WorkerSpec, load_agents, load_model, model_files
 from khala_agents.llm.anthropic import Anthropic
@@ -27,6 +25,8 @@ from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ChatMessage
 from khala_protocol.trust import trust_named
+from khala_sc2.commands.doctor import keys as keys_found
+from khala_sc2.playing.environment import plain, with_model
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.cli import main
-from khala.experiment.store import Store
+from khala_sc2.cli import main
+from khala_sc2.experiment.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -88,7 +88,7 @@ class Machine:
 
     async def khala(self, *arguments: str) -> Command:
         """Start a command there."""
-        return await self.python("-m", "khala", *arguments)
+        return await self.python("-m", "khala_sc2", *arguments)
 
     async def python(self, *arguments: str) -> Command:
         """Start Python there."""

@@ -26,4 +26,4 @@ def fails(*_: object) -> ModelOutput:
 
 if __name__ == "__main__":
     model = get_model("mockllm/model", custom_outputs={"skilled": skilled, "fails": fails}[sys.argv[2]])
-    evaluate(f"khala/{sys.argv[1]}", model=model, task_args=json.loads(sys.argv[4]), log_dir="logs", display="none")
+    evaluate(f"khala_sc2/{sys.argv[1]}", model=model, task_args=json.loads(sys.argv[4]), log_dir="logs", display="none")

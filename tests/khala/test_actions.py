@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from khala.cli import main
 from khala_bridge.catalogue.catalogue import catalogue
+from khala_sc2.cli import main
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -124,8 +124,8 @@ def test_why_a_function_has_no_action_is_told(capsys: pytest.CaptureFixture[str]
 
 def test_it_needs_no_pysc2() -> None:
     script = (
-        "import sys, khala.cli\n"
-        "try: khala.cli.main(['actions', '--json', '--unit', 'Stalker'])\n"
+        "import sys, khala_sc2.cli\n"
+        "try: khala_sc2.cli.main(['actions', '--json', '--unit', 'Stalker'])\n"
         "except SystemExit: sys.exit('pysc2' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False, capture_output=True).returncode == 0

@@ -14,10 +14,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.commands.advise import Adviser, Advising, MatchGone, lines_about, run_advise
-from khala.playing import games, local_bus
-from khala.playing.hosting import game_of
-from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_workers
 from khala_bridge.task.config import AdviserConfig
@@ -34,6 +30,10 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, agent_key, host_key, run_key
 from khala_protocol.messages import Advice, Casualties, Message, Report, Result, Run
 from khala_protocol.recording import Recording
+from khala_sc2.commands.advise import Adviser, Advising, MatchGone, lines_about, run_advise
+from khala_sc2.playing import games, local_bus
+from khala_sc2.playing.hosting import game_of
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Coroutine, Iterator
@@ -203,7 +203,7 @@ def short() -> Iterator[str]:
 @pytest.mark.game
 def test_the_command_advises_a_running_match(tmp_path: Path, short: str) -> None:
     environ = {**os.environ, "TMPDIR": short}
-    khala = [sys.executable, "-m", "khala"]
+    khala = [sys.executable, "-m", "khala_sc2"]
     options = ["--run", "live", "--latency", "0.5", "--max-steps", "12", "--out", str(tmp_path), "--json"]
     with subprocess.Popen(
         [*khala, "run", "2s3z_pair", *options], env=environ, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.calibrate import commands, report
-from khala.calibrate.compare import MOST_COMPARISONS, compare
-from khala.calibrate.estimates import estimates, of_maps
-from khala.cli import main
 from khala_bridge.calibrate.catalogue import PROBES, choose
 from khala_bridge.calibrate.record import Calibration, Measured, Values, load
 from khala_bridge.calibrate.run import play
 from khala_bridge.knowledge.facts import VERSION, unit_facts
 from khala_protocol.errors import ConfigError
+from khala_sc2.calibrate import commands, report
+from khala_sc2.calibrate.compare import MOST_COMPARISONS, compare
+from khala_sc2.calibrate.estimates import estimates, of_maps
+from khala_sc2.cli import main
 from khala_simulator.process.client import Client
 from khala_simulator.process.session import Session
 from khala_simulator.tables.catalog import load_catalog

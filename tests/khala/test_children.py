@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import environment
-from khala.playing.children import ChildDied, Children
 from khala_agents.config import ModelConfig
 from khala_protocol import parent_watch
+from khala_sc2.playing import environment
+from khala_sc2.playing.children import ChildDied, Children
 from khala_simulator.process import parent_watch as simulator_watch
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Processes:
     @contextlib.contextmanager
     def playing(self, *command: str) -> Iterator[subprocess.Popen[str]]:
         """Start a command, and wait until its match has begun."""
-        arguments = [sys.executable, "-m", "khala", *command]
+        arguments = [sys.executable, "-m", "khala_sc2", *command]
         with subprocess.Popen(
             arguments, cwd=self._place, env=self.environ, stderr=subprocess.PIPE, text=True
         ) as process:
@@ -94,8 +94,8 @@ def test_a_killed_match_leaves_no_process_and_only_its_host_had_the_key(tmp_path
 def test_an_agent_started_by_hand_outlives_a_killed_host_and_its_game_does_not(tmp_path: Path) -> None:
     processes = Processes(tmp_path)
     bus = f"unixsock-stream/{tmp_path}/bus.sock"
-    agent = [sys.executable, "-m", "khala", "agent", "Stalkers", "Zealots", "--run", "r", "--policy", "silent"]
-    router = [sys.executable, "-m", "khala", "router", "--listen", bus]
+    agent = [sys.executable, "-m", "khala_sc2", "agent", "Stalkers", "Zealots", "--run", "r", "--policy", "silent"]
+    router = [sys.executable, "-m", "khala_sc2", "router", "--listen", bus]
     with contextlib.ExitStack() as stack:
         for command in (router, [*agent, "--connect", bus]):
             stack.callback(stack.enter_context(subprocess.Popen(command, cwd=tmp_path, env=processes.environ)).kill)
@@ -131,7 +131,7 @@ def test_an_agent_that_dies_in_a_match_is_started_again_and_plays_on(tmp_path: P
     (tmp_path / "mortal.py").write_text(BACK)
     command = ["run", "2s3z_pair", "--policy", "mortal:decide", "--max-steps", "8", "--max-wait", "30", "--run", "r"]
     done = subprocess.run(
-        [sys.executable, "-m", "khala", *command, "--json"],
+        [sys.executable, "-m", "khala_sc2", *command, "--json"],
         cwd=tmp_path, env=Processes(tmp_path).environ, capture_output=True, text=True, timeout=110, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -152,7 +152,7 @@ async def begun() -> asyncio.Event:
 async def test_a_child_that_fails_again_and_again_has_failed_for_good_in_its_last_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("khala.playing.children.PAUSES_S", (0.0,))
+    monkeypatch.setattr("khala_sc2.playing.children.PAUSES_S", (0.0,))
     async with Children(tmp_path) as children:
         await children.start("wrong", "agent", "A", "--run", "r", "--policy", "nope:decide")
         with pytest.raises(ChildDied) as died:

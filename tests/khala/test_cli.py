@@ -16,19 +16,19 @@ from typing import Any
 
 import pytest
 
-from khala.cli import main
-from khala.commands.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
-from khala.service.commands import exit_code
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 from khala_protocol.service import MatchCard
+from khala_sc2.cli import main
+from khala_sc2.commands.exit_codes import AFTER_SIGNAL, DONE, FAILED, NOT_VALID, WRONG_USAGE
+from khala_sc2.service.commands import exit_code
 
 KEY = "sk-test-0123456789abcdef-do-not-tell"
 
 
 def khala(*arguments: str, cwd: Path, **environ: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "khala", *arguments],
+        [sys.executable, "-m", "khala_sc2", *arguments],
         cwd=cwd,
         env=os.environ | {"KHALA_CACHE": str(cwd / "cache"), "COLUMNS": "200"} | environ,
         capture_output=True,
@@ -179,7 +179,7 @@ NOWHERE = dict.fromkeys(["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "ALL_PROXY",
 def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """Return where four steps were played, by a model whose key is in the environment, and what was printed."""
     place = tmp_path_factory.mktemp("played")
-    llm = [sys.executable, "-m", "khala", "llm", "--port", "0", "--latency", "0", "--json"]
+    llm = [sys.executable, "-m", "khala_sc2", "llm", "--port", "0", "--latency", "0", "--json"]
     with subprocess.Popen(llm, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as endpoint:
         assert endpoint.stdout is not None
         base_url = json.loads(endpoint.stdout.readline())["base_url"]
@@ -318,7 +318,7 @@ def test_an_agent_that_cannot_begin_ends_the_match_with_its_own_words(tmp_path: 
 def test_a_signal_ends_everything_and_leaves_a_readable_recording(
     tmp_path: Path, sent: signal.Signals, code: int
 ) -> None:
-    command = [sys.executable, "-m", "khala", "run", "2s3z", "--latency", "0.05", "--run", "cut"]
+    command = [sys.executable, "-m", "khala_sc2", "run", "2s3z", "--latency", "0.05", "--run", "cut"]
     environ = os.environ | {"KHALA_CACHE": str(tmp_path / "cache")}
     with subprocess.Popen(command, cwd=tmp_path, env=environ, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
@@ -382,7 +382,7 @@ def test_stubs_that_pip_has_overwritten_are_named(
     def old_stubs(*_: object, **__: object) -> None:
         raise TypeError("Descriptors cannot be created directly.\nIf this call came from a _pb2.py file, ...")
 
-    monkeypatch.setattr("khala.cli.app", old_stubs)
+    monkeypatch.setattr("khala_sc2.cli.app", old_stubs)
     with pytest.raises(SystemExit) as ended:
         main(["tasks"])
     assert str(ended.value).endswith("pip install --force-reinstall --no-deps pys2clientprotocol")

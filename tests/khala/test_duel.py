@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import games
-from khala.playing.hosting import host_match
-from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_orchestrator.config import MatchConfig, change, load_task
@@ -20,6 +17,9 @@ from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.keys import Topic, parse
 from khala_protocol.messages import Message, Observation, Report, Result
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import host_match
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,26 +14,26 @@ from typing import TYPE_CHECKING, Any, Self
 import psutil
 import pytest
 
-from khala.cli import main
-from khala.commands.exit_codes import NOT_VALID, SIGNALLED
-from khala.fork.figures import are_alike, figures, of_side, rate
-from khala.fork.futures import Future, Plan, Purse, play_all
-from khala.fork.players import players_of
-from khala.fork.recorded import play_recorded
-from khala.fork.scan import rank, steps_of
-from khala.playing import one_process, worker
-from khala.playing.jobs import Ended
-from khala.playing.minds import Minds
-from khala.testing import replay_host
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.past.fork import Trunk, trunk_of
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import Casualties, ModelCall, Observation, Reply, Result
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.cli import main
+from khala_sc2.commands.exit_codes import NOT_VALID, SIGNALLED
+from khala_sc2.fork.figures import are_alike, figures, of_side, rate
+from khala_sc2.fork.futures import Future, Plan, Purse, play_all
+from khala_sc2.fork.players import players_of
+from khala_sc2.fork.recorded import play_recorded
+from khala_sc2.fork.scan import rank, steps_of
+from khala_sc2.playing import one_process, worker
+from khala_sc2.playing.jobs import Ended
+from khala_sc2.playing.minds import Minds
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
-    from khala.playing.jobs import Job
+    from khala_sc2.playing.jobs import Job
 
 GOLDEN = Path(__file__).with_name("golden.mcap")
 SIDE = "blue"
@@ -158,7 +158,7 @@ async def test_each_side_of_a_duel_gets_a_player(tmp_path: Path) -> None:
 
 def khala(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "khala", *arguments],
+        [sys.executable, "-m", "khala_sc2", *arguments],
         cwd=cwd, env=os.environ | {"COLUMNS": "200"}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
 
@@ -208,7 +208,7 @@ prices: {{prompt: 100.0, completion: 100.0}}
 @pytest.mark.game
 @pytest.mark.slow
 def test_forks_never_spend_more_than_the_budget(tmp_path: Path) -> None:
-    llm = [sys.executable, "-m", "khala", "llm", "--port", "0", "--json"]
+    llm = [sys.executable, "-m", "khala_sc2", "llm", "--port", "0", "--json"]
     with subprocess.Popen(llm, stdout=subprocess.PIPE, text=True) as endpoint:
         assert endpoint.stdout is not None
         base_url = json.loads(endpoint.stdout.readline())["base_url"]

@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing import games
-from khala.playing.hosting import game_of, host_match
-from khala.testing import replay_host
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.errors import GameError
@@ -23,6 +20,9 @@ from khala_protocol.errors import RecordingError
 from khala_protocol.messages import Run
 from khala_protocol.recording import Recording
 from khala_protocol.trust import trust
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import game_of, host_match
+from khala_sc2.testing import replay_host
 
 if TYPE_CHECKING:
     from khala_bridge.state import Snapshot

@@ -6,8 +6,8 @@ import pytest
 import typer.main
 from typer.core import TyperGroup
 
-from khala.cli import app
-from khala.commands.help import Commands
+from khala_sc2.cli import app
+from khala_sc2.commands.help import Commands
 
 
 @pytest.mark.parametrize("columns", ["60", "80", "200"])

@@ -88,11 +88,11 @@ def test_an_error_of_the_model_ends_the_sample(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_every_task_of_the_catalogue_is_one_of_inspect() -> None:
-    from khala.inspect.tasks import TASKS
+    from khala_sc2.inspect.tasks import TASKS
 
     assert list(TASKS) == [config.name for config in all_tasks()]
     made = TASKS["pvz_task6_level1"](seeds=2, images="none")
-    assert (made.name, [sample.id for sample in made.dataset]) == ("khala/pvz_task6_level1", ["seed 1", "seed 2"])
+    assert (made.name, [sample.id for sample in made.dataset]) == ("khala_sc2/pvz_task6_level1", ["seed 1", "seed 2"])
     assert made.dataset[1].metadata == {
         "khala_match": {
             "task": "pvz_task6_level1", "seed": 2, "images": "none", "max_steps": None, "rule": None, "executor": None,
@@ -124,7 +124,7 @@ async def score_of(scorer: Scorer, result: Result | None) -> Score:
 
 
 async def test_scores_are_those_of_the_result() -> None:
-    from khala.inspect.scores import legality, value, win
+    from khala_sc2.inspect.scores import legality, value, win
 
     assert (await score_of(win(), result_with())).value == "C"
     assert (await score_of(win(), result_with(outcome="draw"))).value == "I"
@@ -135,7 +135,7 @@ async def test_scores_are_those_of_the_result() -> None:
 
 
 async def test_an_episode_that_says_nothing_of_its_agents_is_not_scored() -> None:
-    from khala.inspect.scores import win
+    from khala_sc2.inspect.scores import win
 
     failed = await score_of(win(), result_with(valid=False, invalid_because="an agent was away"))
     assert math.isnan(failed.as_float())
@@ -152,7 +152,7 @@ def over(metric: object, *values: dict[str, float]) -> float:
 
 
 def test_ratios_are_of_sums_over_all_samples() -> None:
-    from khala.inspect.scores import kd, legal
+    from khala_sc2.inspect.scores import kd, legal
 
     assert over(kd(), {"killed": 500, "lost": 200}, {"killed": 100, "lost": 0}) == 3.0
     assert over(kd(), {"killed": 1, "lost": 0}) == math.inf
@@ -163,7 +163,7 @@ def test_ratios_are_of_sums_over_all_samples() -> None:
 def test_a_message_has_its_pictures_before_its_text() -> None:
     from inspect_ai.model import ContentImage, ContentText
 
-    from khala.inspect.model import message_of
+    from khala_sc2.inspect.model import message_of
 
     ref = ImageRef(name="s", media_type="image/png", sha256="x", title="Screen", width=1, height=1, bytes=3)
     shown = message_of(ChatMessage(role="user", content="Game", images=(ref,)), {"x": b"png"})
@@ -176,7 +176,7 @@ def test_a_message_has_its_pictures_before_its_text() -> None:
 def test_a_model_that_says_nothing_of_its_usage_has_unknown_usage() -> None:
     from inspect_ai.model import ModelUsage
 
-    from khala.inspect.model import usage_of
+    from khala_sc2.inspect.model import usage_of
 
     known = Usage(requests=1, prompt_tokens=100, completion_tokens=10, cached_tokens=60)
     assert usage_of(None) == Usage(requests=1, unknown_requests=1)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import worker
-from khala.playing.jobs import Ended, Job, MatchWorker
-from khala.playing.minds import Minds
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import KhalaError
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing import worker
+from khala_sc2.playing.jobs import Ended, Job, MatchWorker
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

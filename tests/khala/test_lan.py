@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import portpicker
 import pytest
 
-from khala.playing import games
-from khala.playing.hosting import game_of
 from khala_bridge.errors import GameError
 from khala_orchestrator.config import MatchConfig, change, load_task
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import game_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing.local_bus import LOOPBACK, local_endpoint
 from khala_protocol.bus.config import BusConfig
 from khala_protocol.bus.zenoh import open_bus, probe
+from khala_sc2.playing.local_bus import LOOPBACK, local_endpoint
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

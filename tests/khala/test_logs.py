@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import logging
 
-from khala.playing import logs
+from khala_sc2.playing import logs
 
 
 def test_a_log_line_is_json_with_run_agent_and_step() -> None:
     error = ValueError("broken")
     about = (type(error), error, None)
-    record = logging.LogRecord("khala.service", logging.WARNING, "", 1, "late: %s", ("so\nlong",), about)
+    record = logging.LogRecord("khala_sc2.service", logging.WARNING, "", 1, "late: %s", ("so\nlong",), about)
     record.agent, record.step = "blue/Stalkers", 3
     logs.here["run"] = "first"
     try:

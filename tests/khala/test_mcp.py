@@ -19,17 +19,17 @@ import typer
 from mcp import Client, MCPError, StdioServerParameters
 from mcp.types import BlobResourceContents, CallToolResult, ImageContent, TextContent, TextResourceContents
 
-from khala.mcp.serve import over_http
-from khala.mcp.server import server_of
-from khala.mcp.table import Table, TableLook, with_messages
-from khala.mcp.words import page
-from khala.playing.minds import Minds
-from khala.playing.seats import Seat, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol import speech
 from khala_protocol.messages import Message, Observation, Reply, Result
 from khala_protocol.recording import Recording
+from khala_sc2.mcp.serve import over_http
+from khala_sc2.mcp.server import server_of
+from khala_sc2.mcp.table import Table, TableLook, with_messages
+from khala_sc2.mcp.words import page
+from khala_sc2.playing.minds import Minds
+from khala_sc2.playing.seats import Seat, without_time_limit
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Iterator
@@ -180,7 +180,7 @@ async def test_a_player_that_was_too_slow_must_look_before_it_answers() -> None:
 
 
 def server_command(tmp_path: Path, *options: str) -> list[str]:
-    return [sys.executable, "-m", "khala", "mcp", "2s3z_pair", "--max-steps", "2", "--out", str(tmp_path), *options]
+    return [sys.executable, "-m", "khala_sc2", "mcp", "2s3z_pair", "--max-steps", "2", "--out", str(tmp_path), *options]
 
 
 def result_in(tmp_path: Path) -> Result:

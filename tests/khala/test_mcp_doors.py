@@ -13,18 +13,18 @@ import pytest
 import typer
 from mcp import Client
 
-from khala.mcp import holder as holding
-from khala.mcp.holder import HELD_S, Holder, Taken
-from khala.mcp.serve import TOKENS, over_http
-from khala.mcp.server import client_of
-from khala.mcp.table import MOST_MESSAGES
 from khala_protocol.errors import ConfigError
+from khala_sc2.mcp import holder as holding
+from khala_sc2.mcp.holder import HELD_S, Holder, Taken
+from khala_sc2.mcp.serve import TOKENS, over_http
+from khala_sc2.mcp.server import client_of
+from khala_sc2.mcp.table import MOST_MESSAGES
 from tests.khala.test_mcp import STALKERS, ZEALOTS, game, refusal, said, table
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from khala.mcp.table import Table
+    from khala_sc2.mcp.table import Table
 
 LONG_S = 3600  # a busy machine is slow
 TAKEN = f"another client plays blue/Stalkers: end it, or come back when it has done nothing for {HELD_S:.0f} s"
@@ -175,7 +175,7 @@ async def test_a_token_of_the_environment_stays_and_must_not_be_guessed(
 
 @game
 async def test_long_answers_and_messages_without_end_are_refused() -> None:
-    from khala.mcp.server import server_of
+    from khala_sc2.mcp.server import server_of
 
     match = table(STALKERS, max_steps=2)
     async with match, Client(server_of(match, STALKERS)) as client:

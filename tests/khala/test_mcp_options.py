@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.mcp.commands import WantedSeats, run_mcp, table_of
-from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError
+from khala_sc2.mcp.commands import WantedSeats, run_mcp, table_of
+from khala_sc2.playing.seats import Seat
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,6 +53,6 @@ def test_a_taken_port_is_said(tmp_path: Path) -> None:
 
 
 def test_without_the_sdk_the_command_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala.mcp.serve", None)
-    with pytest.raises(ConfigError, match=r"pip install 'khala\[mcp\]'$"):
+    monkeypatch.setitem(sys.modules, "khala_sc2.mcp.serve", None)
+    with pytest.raises(ConfigError, match=r"pip install 'khala-sc2\[mcp\]'$"):
         run_mcp(wanted(tmp_path))

@@ -8,11 +8,6 @@ from typing import TYPE_CHECKING
 import pytest
 import typer
 
-from khala.commands.host import reasons_not_valid, until_interrupted, win_rates, without_orders
-from khala.commands.run_options import MindOptions
-from khala.playing.local import _shares_of, spent_before
-from khala.playing.minds import Minds, minds_of, named_sides
-from khala.playing.spending import spent_usd
 from khala_agents.llm.money import MoneyLedger, SharedBudget
 from khala_agents.llm_policy import LLMPolicy
 from khala_orchestrator.config import MatchConfig, load_task
@@ -22,6 +17,11 @@ from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.commands.host import reasons_not_valid, until_interrupted, win_rates, without_orders
+from khala_sc2.commands.run_options import MindOptions
+from khala_sc2.playing.local import _shares_of, spent_before
+from khala_sc2.playing.minds import Minds, minds_of, named_sides
+from khala_sc2.playing.spending import spent_usd
 
 if TYPE_CHECKING:
     from pathlib import Path

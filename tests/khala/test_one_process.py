@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import one_process
-from khala.playing.minds import Minds
 from khala_bridge.game.processes import IdleGames
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import Observation
 from khala_protocol.recording import Recording
+from khala_sc2.playing import one_process
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from khala.playing.hosting import game_of
 from khala_agents.policy import Policy
 from khala_agents.worker import run_worker
 from khala_bridge.task.images import ImageSpec
@@ -20,6 +19,7 @@ from khala_orchestrator.past.replay import replay
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.messages import Observation
 from khala_protocol.recording import Recording
+from khala_sc2.playing.hosting import game_of
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:

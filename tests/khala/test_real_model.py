@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import one_process
-from khala.playing.minds import Minds
 from khala_agents.build import client_for
 from khala_agents.config import load_model
 from khala_agents.llm.client import Request, RequestRefused
@@ -24,6 +22,8 @@ from khala_agents.llm.window import context_in, told_context
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.messages import ChatMessage, ModelCall, Observation, Reply, Usage
 from khala_protocol.recording import Recording
+from khala_sc2.playing import one_process
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing.matches import new
+from khala_sc2.playing.matches import new
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import typer
 
-from khala.cli import app
-from khala.commands.run_options import MatchOptions
-from khala.playing.matches import new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.recording import Recorder
+from khala_sc2.cli import app
+from khala_sc2.commands.run_options import MatchOptions
+from khala_sc2.playing.matches import new, new_or_resumed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +87,7 @@ def test_options_that_say_something_else_are_refused_by_name(out: Path, given: d
 
 
 def test_a_service_goes_on_with_a_match_as_it_was_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("khala.service.commands.ask", lambda *_: pytest.fail("nothing should be asked"))
+    monkeypatch.setattr("khala_sc2.service.commands.ask", lambda *_: pytest.fail("nothing should be asked"))
     with pytest.raises(ConfigError, match=r"leave out the task 2s3z, --seed 3, or begin a new one"):
         app(["submit", "2s3z", "--resume", "lost", "--run", "lost", "--seed", "3"], standalone_mode=False)
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing.matches import new, new_or_resumed
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
@@ -15,6 +14,7 @@ from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recorder
+from khala_sc2.playing.matches import new, new_or_resumed
 
 if TYPE_CHECKING:
     from collections.abc import Callable

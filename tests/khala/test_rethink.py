@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.dataset.rows import Rows
 from khala_agents.build import Workshop
 from khala_agents.config import WorkerSpec
 from khala_agents.scripted.endpoint import NONSENSE, Behaviour, Endpoint
@@ -23,6 +22,7 @@ from khala_orchestrator.host import host
 from khala_protocol.bus.memory import MemoryBroker
 from khala_protocol.messages import Observation, Reply, Report, Usage
 from khala_protocol.recording import Recording
+from khala_sc2.dataset.rows import Rows
 from khala_simulator.process.install import install
 from tests.khala.view.made import opened
 

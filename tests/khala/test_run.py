@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import typer
 
-from khala.commands.exit_codes import SIGNALLED
-from khala.commands.run import WantedRun, _game_for, run
-from khala.commands.run_options import MindOptions
+from khala_sc2.commands.exit_codes import SIGNALLED
+from khala_sc2.commands.run import WantedRun, _game_for, run
+from khala_sc2.commands.run_options import MindOptions
 
 
 def wanted(task: str | None, **match: Any) -> WantedRun:
@@ -28,7 +28,7 @@ def test_a_signal_before_the_match_is_known_ends_it_in_order(
         os.kill(os.getpid(), signal.SIGTERM)
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("khala.commands.run._play", imports)
+    monkeypatch.setattr("khala_sc2.commands.run._play", imports)
     with pytest.raises(typer.Exit) as ended:
         run(wanted("2s3z"), as_json=False)
     assert ended.value.exit_code == SIGNALLED + signal.SIGTERM

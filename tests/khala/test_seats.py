@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.playing import one_process
-from khala.playing.minds import Minds
-from khala.playing.seats import NotAsked, Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Observation, Reply, Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing import one_process
+from khala_sc2.playing.minds import Minds
+from khala_sc2.playing.seats import NotAsked, Seat, SeatedMatch, SeatsTurn, seats_of, without_time_limit
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing.spending import ledger_of, paid_usd
 from khala_protocol.errors import ConfigError
+from khala_sc2.playing.spending import ledger_of, paid_usd
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.cli import main
-from khala.commands.trial import FormTrial, ModelTrial, WantedTrial, print_trial, try_model
 from khala_agents.scripted.canned import Canned, completion, refusal
+from khala_sc2.cli import main
+from khala_sc2.commands.trial import FormTrial, ModelTrial, WantedTrial, print_trial, try_model
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing.hosting import MAX_RESTARTS, host_match
 from khala_bridge.errors import GameError, GameMissing
 from khala_orchestrator.past.resume import RESUMED
 from khala_protocol.messages import Observation, Report
 from khala_protocol.recording import Recording
+from khala_sc2.playing.hosting import MAX_RESTARTS, host_match
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
@@ -101,7 +101,7 @@ def stable(
     async def make(*calls: int, **how: Any) -> Stable:
         games = [await start(Mortal(still_game(), number, **how)) for number in calls]
         stable = Stable(hall, games)
-        monkeypatch.setattr("khala.playing.hosting.game_of", stable.next_game)
+        monkeypatch.setattr("khala_sc2.playing.hosting.game_of", stable.next_game)
         return stable
 
     return make

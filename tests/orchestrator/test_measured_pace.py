@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from khala.cli import app
 from khala_orchestrator.past.measured_pace import least_squares, measured_paces, yaml
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key
 from khala_protocol.messages import ModelCall, Pace, Usage
 from khala_protocol.recording import Recorder
+from khala_sc2.cli import app
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

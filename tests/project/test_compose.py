@@ -16,9 +16,9 @@ import yaml
 from check_jsonschema import main as check_jsonschema  # type: ignore[import-untyped]  # it is no library
 from click.testing import CliRunner
 
-from khala.cli import app
 from khala_agents.config import load_model, model_files
 from khala_orchestrator.config import load_task
+from khala_sc2.cli import app
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -333,7 +333,7 @@ def test_the_images_hold_what_the_lock_file_says_and_no_more() -> None:
     syncs = [run for run in instructions("RUN") if "uv sync" in run]
     assert len(syncs) == 2
     assert all("--frozen --no-dev --no-editable" in run for run in syncs)
-    assert "--package khala-agents" in syncs[0]
+    assert "--package khala-sc2-agents" in syncs[0]
     assert instructions("FROM")[-2:] == ["base AS agents", "base AS khala"]  # the last one is built by default
 
 
@@ -345,7 +345,7 @@ def test_the_simulator_is_where_the_host_looks_for_it(environment: Callable[[str
 
 def test_the_build_sees_the_packages_and_nothing_else() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    packages = ["khala", *project["tool"]["uv"]["workspace"]["members"]]
+    packages = ["khala_sc2", *project["tool"]["uv"]["workspace"]["members"]]
     rules = [line for line in (ROOT / ".dockerignore").read_text().splitlines() if not line.startswith("#")]
     assert rules[0] == "*"
     needed = {f"{package}/" for package in packages} | {"LICENSE", "README.md", "pyproject.toml", "uv.lock"}

@@ -15,8 +15,8 @@ import yaml
 from check_jsonschema import main as check_jsonschema  # type: ignore[import-untyped]  # it is no library
 from click.testing import CliRunner
 
-from khala.cli import app
-from khala.experiment.engine import MATCH_MB
+from khala_sc2.cli import app
+from khala_sc2.experiment.engine import MATCH_MB
 
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST, SCRIPT = ROOT / "docs" / "deploy" / "kuberay.yaml", ROOT / "docs" / "deploy" / "slurm.sh"

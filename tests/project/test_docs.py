@@ -27,8 +27,6 @@ from docs import generate
 from docs.generate import PAGES, REFERENCE, main, outdated, write
 from docs.pages.markdown import anchor, cell, table
 from docs.pages.schema import attributes
-from khala import testing
-from khala.cli import app
 from khala_agents.config import AgentsFile, ModelConfig
 from khala_agents.policy import Context, Policy, as_policy
 from khala_bridge.catalogue import catalogue
@@ -40,6 +38,8 @@ from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Briefing
 from khala_protocol.recording import Recording
+from khala_sc2 import testing
+from khala_sc2.cli import app
 from khala_simulator.maps.map_file import read_map
 from khala_simulator.tick import advance, new_game
 
@@ -162,7 +162,7 @@ async def check_policy(policy: Policy, scene: tuple[Briefing, Observation]) -> N
 
 
 def double(fixture: str) -> Callable[..., Any]:
-    """Return a fixture of `khala.pytest_plugin` that finds no difference, if it is called as the real one may be."""
+    """Return a fixture of `khala_sc2.pytest_plugin` that finds no difference, if it is called as the real one may be."""
     real = inspect.signature(getattr(testing, fixture))
 
     async def find_none(*args: Any, **kwargs: Any) -> list[object]:

@@ -13,7 +13,7 @@ import yaml
 from openenv.cli.__main__ import app as openenv
 from typer.testing import CliRunner
 
-from khala.cli import app
+from khala_sc2.cli import app
 
 HERE = Path(__file__).resolve().parents[2] / "envs" / "khala_env"
 MANIFEST: dict[str, Any] = yaml.safe_load((HERE / "openenv.yaml").read_text())

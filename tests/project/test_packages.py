@@ -70,9 +70,9 @@ def run(*command: object, cwd: Path | None = None, **environ: str) -> str:
 
 
 def test_an_agent_is_installed_without_a_game_and_plays(wheels: Path, tmp_path: Path) -> None:
-    alone = Environment(tmp_path / "env", wheels, "khala-agents")
+    alone = Environment(tmp_path / "env", wheels, "khala-sc2-agents")
     assert not alone.names() & GAME_PARTS
-    host = [sys.executable, "-m", "khala", "host", "2s3z", "--run", "alone", "--max-steps", "3", "--json"]
+    host = [sys.executable, "-m", "khala_sc2", "host", "2s3z", "--run", "alone", "--max-steps", "3", "--json"]
     socket = f"unixsock-stream/{tmp_path / 'bus'}"
     with subprocess.Popen(
         [*host, "--listen", socket], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -86,7 +86,7 @@ def test_an_agent_is_installed_without_a_game_and_plays(wheels: Path, tmp_path: 
 
 
 def test_khala_and_the_openai_agents_sdk_share_an_environment(wheels: Path, tmp_path: Path) -> None:
-    both = Environment(tmp_path / "env", wheels, "khala", "openai-agents")
+    both = Environment(tmp_path / "env", wheels, "khala-sc2", "openai-agents")
     (tmp_path / "both.py").write_text(BOTH_IMPORTS)
     options = ("--policy", "both:decide", "--max-steps", "3", "--json")
     printed = both.run("khala", "run", "2s3z", *options, cwd=tmp_path, KHALA_CACHE=str(tmp_path / "cache"))
@@ -95,8 +95,8 @@ def test_khala_and_the_openai_agents_sdk_share_an_environment(wheels: Path, tmp_
 
 
 def test_python_sc2_plays_on_the_simulator_alone(wheels: Path, tmp_path: Path) -> None:
-    game = Environment(tmp_path / "env", wheels, "khala-simulator", "burnysc2")
-    assert not {name for name in game.names() if name.startswith("khala")} - {"khala-simulator"}
+    game = Environment(tmp_path / "env", wheels, "khala-sc2-simulator", "burnysc2")
+    assert not {name for name in game.names() if name.startswith("khala")} - {"khala-sc2-simulator"}
     game.run("khala-sc2", "install", tmp_path / "sc2", cwd=tmp_path)
     game.run("python", BOTS, "combat", tmp_path / "seen.json", cwd=tmp_path, SC2PATH=str(tmp_path / "sc2"))
     assert json.loads((tmp_path / "seen.json").read_text())["killed"] > 0

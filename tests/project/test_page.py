@@ -12,7 +12,7 @@ from page.typescript import TYPES, typescript
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "page"
-BUILT = ROOT / "khala" / "view" / "assets" / "index.html"
+BUILT = ROOT / "khala_sc2" / "view" / "assets" / "index.html"
 MOST_BYTES = 250_000
 
 
@@ -45,4 +45,6 @@ def test_the_committed_page_is_built_from_its_source(tmp_path: Path) -> None:
     shutil.copytree(SOURCE, source, ignore=shutil.ignore_patterns("node_modules"))
     for command in (["ci", "--no-audit", "--no-fund"], ["run", "types"], ["test"], ["run", "build"]):
         subprocess.run([npm, *command], cwd=source, check=True, capture_output=True)
-    assert (tmp_path / "khala" / "view" / "assets" / "index.html").read_bytes() == BUILT.read_bytes(), "run `make page`"
+    assert (tmp_path / "khala_sc2" / "view" / "assets" / "index.html").read_bytes() == BUILT.read_bytes(), (
+        "run `make page`"
+    )

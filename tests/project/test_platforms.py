@@ -8,7 +8,7 @@ import mypy
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("khala", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator/khala_simulator")
+PACKAGES = ("khala_sc2", "agents", "bridge", "configs", "orchestrator", "protocol", "simulator/khala_simulator")
 PLACES = {"protocol/khala_protocol/platforms.py"}
 STUBS = Path(mypy.__file__).with_name("typeshed") / "stdlib"
 STUB_OF = {"os": "os/__init__.pyi", "signal": "signal.pyi", "socket": "socket.pyi", "asyncio": "asyncio/streams.pyi"}

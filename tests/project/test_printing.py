@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("agents/khala_agents", "bridge/khala_bridge", "orchestrator/khala_orchestrator",
-            "protocol/khala_protocol", "simulator/khala_simulator", "khala", "envs")  # fmt: skip
+            "protocol/khala_protocol", "simulator/khala_simulator", "khala_sc2", "envs")  # fmt: skip
 WRITERS = {"typer.echo", "typer.secho", "click.echo", "print", "sys.stdout.write", "sys.stderr.write", "rich.print"}
 HINT = re.compile(r"echo\(|\bprint\(|std(out|err)\.write|Console\(|from_markup|TextColumn|rich\.markup")
 PLACES = {
-    "khala/commands/front_page.py": "draws `khala --help`, whose texts are our own",
+    "khala_sc2/commands/front_page.py": "draws `khala --help`, whose texts are our own",
     "simulator/khala_simulator/cli.py": "stands alone, and has a `_say` of its own",
     "simulator/khala_simulator/process/lan.py": "stands alone, and prints one sentence in ASCII",
 }

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("agents/khala_agents", "bridge/khala_bridge", "orchestrator/khala_orchestrator",
-            "protocol/khala_protocol", "khala", "envs")  # fmt: skip
+            "protocol/khala_protocol", "khala_sc2", "envs")  # fmt: skip
 PLACES = {
     "protocol/khala_protocol/files.py": "the place",
     "protocol/khala_protocol/certificates.py": "makes its files with their modes",
     "protocol/khala_protocol/recording/recorder.py": "never writes over a file, and makes it with its mode",
     "agents/khala_agents/commands.py": "the address of an endpoint, which other users may read",
     "bridge/khala_bridge/catalogue/functions.py": "a file of this repository",
-    "khala/knowledge/files.py": "files of this repository",
-    "khala/experiment/ray_engine.py": "writes to a URL, and makes a file of this machine with its mode",
+    "khala_sc2/knowledge/files.py": "files of this repository",
+    "khala_sc2/experiment/ray_engine.py": "writes to a URL, and makes a file of this machine with its mode",
 }
 HINT = re.compile(r"\.write_(text|bytes)\(|\bopen\(|mkdir\(|copyfile|copytree")
 

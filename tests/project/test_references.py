@@ -23,8 +23,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("agents", "bench", "bridge", "configs", "docs", "khala", "orchestrator", "protocol", "simulator", "tests")
-PACKAGES = ("khala", *(f"khala_{folder}" for folder in FOLDERS if (ROOT / folder / f"khala_{folder}").is_dir()))
+FOLDERS = (
+    "agents",
+    "bench",
+    "bridge",
+    "configs",
+    "docs",
+    "khala_sc2",
+    "orchestrator",
+    "protocol",
+    "simulator",
+    "tests",
+)
+PACKAGES = ("khala_sc2", *(f"khala_{folder}" for folder in FOLDERS if (ROOT / folder / f"khala_{folder}").is_dir()))
 HIDDEN = {"__pycache__", "build", "dist"}
 
 NAME = re.compile(rf"(?<![\w./-])(?:{'|'.join(PACKAGES)})(?:\.[A-Za-z_]\w*)+(?![\w/-])")
@@ -34,7 +45,7 @@ FILE = re.compile(r"`([\w*<>-][\w.*<>/-]*\.(?:py|md|yaml|toml|json|tsv))`")
 MODULE = re.compile(r"(?<![\w./<>*-])\w[\w/]*\.py\b")
 
 # What looks like ours and is not: keys of the bus, files that a reader or a command writes, files of the game.
-KEY = re.compile(r"khala/(?:<run>|first|first2|duel)(?:/|$)|khala/service/(?:order/|matches$)")
+KEY = re.compile(r"khala/(?:<run>|first|first2|duel)(?:/|$)|khala_sc2/service/(?:order/|matches$)")
 FOREIGN = {
     "kite.yaml": "a reader of the tutorial writes it",
     "my_model.yaml": "a reader writes it",
@@ -131,7 +142,7 @@ def exists(path: str, mentioned_in: Path) -> bool:
 @functools.cache
 def evaluated() -> frozenset[str]:
     """What inspect_ai calls our tasks and their solver."""
-    return frozenset(f"khala/{name}" for name in ("team", *(config.name for config in all_tasks())))
+    return frozenset(f"khala_sc2/{name}" for name in ("team", *(config.name for config in all_tasks())))
 
 
 @functools.cache

@@ -91,7 +91,7 @@ def _usable(url: str, source: str) -> Proxy:
         raise ConfigError(f"a proxy of the kind {parts.scheme!r} cannot be used: {', '.join(_KINDS)}", source=variable)
     if parts.scheme in _SOCKS and importlib.util.find_spec("socksio") is None:
         raise ConfigError(
-            "a SOCKS proxy needs a package that is not installed: `pip install 'khala[socks]'`", source=variable
+            "a SOCKS proxy needs a package that is not installed: `pip install 'khala-sc2[socks]'`", source=variable
         )
     return Proxy(url, source)
 

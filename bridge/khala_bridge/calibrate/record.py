@@ -1,6 +1,6 @@
 """The file of one calibration: which game was measured, and what each probe found.
 
-One JSON object; `khala.calibrate.compare` compares two. Above: `run`.
+One JSON object; `khala_sc2.calibrate.compare` compares two. Above: `run`.
 """
 
 from __future__ import annotations

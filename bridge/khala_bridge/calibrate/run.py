@@ -1,6 +1,6 @@
 """Play probes one after another in one process of the game, and keep what each found.
 
-A probe that fails is written down with the reason, and the next one begins in a new game. Above: `khala.calibrate`.
+A probe that fails is written down with the reason, and the next one begins in a new game. Above: `khala_sc2.calibrate`.
 """
 
 from __future__ import annotations

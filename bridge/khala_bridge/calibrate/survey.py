@@ -1,6 +1,6 @@
 """Look at an install: does its game start, which maps does it load, does it draw.
 
-Above: `khala.commands.doctor`. Below: `connection`.
+Above: `khala_sc2.commands.doctor`. Below: `connection`.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ import os
 
 import uvicorn
 
-from khala.openenv.server import OPENENV_OPEN, app_of, openenv_door, server_config
 from khala_protocol.listening import bind
+from khala_sc2.openenv.server import OPENENV_OPEN, app_of, openenv_door, server_config
 
 app = app_of(door=openenv_door(is_open=os.environ.get(OPENENV_OPEN, "") not in {"", "0", "false"}))
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig, TaskConfig
     from khala_orchestrator.config import MatchConfig
 
-_PACKAGES = ("khala", "pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
+_PACKAGES = ("pysc2", "eclipse-zenoh", "pydantic", "protobuf", "numpy")
 
 
 def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episodes: int = 1) -> Briefing:
@@ -75,4 +75,5 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
 
 def versions() -> dict[str, str]:
     """Return the versions of what plays, here and now."""
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _PACKAGES}
+    ours = {"python": platform.python_version(), "khala": importlib.metadata.version("khala-sc2")}
+    return ours | {name: importlib.metadata.version(name) for name in _PACKAGES}

@@ -13,7 +13,7 @@ import psutil
 from khala_protocol.platforms import cores
 
 PACKAGES = (
-    "khala", "khala_agents", "khala_bridge", "khala_configs", "khala_orchestrator", "khala_protocol", "khala_simulator",
+    "khala_sc2", "khala_agents", "khala_bridge", "khala_configs", "khala_orchestrator", "khala_protocol", "khala_simulator",
 )  # fmt: skip
 
 SUFFIXES = frozenset({".py", ".pxd", ".pyx"})

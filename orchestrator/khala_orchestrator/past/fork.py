@@ -5,7 +5,7 @@ as the recording of a match of its own, and `khala_orchestrator.past.resume` pla
 and asks live agents from there on. So a fork's recording is a whole one, which is replayed and forked like any other.
 Advice is added to the copy, in the step before: agents find it in the first observation that they decide on.
 
-Above it: `khala.fork`.
+Above it: `khala_sc2.fork`.
 """
 
 from __future__ import annotations

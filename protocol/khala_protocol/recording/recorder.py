@@ -174,6 +174,6 @@ def _versions() -> dict[str, str]:
 
 def _khala_version() -> str:
     try:
-        return version("khala")
+        return version("khala-sc2")
     except PackageNotFoundError:  # run from a checkout that is not installed
         return "unknown"

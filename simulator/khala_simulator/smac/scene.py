@@ -4,7 +4,7 @@ Every number is computed from the same values in the same order of operations as
 to the 32 bits of an observation or a state. Results go into arrays of the caller, whose memory must be contiguous.
 
 The parts of an observation, in this order: the four moves; the surroundings; each enemy; each ally; the agent itself;
-the time. Above: `khala.env.numeric`. Below: `fighters`, `board`.
+the time. Above: `khala_sc2.env.numeric`. Below: `fighters`, `board`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class SceneLayout(NamedTuple):
-    """What observations and states of a battle consist of; see `khala.env.numeric.options` for each."""
+    """What observations and states of a battle consist of; see `khala_sc2.env.numeric.options` for each."""
 
     actions: int
     """How many an agent has."""

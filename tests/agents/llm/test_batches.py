@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.playing.minds import Minds
 from khala_agents.answers.form import AnswerShape
 from khala_agents.batch_policy import BatchPolicy
 from khala_agents.build import Workshop, client_for
@@ -23,6 +22,7 @@ from khala_agents.policy import Context
 from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ChatMessage, Clock
+from khala_sc2.playing.minds import Minds
 
 if TYPE_CHECKING:
     from collections.abc import Callable

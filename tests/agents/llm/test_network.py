@@ -123,7 +123,7 @@ def test_a_socks_proxy_without_its_package_says_what_to_install(monkeypatch: pyt
     with pytest.raises(ConfigError) as caught:
         proxy_for("https://model.example/v1")
     assert str(caught.value) == (
-        "HTTPS_PROXY: a SOCKS proxy needs a package that is not installed: `pip install 'khala[socks]'`"
+        "HTTPS_PROXY: a SOCKS proxy needs a package that is not installed: `pip install 'khala-sc2[socks]'`"
     )
 
 

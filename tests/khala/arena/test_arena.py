@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from khala.arena import commands
-from khala.arena.matches import plan_round, tasks_of
-from khala.arena.pairing import pair_swiss
-from khala.arena.ratings import distinct_games, rate
-from khala.arena.results import RESULTS, ArenaGame, ArenaResults, PoolPlayer, pool_results, write_results
-from khala.arena.spec import Arena
-from khala.cli import main
 from khala_protocol.errors import ConfigError
+from khala_sc2.arena import commands
+from khala_sc2.arena.matches import plan_round, tasks_of
+from khala_sc2.arena.pairing import pair_swiss
+from khala_sc2.arena.ratings import distinct_games, rate
+from khala_sc2.arena.results import RESULTS, ArenaGame, ArenaResults, PoolPlayer, pool_results, write_results
+from khala_sc2.arena.spec import Arena
+from khala_sc2.cli import main
 from tests.khala.experiment.made import MadeEngine
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.playing.jobs import Job
+    from khala_sc2.playing.jobs import Job
 
 MODELS = [{"name": name, "model": name} for name in ("skilled", "focus-fire", "silent")]
 GROUPS = {"duels": ["duel_3m"], "battles": ["2s3z"], "full games": ["simple64_eceb_terran"]}

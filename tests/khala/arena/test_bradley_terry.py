@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from khala.arena.bradley_terry import RatedGame, fit_strengths
+from khala_sc2.arena.bradley_terry import RatedGame, fit_strengths
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

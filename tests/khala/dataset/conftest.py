@@ -7,10 +7,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.dataset.card import Recipe
-from khala.dataset.export import export
-from khala.playing import games
-from khala.playing.hosting import host_match
 from khala_agents.build import Workshop, load_policy
 from khala_agents.config import WorkerSpec
 from khala_agents.scripted.endpoint import Endpoint
@@ -21,6 +17,10 @@ from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key
 from khala_protocol.messages import ModelCall
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.export import export
+from khala_sc2.playing import games
+from khala_sc2.playing.hosting import host_match
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.dataset.card import Recipe
-from khala.dataset.export import export
-from khala.dataset.files import RowForm
-from khala.dataset.replay import FromDataset, replies_of
 from khala_agents.build import load_policy
 from khala_agents.policy import Context, Decision
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Briefing, Observation, Reply
 from khala_protocol.trust import trust_named
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.export import export
+from khala_sc2.dataset.files import RowForm
+from khala_sc2.dataset.replay import FromDataset, replies_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Mapping
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.game
 
-NAME = "khala.dataset.replay:FromDataset"
+NAME = "khala_sc2.dataset.replay:FromDataset"
 
 
 def both() -> dict[str, Policy]:
@@ -69,7 +69,7 @@ async def test_a_match_from_a_data_set_ends_as_the_recorded_one(
 ) -> None:
     monkeypatch.setenv("KHALA_DATASET", str(data_set / form))
     again = await play_again("again", both())
-    assert not [record for record in caplog.records if record.name == "khala.dataset.replay"]
+    assert not [record for record in caplog.records if record.name == "khala_sc2.dataset.replay"]
     check_same(again, recording)
 
 
@@ -112,7 +112,7 @@ async def test_another_game_than_the_recorded_one_is_noticed_once(
     first, *others = recording.observations("Stalkers")
     for observation in (first, *(one.but(text="Nothing.") for one in others)):
         await policy.decide(Context(briefing, observation))
-    (warning,) = [record.getMessage() for record in caplog.records if record.name == "khala.dataset.replay"]
+    (warning,) = [record.getMessage() for record in caplog.records if record.name == "khala_sc2.dataset.replay"]
     assert warning.startswith("agent Stalkers: from episode 0, step 1 on its prompts are not those of the data set")
 
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.cli import main
-from khala.dataset.card import Recipe
-from khala.dataset.choose import Split
-from khala.dataset.dynamics import Transitions
-from khala.dataset.export import export
-from khala.dataset.files import RowForm
-from khala.dataset.read import read_rows
 from khala_protocol.messages import LOOPS_PER_S, Observation, Report, Run, Scene
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.cli import main
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.choose import Split
+from khala_sc2.dataset.dynamics import Transitions
+from khala_sc2.dataset.export import export
+from khala_sc2.dataset.files import RowForm
+from khala_sc2.dataset.read import read_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala.dataset.row import Row
+    from khala_sc2.dataset.row import Row
 
     Rewrite = Callable[..., Recording]
 

@@ -16,19 +16,19 @@ import pytest
 import yaml
 from PIL import Image
 
-from khala.cli import main
-from khala.dataset import forms
-from khala.dataset.card import Recipe
-from khala.dataset.choose import FILTERS, Only, RowChoice, Split
-from khala.dataset.export import export
-from khala.dataset.files import RowForm
-from khala.dataset.read import check_splits, read_rows
-from khala.dataset.repeats import prompt_digest
-from khala.dataset.rows import Rows
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Report, Result, Run
 from khala_protocol.recording import Recorder
+from khala_sc2.cli import main
+from khala_sc2.dataset import forms
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.choose import FILTERS, Only, RowChoice, Split
+from khala_sc2.dataset.export import export
+from khala_sc2.dataset.files import RowForm
+from khala_sc2.dataset.read import check_splits, read_rows
+from khala_sc2.dataset.repeats import prompt_digest
+from khala_sc2.dataset.rows import Rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -394,7 +394,7 @@ def test_without_pyarrow_the_extra_is_named(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ConfigError, match=r'pip install "khala\[data\]"'):
+    with pytest.raises(ConfigError, match=r'pip install "khala-sc2\[data\]"'):
         export([recording.path], tmp_path / "out", Recipe((RowForm.PARQUET,)))
     assert export([recording.path], tmp_path / "out", Recipe((RowForm.OPENAI,))).rows["train"]
 
@@ -435,7 +435,7 @@ def test_the_command_prints_what_it_wrote(
 def test_memory_does_not_grow_with_the_recordings(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("khala.dataset.files.ROW_GROUP_BYTES", 200_000)
+    monkeypatch.setattr("khala_sc2.dataset.files.ROW_GROUP_BYTES", 200_000)
 
     def peak(episodes: int) -> int:
         """Return the most bytes that are in use while so many episodes are exported."""

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.dataset.card import Recipe
-from khala.dataset.export import export
-from khala.dataset.files import RowForm
-from khala.dataset.lengths import ESTIMATE, Lengths, TokenCounter, token_counter
-from khala.dataset.rows import Rows
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import ChatMessage
+from khala_sc2.dataset.card import Recipe
+from khala_sc2.dataset.export import export
+from khala_sc2.dataset.files import RowForm
+from khala_sc2.dataset.lengths import ESTIMATE, Lengths, TokenCounter, token_counter
+from khala_sc2.dataset.rows import Rows
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.dataset.row import Row
     from khala_protocol.recording import Recording
+    from khala_sc2.dataset.row import Row
 
 
 @pytest.mark.game

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.dataset import rows as module
-from khala.dataset.rewards import Reward
-from khala.dataset.rows import Rows
 from khala_protocol.messages import ModelCall, Reply, Report, Result
+from khala_sc2.dataset import rows as module
+from khala_sc2.dataset.rewards import Reward
+from khala_sc2.dataset.rows import Rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from khala.dataset.row import Row
     from khala_protocol.messages import Wire
     from khala_protocol.recording import Recorded, Recording
+    from khala_sc2.dataset.row import Row
 
     Rewrite = Callable[..., Recording]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from khala.doors.asgi import Guarded
-from khala.doors.rules import Door
+from khala_sc2.doors.asgi import Guarded
+from khala_sc2.doors.rules import Door
 
 DOOR = Door(command="khala mcp", most_body_bytes=100)
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from khala.doors.brake import FORGET_S, FREE, FREE_TOGETHER, MOST_PEERS, Brake
-from khala.doors.rules import Door, RequestHead, host_of, token_of
 from khala_protocol.errors import ConfigError
+from khala_sc2.doors.brake import FORGET_S, FREE, FREE_TOGETHER, MOST_PEERS, Brake
+from khala_sc2.doors.rules import Door, RequestHead, host_of, token_of
 
 HOST = "127.0.0.1:8000"
 NEAR = Door(command="khala openenv")

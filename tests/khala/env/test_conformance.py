@@ -8,7 +8,7 @@ import gymnasium
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from khala.env import numeric
+from khala_sc2.env import numeric
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its tests import environments of its own, which warn
@@ -45,5 +45,5 @@ def test_numeric_env_passes_the_seed_test() -> None:
 
 @pytest.mark.parametrize("name", MAPS)
 def test_central_env_passes_gymnasiums_check(name: str) -> None:
-    made = gymnasium.make(f"khala.env.numeric:khala-smac/{name}-v0", render_mode="rgb_array")
+    made = gymnasium.make(f"khala_sc2.env.numeric:khala-smac/{name}-v0", render_mode="rgb_array")
     check_env(made.unwrapped)

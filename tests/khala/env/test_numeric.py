@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv
 
-from khala.env import numeric
-from khala.env.numeric import CentralEnv, StarCraft2Env, parallel_env
 from khala_protocol.errors import ConfigError
+from khala_sc2.env import numeric
+from khala_sc2.env.numeric import CentralEnv, StarCraft2Env, parallel_env
 from khala_simulator.battle import Battle
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "parallel": lambda: parallel_env("3m"),
     "aec": lambda: numeric.env("3m"),
     "central": lambda: CentralEnv("3m"),
-    "gymnasium": lambda: gymnasium.make("khala.env.numeric:khala-smac/3m-v0"),
+    "gymnasium": lambda: gymnasium.make("khala_sc2.env.numeric:khala-smac/3m-v0"),
 }
 
 

@@ -15,9 +15,9 @@ from absl import flags
 from s2clientprotocol import common_pb2, debug_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
-from khala.env.numeric import MAPS, StarCraft2Env, starcraft2
-from khala.playing import games
 from khala_bridge.compat import run_configs
+from khala_sc2.env.numeric import MAPS, StarCraft2Env, starcraft2
+from khala_sc2.playing import games
 from khala_simulator.api.game import HostedGame
 from khala_simulator.battle import ENEMY, PLAYER, Battle
 from khala_simulator.maps.game_map import load_map

@@ -13,15 +13,15 @@ import numpy as np
 import psutil
 import pytest
 
-from khala import env as words
-from khala.env.rewards import battle
-from khala.playing import one_process
-from khala.playing.minds import Minds
 from khala_agents.scripted.players import PLAYERS
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.errors import ConfigError
 from khala_protocol.messages import Casualties, Observation, Report, Result
 from khala_protocol.recording import Recording
+from khala_sc2 import env as words
+from khala_sc2.env.rewards import battle
+from khala_sc2.playing import one_process
+from khala_sc2.playing.minds import Minds
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its tests import environments of its own, which warn
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from khala.env.text import TextParallelEnv
+    from khala_sc2.env.text import TextParallelEnv
 
 game = pytest.mark.game
 

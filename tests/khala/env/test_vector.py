@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from khala.env import numeric
-from khala.env.numeric import MAPS, StarCraft2Env
-from khala.env.numeric.workers import RemoteShare, WorkerError
 from khala_protocol.errors import ConfigError
+from khala_sc2.env import numeric
+from khala_sc2.env.numeric import MAPS, StarCraft2Env
+from khala_sc2.env.numeric.workers import RemoteShare, WorkerError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from typing import TYPE_CHECKING, Any
 
-from khala.experiment.measures import Measures
-from khala.experiment.played import PlayedMatch
-from khala.experiment.store import Store
+from khala_sc2.experiment.measures import Measures
+from khala_sc2.experiment.played import PlayedMatch
+from khala_sc2.experiment.store import Store
 
 if TYPE_CHECKING:
     from pathlib import Path

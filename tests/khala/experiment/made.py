@@ -7,20 +7,20 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Self
 
-from khala.playing.jobs import Ended
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage
 from khala_protocol.recording import Recorder
+from khala_sc2.playing.jobs import Ended
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala.playing.jobs import Job
     from khala_orchestrator.config import MatchConfig
+    from khala_sc2.playing.jobs import Job
 
 
 GAME = GameIdentity("4.10", "B0", "Map.SC2Map", "0" * 64)

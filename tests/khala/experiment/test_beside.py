@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from khala.experiment.plan import cells
-from khala.experiment.published import PublishedTable, published_tables
-from khala.experiment.report import report
-from khala.experiment.spec import Experiment
-from khala.experiment.statistics import p_of_published_ratio, variation_of_ratio
 from khala_protocol.configfile import load, loads
 from khala_protocol.errors import ConfigError
+from khala_sc2.experiment.plan import cells
+from khala_sc2.experiment.published import PublishedTable, published_tables
+from khala_sc2.experiment.report import report
+from khala_sc2.experiment.spec import Experiment
+from khala_sc2.experiment.statistics import p_of_published_ratio, variation_of_ratio
 from tests.khala.experiment.handmade import HandMade
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.experiment.report.document import ReportTable
+    from khala_sc2.experiment.report.document import ReportTable
 
 FILE = """
 name: made

@@ -9,10 +9,10 @@ import pytest
 from scipy import stats  # type: ignore[import-untyped]
 from typer.testing import CliRunner
 
-from khala.cli import app
-from khala.experiment.compare import Compared, Findings, compare
-from khala.experiment.selection import select
 from khala_protocol.errors import ConfigError
+from khala_sc2.cli import app
+from khala_sc2.experiment.compare import Compared, Findings, compare
+from khala_sc2.experiment.selection import select
 from tests.khala.experiment.handmade import CARD, HandMade
 
 if TYPE_CHECKING:

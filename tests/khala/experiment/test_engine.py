@@ -14,16 +14,16 @@ import pytest
 from typer.testing import CliRunner
 
 from bench.survival import experiments
-from khala.cli import app
-from khala.commands.exit_codes import NOT_VALID
-from khala.experiment.engine import Local
-from khala.experiment.plan import plan
-from khala.experiment.spec import Experiment
-from khala.experiment.store import Store
-from khala.playing import local, one_process, worker
-from khala.playing.jobs import Job
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_protocol.recording import Recording
+from khala_sc2.cli import app
+from khala_sc2.commands.exit_codes import NOT_VALID
+from khala_sc2.experiment.engine import Local
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.spec import Experiment
+from khala_sc2.experiment.store import Store
+from khala_sc2.playing import local, one_process, worker
+from khala_sc2.playing.jobs import Job
 
 if TYPE_CHECKING:
     from pathlib import Path

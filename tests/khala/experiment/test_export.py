@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 import pytest
 from typer.testing import CliRunner
 
-from khala.cli import app
-from khala.experiment.commands import shipped_experiments
-from khala.experiment.measures import Measures
-from khala.experiment.plan import cells, plan
-from khala.experiment.spec import Experiment
 from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
+from khala_sc2.cli import app
+from khala_sc2.experiment.commands import shipped_experiments
+from khala_sc2.experiment.measures import Measures
+from khala_sc2.experiment.plan import cells, plan
+from khala_sc2.experiment.spec import Experiment
 from tests.khala.experiment.handmade import HandMade
 
 if TYPE_CHECKING:
-    from khala.experiment.plan import PlannedMatch
+    from khala_sc2.experiment.plan import PlannedMatch
 
 ROOT = Path(__file__).parents[3]
 PLANNED = {

@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala import indexes
-from khala.experiment import index as rows
-from khala.experiment.plan import plan
-from khala.experiment.runner import Runner
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import INDEX, MATCHES, Store
 from khala_protocol.errors import ConfigError
+from khala_sc2 import indexes
+from khala_sc2.experiment import index as rows
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.runner import Runner
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import INDEX, MATCHES, Store
 from tests.khala.experiment.made import MadeEngine, record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from khala.experiment.plan import PlannedMatch
+    from khala_sc2.experiment.plan import PlannedMatch
 
 FOUND = Experiment.model_validate({"name": "e", "fixed": {"model": "scripted"}, "factors": {"task": ["3s5z"]}})
 

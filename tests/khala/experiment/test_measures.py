@@ -12,10 +12,6 @@ from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 import pytest
 import pytest_asyncio
 
-from khala.experiment.measures import GROUPS, Measures, measure
-from khala.experiment.measures.communication import is_acted_on
-from khala.experiment.measures.hallucinations import KINDS, Kind
-from khala.playing.spending import spent_usd
 from khala_agents.policy import FunctionPolicy
 from khala_agents.worker import run_worker
 from khala_bridge.act.raw_executor import RawExecutor
@@ -55,6 +51,10 @@ from khala_protocol.messages import (
     Wire,
 )
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.experiment.measures import GROUPS, Measures, measure
+from khala_sc2.experiment.measures.communication import is_acted_on
+from khala_sc2.experiment.measures.hallucinations import KINDS, Kind
+from khala_sc2.playing.spending import spent_usd
 from khala_simulator.process.install import install
 
 if TYPE_CHECKING:

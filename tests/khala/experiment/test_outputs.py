@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.cli import main
-from khala.experiment.plan import plan
-from khala.experiment.played import unread
-from khala.experiment.progress import Watcher
-from khala.experiment.runner import Runner, RunnerEvent
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import MATCHES, Store
 from khala_orchestrator.console import stderr_console
+from khala_sc2.cli import main
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.played import unread
+from khala_sc2.experiment.progress import Watcher
+from khala_sc2.experiment.runner import Runner, RunnerEvent
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import MATCHES, Store
 from tests.khala.experiment.made import MadeEngine, record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from khala.experiment.plan import PlannedMatch
+    from khala_sc2.experiment.plan import PlannedMatch
 
 FILE = "name: e\nfixed: {model: scripted}\nfactors: {task: [3s5z]}\nseeds: 2\n"
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e[red][link=http://e]"

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.experiment.plan import SWAPPED, PlannedMatch, cells, check_playable, plan, task_of
-from khala.experiment.spec import Experiment, Settings
 from khala_orchestrator.config import load_task
 from khala_protocol.configfile import loads
 from khala_protocol.errors import ConfigError
 from khala_protocol.trust import trust_files
+from khala_sc2.experiment.plan import SWAPPED, PlannedMatch, cells, check_playable, plan, task_of
+from khala_sc2.experiment.spec import Experiment, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from scipy import stats as scipy_stats  # type: ignore[import-untyped]
 from statsmodels.stats.proportion import power_proportions_2indep  # type: ignore[import-untyped]
 
-from khala.experiment.power import (
+from khala_sc2.experiment.power import (
     games_for_half_width,
     games_for_power,
     games_to_separate,
     mcnemar_power,
     pairs_for_power,
 )
-from khala.experiment.statistics import wilson_bounds
+from khala_sc2.experiment.statistics import wilson_bounds
 
 
 def test_93_games_separate_50_from_70_percent_by_every_rule() -> None:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from khala.experiment.engine import MATCH_MB, Local
-from khala.experiment.plan import plan
-from khala.experiment.runner import Runner, RunnerEvent
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import Store
 from khala_agents.scripted.endpoint import Behaviour, Endpoint
 from khala_protocol.errors import ConfigError
+from khala_sc2.experiment.engine import MATCH_MB, Local
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.runner import Runner, RunnerEvent
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from aiohttp import web
 
-    from khala.experiment.engine import Engine
+    from khala_sc2.experiment.engine import Engine
 
 pytestmark = [pytest.mark.slow, pytest.mark.game, pytest.mark.filterwarnings("ignore")]  # those of Ray's own code
 
@@ -71,7 +71,7 @@ def node(cluster: Any, *, cores: int) -> Any:
 
 
 def ray(cluster: Any, **options: Any) -> Any:
-    from khala.experiment.ray_engine import Ray
+    from khala_sc2.experiment.ray_engine import Ray
 
     return Ray(options.pop("slots", None), game="simulator", address=cluster.address, **options)
 
@@ -167,7 +167,7 @@ async def test_ctrl_c_ends_ray_on_this_machine_and_keeps_what_was_played(tmp_pat
     file.write_text(yaml.safe_dump({"name": "many", "fixed": fixed, "factors": {"task": ["2s3z_pair"]}, "seeds": 1000}))
     words = ("experiment", "run", str(file), "--on", "ray", "--jobs", "1", "--out", str(tmp_path))
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "khala", *words), stderr=subprocess.PIPE, env=os.environ | PATIENT
+        *(sys.executable, "-m", "khala_sc2", *words), stderr=subprocess.PIPE, env=os.environ | PATIENT
     )
     assert process.stderr is not None
     said = [await process.stderr.readline()]
@@ -184,7 +184,7 @@ async def test_ctrl_c_ends_ray_on_this_machine_and_keeps_what_was_played(tmp_pat
     [("127.0.0.1:1", "there is no Ray cluster"), ("ray://127.0.0.1:10001", "give HOST:PORT, such as 10.0.0.5:6379")],
 )
 async def test_a_cluster_that_is_not_there_is_said(address: str, complaint: str) -> None:
-    from khala.experiment.ray_engine import Ray
+    from khala_sc2.experiment.ray_engine import Ray
 
     with pytest.raises(ConfigError) as caught:
         async with Ray(1, game="simulator", address=address):

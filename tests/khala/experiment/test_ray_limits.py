@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow  # importing Ray takes a second
 
 async def test_a_request_whose_node_died_gives_its_place_back_and_a_refused_one_says_why() -> None:
     pytest.importorskip("ray")
-    from khala.experiment.ray_limits import LEASE_S, LimitRefusal, SharedTurns
+    from khala_sc2.experiment.ray_limits import LEASE_S, LimitRefusal, SharedTurns
 
     turns = SharedTurns(LimitRules(in_flight=1, requests_per_minute=600), "model file m")
     left = await turns.enter(1, None)

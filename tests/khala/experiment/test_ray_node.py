@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.experiment import ray_node
 from khala_protocol.errors import ConfigError
+from khala_sc2.experiment import ray_node
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from typer.testing import CliRunner
 
-from khala.cli import app
-from khala.experiment.plan import plan
-from khala.experiment.report import FORMATS, report, write
-from khala.experiment.report.calls import calls
-from khala.experiment.report.document import ReportDocument, ReportSection, ReportTable
 from khala_protocol.errors import ConfigError
+from khala_sc2.cli import app
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.report import FORMATS, report, write
+from khala_sc2.experiment.report.calls import calls
+from khala_sc2.experiment.report.document import ReportDocument, ReportSection, ReportTable
 from tests.khala.experiment.handmade import CARD, HandMade
 from tests.khala.experiment.made import record
 

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.experiment.plan import plan
-from khala.experiment.runner import Runner, RunnerEvent, pilot_of
-from khala.experiment.spec import Experiment, ExperimentBudget
-from khala.experiment.store import Store
 from khala_agents.llm.money import MoneyLedger
 from khala_protocol.errors import ConfigError
+from khala_sc2.experiment.plan import plan
+from khala_sc2.experiment.runner import Runner, RunnerEvent, pilot_of
+from khala_sc2.experiment.spec import Experiment, ExperimentBudget
+from khala_sc2.experiment.store import Store
 from tests.khala.experiment.made import MadeEngine, record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.experiment.plan import PlannedMatch
-    from khala.playing.jobs import Job
+    from khala_sc2.experiment.plan import PlannedMatch
+    from khala_sc2.playing.jobs import Job
 
 
 def experiment(**fields: Any) -> Experiment:

@@ -19,7 +19,7 @@ from statsmodels.stats.proportion import (  # type: ignore[import-untyped]
 )
 
 from bench.matches.intervals import average_coverage, bootstrap_coverage, difference_coverage, type_one_errors
-from khala.experiment.statistics import (
+from khala_sc2.experiment.statistics import (
     Interval,
     common_values,
     compare_paired_ratios,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.cli import main
-from khala.knowledge import files
+from khala_sc2.cli import main
+from khala_sc2.knowledge import files
 
 if TYPE_CHECKING:
     from pathlib import Path

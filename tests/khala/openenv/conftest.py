@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import uvicorn
 
-from khala.openenv.server import app_of, server_config
+from khala_sc2.openenv.server import app_of, server_config
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from khala.openenv.settings import ServerSettings
+    from khala_sc2.openenv.settings import ServerSettings
 
 
 class _Server(uvicorn.Server):

@@ -18,9 +18,10 @@ from openenv.core.generic_client import GenericEnvClient
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from khala.openenv.client import KhalaAction, KhalaEnv
-from khala.openenv.places import OVER_YIELD_S, YIELD_S, ServerPlaces
-from khala.openenv.server import (
+from khala_bridge.game.processes import IdleGames
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv
+from khala_sc2.openenv.places import OVER_YIELD_S, YIELD_S, ServerPlaces
+from khala_sc2.openenv.server import (
     MOST_BODY_BYTES,
     MOST_WAITING,
     OPENENV_TOKEN,
@@ -29,8 +30,7 @@ from khala.openenv.server import (
     openenv_door,
     server_config,
 )
-from khala.openenv.settings import ServerSettings
-from khala_bridge.game.processes import IdleGames
+from khala_sc2.openenv.settings import ServerSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -145,7 +145,7 @@ async def test_silent_websockets_take_no_session_and_the_oldest_make_room(servin
 async def test_episodes_over_http_that_their_clients_left_do_not_fill_the_server(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("khala.openenv.server.MOST_WAITING", 2)
+    monkeypatch.setattr("khala_sc2.openenv.server.MOST_WAITING", 2)
     server = _Server(
         ServerSettings(), IdleGames(1), ServerPlaces(1), ConcurrencyConfig(max_concurrent_envs=6, session_timeout=3600)
     )
@@ -300,7 +300,7 @@ async def test_a_session_that_left_makes_room_and_reads_why_when_it_comes_back(
         await first.reset(**SHORT)
         with RAISES(RuntimeError, match="at capacity: 1/1"):
             await second.reset(**SHORT)
-        monkeypatch.setattr("khala.openenv.places.YIELD_S", 0.0)
+        monkeypatch.setattr("khala_sc2.openenv.places.YIELD_S", 0.0)
         assert not (await second.reset(**SHORT)).done
         monkeypatch.undo()
         with RAISES(RuntimeError, match="the episode was ended, since it did nothing for long, and another client"):

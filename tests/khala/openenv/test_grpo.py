@@ -13,8 +13,8 @@ import pytest
 import uvicorn
 from openenv.core.rubrics import Rubric
 
-from khala.openenv.server import app_of
-from khala.openenv.settings import ServerSettings
+from khala_sc2.openenv.server import app_of
+from khala_sc2.openenv.settings import ServerSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

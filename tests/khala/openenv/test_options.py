@@ -15,16 +15,16 @@ import pytest
 from openenv.cli.commands.validate import validate
 from openenv.core.rubrics import Rubric
 
-from khala.env.rewards import battle
-from khala.openenv.commands import WantedServer, rubric_of, run_openenv, settings_of
-from khala.openenv.environment import KhalaEnvironment
-from khala.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
-from khala.openenv.rubrics import Battle
-from khala.openenv.server import app_of
-from khala.openenv.settings import ServerSettings
-from khala.playing.seats import Seat
 from khala_protocol.errors import ConfigError, KhalaError
 from khala_protocol.messages import Casualties, Report, Result
+from khala_sc2.env.rewards import battle
+from khala_sc2.openenv.commands import WantedServer, rubric_of, run_openenv, settings_of
+from khala_sc2.openenv.environment import KhalaEnvironment
+from khala_sc2.openenv.models import KhalaAction, KhalaObservation, Outcome, ResetOptions
+from khala_sc2.openenv.rubrics import Battle
+from khala_sc2.openenv.server import app_of
+from khala_sc2.openenv.settings import ServerSettings
+from khala_sc2.playing.seats import Seat
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -188,14 +188,14 @@ def test_the_command_finds_what_is_wrong_before_it_serves() -> None:
 
 
 def test_openenv_is_named_if_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "khala.openenv.server", None)
-    with pytest.raises(ConfigError, match=re.escape("pip install 'khala[openenv]'")):
+    monkeypatch.setitem(sys.modules, "khala_sc2.openenv.server", None)
+    with pytest.raises(ConfigError, match=re.escape("pip install 'khala-sc2[openenv]'")):
         run_openenv(wanted())
 
 
 @pytest.mark.slow
 def test_openenv_validates_the_server_that_runs() -> None:
-    command = [sys.executable, "-m", "khala", "openenv", "--port", "0"]
+    command = [sys.executable, "-m", "khala_sc2", "openenv", "--port", "0"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         address = process.stderr.readline().strip()

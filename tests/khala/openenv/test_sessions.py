@@ -11,11 +11,11 @@ import httpx
 import psutil
 import pytest
 
-from khala.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
-from khala.openenv.settings import ServerSettings
 from khala_agents.scripted.players import PLAYERS
 from khala_protocol.messages import Observation, Reply
 from khala_protocol.recording import Recording
+from khala_sc2.openenv.client import KhalaAction, KhalaEnv, KhalaObservation
+from khala_sc2.openenv.settings import ServerSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable

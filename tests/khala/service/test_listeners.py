@@ -9,10 +9,10 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from prometheus_client import generate_latest
 
-from khala.service.book import Book
-from khala.service.metrics import Metrics
-from khala.service.traces import KEPT, Traces
 from khala_protocol.messages import AgentReport, AgentStatus, ModelCall, Rejection, Report, Timings, Usage
+from khala_sc2.service.book import Book
+from khala_sc2.service.metrics import Metrics
+from khala_sc2.service.traces import KEPT, Traces
 
 if TYPE_CHECKING:
     from opentelemetry.sdk.trace import ReadableSpan

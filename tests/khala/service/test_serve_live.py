@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from khala.playing.matches import new
-from khala.playing.minds import Minds
-from khala.service import client
 from khala_protocol.bus.config import BusConfig, TlsFiles
 from khala_protocol.bus.zenoh import open_bus
 from khala_protocol.certificates import certify_observer, make_authority
 from khala_protocol.messages import Report
 from khala_protocol.recording import Recording
 from khala_protocol.service import Stop, Submit
+from khala_sc2.playing.matches import new
+from khala_sc2.playing.minds import Minds
+from khala_sc2.service import client
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -87,7 +87,7 @@ def order(run: str, max_steps: int, episodes: int = 1) -> Submit:
 async def serving(
     out: Path, *options: str, listen: str = "tcp/127.0.0.1:0", tls: TlsFiles | None = None
 ) -> AsyncIterator[Serving]:
-    command = ("-m", "khala", "serve", "--json", "--listen", listen, "--out", str(out), *options)
+    command = ("-m", "khala_sc2", "serve", "--json", "--listen", listen, "--out", str(out), *options)
     with (out / "serve.log").open("wb") as log:
         process = await asyncio.create_subprocess_exec(
             sys.executable, *command, stdout=asyncio.subprocess.PIPE, stderr=log
@@ -110,7 +110,7 @@ async def test_matches_are_played_side_by_side_and_survive_a_worker_and_the_end(
         await service.submit("long", 10_000, ENDLESS)
         await service.step("long")
         assert (await service.over("short")).state == "done"
-        (worker,) = [p for p in service.below("khala.playing.worker") if _is_playing(p)]
+        (worker,) = [p for p in service.below("khala_sc2.playing.worker") if _is_playing(p)]
         worker.kill()
         await service.step("long")
         card = client.find(await client.list_matches(service.bus), "long")

@@ -12,14 +12,6 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import pytest
 from rich.console import Console
 
-from khala.playing.jobs import Ended
-from khala.playing.matches import new
-from khala.playing.minds import Minds
-from khala.service import client
-from khala.service.book import KEPT, Limits
-from khala.service.client import NoService, Refused
-from khala.service.commands import table_of
-from khala.service.daemon import STARTS, Service
 from khala_bridge.game.game import GameIdentity
 from khala_orchestrator.config import change, load_task
 from khala_orchestrator.match.cards import run_card
@@ -32,13 +24,21 @@ from khala_protocol.keys import Topic, run_key
 from khala_protocol.messages import AgentReport, Report, Usage
 from khala_protocol.recording import Recorder
 from khala_protocol.service import MAX_ORDER_BYTES, MatchCard, Stop, Submit
+from khala_sc2.playing.jobs import Ended
+from khala_sc2.playing.matches import new
+from khala_sc2.playing.minds import Minds
+from khala_sc2.service import client
+from khala_sc2.service.book import KEPT, Limits
+from khala_sc2.service.client import NoService, Refused
+from khala_sc2.service.commands import table_of
+from khala_sc2.service.daemon import STARTS, Service
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from khala.playing.jobs import Job
     from khala_protocol.bus import Bus
     from khala_protocol.messages import Wire
+    from khala_sc2.playing.jobs import Job
 
 CLOCK = "jumps"
 
@@ -245,7 +245,7 @@ async def test_an_order_that_breaks_the_reader_is_refused_and_the_service_goes_o
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("khala.service.daemon.match_of", _breaks)
+        broken.setattr("khala_sc2.service.daemon.match_of", _breaks)
         with pytest.raises(Refused, match="the service could not read it: RecursionError"):
             await stage.submit("first")
     assert (await stage.submit("second")).state in {"queued", "running"}

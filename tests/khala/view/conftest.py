@@ -15,7 +15,7 @@ from tests.khala.view.made import make, opened
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala.view.runs import Opened
+    from khala_sc2.view.runs import Opened
 
 GOLDEN = Path(__file__).parents[1] / "golden.mcap"
 

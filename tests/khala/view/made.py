@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING
 
-from khala.view.runs import Opened
-from khala.view.scan import whole
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key, image_key, run_key
 from khala_protocol.messages import (
@@ -37,6 +35,8 @@ from khala_protocol.messages import (
     View,
 )
 from khala_protocol.recording import Recorder
+from khala_sc2.view.runs import Opened
+from khala_sc2.view.scan import whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

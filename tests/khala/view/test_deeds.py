@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from khala.view.deeds import Screen, deeds
 from khala_protocol.messages import AgentReport, Rejection
+from khala_sc2.view.deeds import Screen, deeds
 
 SCREENS = {"Stalker-1": Screen((32.0, 20.0), 12.0, 24.0)}
 FRAMES = {"move_screen": ("screen",), "move_minimap": ("minimap",), "attack_unit": ("tag",), "stop": ()}

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.experiment.report import report
-from khala.view.runs import NotThere
-from khala.view.sources import Sources
+from khala_sc2.experiment.report import report
+from khala_sc2.view.runs import NotThere
+from khala_sc2.view.sources import Sources
 from tests.khala.experiment.handmade import HandMade
 
 if TYPE_CHECKING:

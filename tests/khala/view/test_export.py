@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.view import export as exporting
-from khala.view.export import TooLarge, export
-from khala.view.guard import policy_of
-from khala.view.library import run_id
-from khala.view.sources import Sources
 from khala_orchestrator.past.transcript import StepSelection
 from khala_protocol.errors import ConfigError
+from khala_sc2.view import export as exporting
+from khala_sc2.view.export import TooLarge, export
+from khala_sc2.view.guard import policy_of
+from khala_sc2.view.library import run_id
+from khala_sc2.view.sources import Sources
 from tests.khala.view.made import AGENT, HOSTILE, STEPS, make, opened
 
 if TYPE_CHECKING:

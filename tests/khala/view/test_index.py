@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.view.index import Index, Spot, index_path
-from khala.view.scan import Scanner, whole
 from khala_protocol.codec import encode
 from khala_protocol.errors import RecordingError
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.view.index import Index, Spot, index_path
+from khala_sc2.view.scan import Scanner, whole
 from tests.khala.view.made import STEPS, begin, card, end, key_of, make, opened, put, step_of
 
 if TYPE_CHECKING:

@@ -10,15 +10,15 @@ from typing import BinaryIO, get_type_hints
 
 import pytest
 
-from khala.view import library, serve
-from khala.view.cli import view
-from khala.view.library import found_in, lines, read_head, run_id
-from khala.view.serve import PASSWORD, ViewOptions, door_of, is_near, password_of
-from khala.view.sources import Sources, find
 from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording, summary
 from khala_protocol.recording.chunks import chunk_at
 from khala_protocol.recording.summary import Summary
+from khala_sc2.view import library, serve
+from khala_sc2.view.cli import view
+from khala_sc2.view.library import found_in, lines, read_head, run_id
+from khala_sc2.view.serve import PASSWORD, ViewOptions, door_of, is_near, password_of
+from khala_sc2.view.sources import Sources, find
 from tests.khala.view.made import AGENT, RUN, STEPS, make
 
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from khala.view.live import DELIVERIES, Following, running_match
 from khala_protocol.bus.memory import MemoryBroker, MemoryBus
 from khala_protocol.codec import encode
 from khala_protocol.errors import ConfigError
 from khala_protocol.keys import Topic
 from khala_protocol.recording import Recorder, Recording
+from khala_sc2.view.live import DELIVERIES, Following, running_match
 from tests.khala.view.made import RUN, begin, card, end, key_of, opened, step_of
 
 if TYPE_CHECKING:

@@ -11,14 +11,23 @@ import aiohttp
 import pytest
 from aiohttp import encode_basic_auth, web
 
-from khala.view.guard import policy_of, view_door
-from khala.view.library import run_id
-from khala.view.server import NO_PAGE, Server
-from khala.view.sources import Sources
-from khala.view.wire import MOST_SCENES, DecisionTexts, Library, RecordingProgress, RunView, Scenes, StepView, Timeline
 from khala_protocol.codec import encode
 from khala_protocol.messages import Scene, Terrain
 from khala_protocol.recording import Recorder
+from khala_sc2.view.guard import policy_of, view_door
+from khala_sc2.view.library import run_id
+from khala_sc2.view.server import NO_PAGE, Server
+from khala_sc2.view.sources import Sources
+from khala_sc2.view.wire import (
+    MOST_SCENES,
+    DecisionTexts,
+    Library,
+    RecordingProgress,
+    RunView,
+    Scenes,
+    StepView,
+    Timeline,
+)
 from tests.khala.view.made import AGENT, PICTURE, STEPS, begin, key_of, make, put, step_of
 
 if TYPE_CHECKING:
@@ -27,8 +36,8 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel
 
-    from khala.doors.rules import Door
-    from khala.view.wire import AdviceNote
+    from khala_sc2.doors.rules import Door
+    from khala_sc2.view.wire import AdviceNote
 
 
 class Browser:

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala.view.digest import Digest, Memory
-from khala.view.wire import MOST_SCENES
 from khala_protocol.messages import (
     AgentReport,
     Observation,
@@ -23,12 +21,14 @@ from khala_protocol.messages import (
     count_refusals,
 )
 from khala_protocol.recording import Recording
+from khala_sc2.view.digest import Digest, Memory
+from khala_sc2.view.wire import MOST_SCENES
 from tests.khala.view.made import opened
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from khala.view.runs import Opened
+    from khala_sc2.view.runs import Opened
 
 MOMENTS = 200
 
@@ -138,7 +138,7 @@ def test_every_death_of_the_result_is_on_the_time_line(name: str, request: pytes
 @pytest.mark.parametrize("task", ["2s3z_pair", "simple64_duel"])
 def test_a_match_that_is_played_now_is_shown_as_it_was(task: str, tmp_path: Path) -> None:
     arguments = ["run", task, "--policy", "skilled", "--max-steps", "40", "--out", str(tmp_path), "--run", "now"]
-    subprocess.run([sys.executable, "-m", "khala", *arguments], check=False, capture_output=True)
+    subprocess.run([sys.executable, "-m", "khala_sc2", *arguments], check=False, capture_output=True)
     played = opened(tmp_path / "now" / "recording.mcap")
     recorded = {scene.step: scene for scene in Recording.open(played.path).of(Scene)}
     assert recorded

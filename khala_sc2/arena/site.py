@@ -1,0 +1,194 @@
+"""A static site of ratings: the leaderboard, for each of its cells the matches, and for each match its page.
+
+    index.html                     the leaderboard
+    games/PLAYER.GROUP.html        the games of a cell
+    matches/KEY.html               a match, as `khala view --export` writes it
+
+Pages load nothing, run no script of their own, and need no server. Names may come from anyone's file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import logging
+import re
+from typing import TYPE_CHECKING
+
+from khala_orchestrator.past.transcript import StepSelection
+from khala_protocol.errors import KhalaError
+from khala_protocol.files import make_private, write_private
+from khala_protocol.visible import visible_line
+from khala_sc2.arena.leaderboard import costs_of, has_costs, remarks_of
+from khala_sc2.arena.ratings import games_of, outcome_for, seat_of
+from khala_sc2.experiment.report.html import STYLE
+from khala_sc2.view.export import export
+from khala_sc2.view.server import page
+from khala_sc2.view.sources import Sources
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
+
+    from khala_sc2.arena.ratings import Leaderboard, LeaderboardLine, Rating
+    from khala_sc2.arena.results import ArenaGame, PlayerPool
+
+log = logging.getLogger(__name__)
+
+GAMES, MATCHES, INDEX = "games", "matches", "index.html"
+BAR_PX = 110
+OURS = """
+body { max-width: 84rem; }
+a { color: inherit; text-decoration-color: var(--faint); text-underline-offset: .2em; }
+td small { color: var(--faint); }
+td svg { display: block; }
+.whisker { stroke: var(--ink); stroke-width: 1.5; }
+.dot { fill: var(--ink); }
+.win { color: #1a7f4b; } .loss { color: #c0392b; }
+@media (prefers-color-scheme: dark) { .win { color: #5fd39a; } .loss { color: #ff8a7a; } }
+"""
+
+
+def make_site(pool: PlayerPool, board: Leaderboard, into: Path) -> int:
+    """Write a site, and return how many matches have a page; pages of matches that are there already stay.
+
+    Raises:
+        ConfigError: it cannot be written, or the page of `khala view` is not built.
+    """
+    for directory in (into, into / GAMES, into / MATCHES):
+        make_private(directory)
+    shown = {game.match for game in pool.games if _write_match(pool, game, into)}
+    title = ", ".join(dict.fromkeys(pool.arenas))
+    write_private(into / INDEX, _page(f"Ratings: {title}", _leaderboard(pool, board)))
+    for line in board.standings:
+        for group in board.columns:
+            games = games_of(pool.games, line.player, group)
+            content = _games(pool, line, games, shown)
+            write_private(into / _place(line.player, group), _page(f"{line.player}, {group}", content))
+    return len(shown)
+
+
+def _write_match(pool: PlayerPool, game: ArenaGame, into: Path) -> bool:
+    """Write the page of a match; return whether there is one."""
+    path = into / MATCHES / f"{game.match}.html"
+    recording = pool.places[game.match]
+    if path.exists():
+        return True
+    if not recording.is_file():
+        return False
+    title = f"{game.task}: {game.first.player} and {game.second.player}, seed {game.seed}"
+    try:
+        export(Sources(title, None, [recording]), page(), path, steps=StepSelection.of(None, None), agents=())
+    except KhalaError as error:
+        log.warning("%s gets no page: %s", recording, error)
+        return False
+    return True
+
+
+def _place(player: str, group: str) -> str:
+    """Return the path of a cell's page: readable, and different for each cell whatever its names are."""
+    digest = hashlib.sha256(f"{player}\n{group}".encode()).hexdigest()[:6]
+    words = re.sub(r"[^A-Za-z0-9-]+", "-", f"{player}.{group}")[:60]
+    return f"{GAMES}/{words}-{digest}.html"
+
+
+# --- the leaderboard ---------------------------------------------------------------------------------
+
+
+def _leaderboard(pool: PlayerPool, board: Leaderboard) -> Iterator[str]:
+    yield f"<p>{len(pool.games)} games of {len(board.standings)} players. Each rating is a link to its games.</p>"
+    ratings = [rating for line in board.standings for rating in line.ratings.values()]
+    low = min((rating.low for rating in ratings), default=0.0)
+    high = max((rating.high for rating in ratings), default=1.0)
+    costs = ("USD a game", "tokens a game") if has_costs(board) else ()
+    names = ["", "player", *board.columns, "won", "drawn", "lost", *costs, "clock"]
+    yield '<div class="scroll"><table><thead><tr>'
+    yield "".join(f"<th>{_safe(name)}</th>" for name in names)
+    yield "</tr></thead><tbody>"
+    for number, line in enumerate(board.standings, start=1):
+        yield f"<tr>{''.join(_cells(number, line, board, low, high))}</tr>"
+    yield "</tbody></table></div>"
+    yield from (f'<p class="note">{_safe(remark)}</p>' for remark in remarks_of(board, pool.remarks))
+
+
+def _cells(number: int, line: LeaderboardLine, board: Leaderboard, low: float, high: float) -> Iterator[str]:
+    yield f'<td class="number">{number}</td>'
+    anchor = " · anchor" if line.is_anchor else ""
+    yield f"<td>{_safe(line.player)}<br><small>{_safe(line.kind)}: {_safe(line.about)}{anchor}</small></td>"
+    for column in board.columns:
+        yield f"<td>{_rating(line.player, column, line.ratings.get(column), low, high)}</td>"
+    overall = line.ratings.get("overall")
+    counts = (overall.won, overall.drawn, overall.lost) if overall else ("", "", "")
+    yield from (f'<td class="number">{count}</td>' for count in counts)
+    if has_costs(board):
+        yield from (f'<td class="number">{_safe(cost)}</td>' for cost in costs_of(line))
+    yield f"<td>{_safe(', '.join(line.clocks))}</td>"
+
+
+def _rating(player: str, column: str, rating: Rating | None, low: float, high: float) -> str:
+    if rating is None:
+        return ""
+    bounds = "fixed" if rating.low == rating.high else f"{rating.low:.0f} to {rating.high:.0f}"
+    words = f"{rating.value:.0f} <small>{bounds}</small>"
+    return f'<a href="{_place(player, column)}">{words}</a>{_whisker(rating, low, high)}'
+
+
+def _whisker(rating: Rating, low: float, high: float) -> str:
+    """Return a picture of a rating and its interval, on the scale of all of them."""
+    span = max(high - low, 1.0)
+    at, begin, end = (6 + (BAR_PX - 12) * (x - low) / span for x in (rating.value, rating.low, rating.high))
+    return (
+        f'<svg width="{BAR_PX}" height="12" role="img" aria-label="interval {rating.low:.0f} to {rating.high:.0f}">'
+        f'<line class="whisker" x1="{begin:.1f}" x2="{end:.1f}" y1="6" y2="6"/>'
+        f'<circle class="dot" cx="{at:.1f}" cy="6" r="3.5"/></svg>'
+    )
+
+
+# --- the games of a cell -----------------------------------------------------------------------------
+
+
+def _games(pool: PlayerPool, line: LeaderboardLine, games: Sequence[ArenaGame], shown: set[str]) -> Iterator[str]:
+    yield f'<p><a href="../{INDEX}">All ratings</a>. {_safe(line.kind)}: {_safe(line.about)}.</p>'
+    names = ("outcome", "against", "task", "side", "seed", "ended by", "game time", "killed", "lost", "tokens", "match")
+    yield '<div class="scroll"><table><thead><tr>'
+    yield "".join(f"<th>{name}</th>" for name in names)
+    yield "</tr></thead><tbody>"
+    for game in games:
+        yield f"<tr>{_game(pool, line.player, game, has_page=game.match in shown)}</tr>"
+    yield "</tbody></table></div>"
+
+
+def _game(pool: PlayerPool, player: str, game: ArenaGame, *, has_page: bool) -> str:
+    is_first = game.first.player == player
+    other = game.second.player if is_first else game.first.player
+    outcome = outcome_for(game, player)
+    killed, lost = (game.killed, game.lost) if is_first else (game.lost, game.killed)
+    seat = seat_of(game, player)
+    match = f'<a href="../{MATCHES}/{game.match}.html">{game.match}</a>' if has_page else game.match
+    about = pool.players[other].about
+    return (
+        f'<td class="{outcome}">{outcome}</td><td title="{_safe(about)}">{_safe(other)}</td><td>{_safe(game.task)}</td>'
+        f"<td>{'first' if is_first else 'second'}</td>"
+        f'<td class="number">{game.seed}</td><td>{_safe(game.cause)}</td>'
+        f'<td class="number">{game.game_s:.0f} s</td><td class="number">{killed:.0f}</td>'
+        f'<td class="number">{lost:.0f}</td><td class="number">{seat.tokens if seat else 0}</td>'
+        f"<td>{match}</td>"
+    )
+
+
+# --- a page ------------------------------------------------------------------------------------------
+
+
+def _page(title: str, content: Iterable[str]) -> str:
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        """<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">\n"""
+        f"<title>{_safe(title)}</title>\n<style>{STYLE}{OURS}</style>\n</head>\n<body>\n<h1>{_safe(title)}</h1>\n"
+        + "\n".join(content)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _safe(words: str) -> str:
+    return html.escape(visible_line(words))
