@@ -128,7 +128,6 @@ class SmallModel:
 
     # answers ----------------------------------------------------------------------------------------------------------
 
-    @torch.no_grad()  # type: ignore[untyped-decorator, unused-ignore]  # without torch
     def complete(self, prompts: Sequence[list[int]], *, most: int, temperature: float) -> list[list[int]]:
         """Return the tokens of an answer to each prompt, with the end of the turn if it was reached.
 
@@ -137,6 +136,10 @@ class SmallModel:
             most: tokens of an answer.
             temperature: of sampling; 0 for the likeliest tokens.
         """
+        with torch.no_grad():
+            return self._complete(prompts, most, temperature)
+
+    def _complete(self, prompts: Sequence[list[int]], most: int, temperature: float) -> list[list[int]]:
         cache, begun = self._shared_cache(prompts)
         rest = [prompt[begun:] for prompt in prompts]
         longest = max(map(len, rest))

@@ -42,7 +42,7 @@ def _draw_tests(axes: Any, results: Sequence[dict[str, Any]], references: Sequen
     axes.errorbar(names, won, yerr=bounds, marker="o", capsize=4, label="SmolLM2-135M")
     for result, style in zip([r for r in results if r["player"] in references], (":", "-.", "--"), strict=False):
         axes.axhline(result["won"], linestyle=style, color="gray", label=result["player"])
-    battles = max((result["battles"] for result in results), default=0)
+    battles = max((result["battles"] for result in points), default=0)
     axes.set(ylabel=f"won of {battles} test battles", ylim=(-0.03, 1.03))
     axes.tick_params(axis="x", labelrotation=30)
     axes.grid(alpha=0.3)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+import random
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -78,6 +81,22 @@ def test_results_are_counted_by_player(tmp_path: Path) -> None:
     assert (silent["player"], silent["won"], silent["battles"]) == ("silent", 0.0, 1)
     assert (taught["won"], taught["reward"], taught["obeyed"]) == (0.5, 0.5, 0.25)
     assert taught["low"] < 0.5 < taught["high"]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_decisions_of_a_group_weigh_as_much_as_their_battles_were_better_than_the_others() -> None:
+    """Needs the group `learning`."""
+    pytest.importorskip("peft")
+    learns: Any = importlib.import_module("bench.learning.learns")
+    model = SimpleNamespace(tokens=lambda prompt: [len(prompt)])
+    prompt = (ChatMessage(role="user", content="U"),)
+    better = PlayedBattle(7, [Answered(prompt, Answer("a", (5, 2)))] * 3, reward=0.5)
+    worse = PlayedBattle(7, [Answered(prompt, Answer("b", (6, 2))), Answered(prompt, Answer(""))], reward=-0.5)
+    rows = learns.chosen_rows(model, [better, worse], 99, random.Random(0))
+    assert sorted((row.answer[0], row.weight) for row in rows) == [(5, 1.0)] * 3 + [(6, -1.0)]
+    assert learns.chosen_rows(model, [worse, worse], 99, random.Random(0)) == []
+    assert len(learns.chosen_rows(model, [better, worse], 2, random.Random(0))) == 2
 
 
 @pytest.mark.slow
