@@ -22,6 +22,7 @@ WITHOUT_ROWS: Final[dict[str, str]] = {
     "khala tasks": "lists the tasks that are installed",
     "khala experiment list": "lists the experiments that are installed",
     "khala knowledge show": "prints the tables that are installed",
+    "khala person": "takes a seat as `khala agent` does, and shows a page as `khala view` does",
     "khala keys init": "writes new keys",
     "khala keys agent": "writes a new key",
     "khala keys adviser": "writes a new key",

@@ -49,6 +49,10 @@ class ConfigError(KhalaError):
         super().__init__(f"{where}: {message}" if where else message)
 
 
+class NotInstalled(ConfigError, ImportError):
+    """A package of an extra is not installed; whoever imports a module of Khala may catch it as an ImportError."""
+
+
 class BusError(KhalaError):
     """The bus could not be opened, or a link of it failed."""
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from khala_protocol.errors import ConfigError
+from khala_protocol.errors import NotInstalled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,10 +36,6 @@ DISTRIBUTIONS: Final = (FRONT, "khala-sc2-agents")
 _OWN: Final = "khala_"
 _EXTRA: Final = re.compile(r"extra == ['\"]([^'\"]+)['\"]")
 _REQUIREMENT: Final = re.compile(r"([A-Za-z0-9._-]+)(?:\[([^\]]*)\])?")
-
-
-class NotInstalled(ConfigError, ImportError):
-    """A package of an extra is not installed; whoever imports a module of Khala may catch it as an ImportError."""
 
 
 def not_installed(extra: str, package: str, *, source: str) -> NotInstalled:

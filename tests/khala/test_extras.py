@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_protocol import extras
-from khala_protocol.errors import ConfigError
-from khala_protocol.extras import NotInstalled, install_command, needs, requirements
+from khala_protocol.errors import ConfigError, NotInstalled
+from khala_protocol.extras import install_command, needs, requirements
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -25,6 +25,7 @@ RECORDED = [field.name for field in fields(MatchOptions) if field.name != "assem
 UNSAID: dict[str, Any] = dict.fromkeys(RECORDED)
 TAKEN = {
     *("resume", "out", "as_json", "game", "assemble_s", "connect", "listen", "tls", "insecure", "trust"),
+    *("person", "page_host", "page_port", "page_https"),
     *(
         "model",
         "model_name",

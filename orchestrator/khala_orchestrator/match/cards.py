@@ -81,7 +81,8 @@ def run_card(config: MatchConfig, game: GameIdentity) -> Run:
 
 def versions() -> dict[str, str]:
     """Return the versions of what plays, here and now."""
-    return {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES}
+    ours = {"python": platform.python_version(), "khala": _version("khala-sc2")}
+    return ours | {name: _version(name) for name in _PACKAGES}
 
 
 @functools.cache
