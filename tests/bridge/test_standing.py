@@ -154,7 +154,7 @@ def test_an_order_whose_target_is_gone_ends(table: Table) -> None:
         ("<Standing(Train_Probes_Now())>", "There is no action Train_Probes_Now"),
         ("Team Stalker-1:\n<Standing(Attack_Minimap([99, 99]))>", "outside"),
         ("Team Stalker-1:\n<Standing(Select_Unit_Move_Screen(0x100040001, [3, 3]))>", "for a team"),
-        ("Team Base:\n<Standing(Train_Probe(), until dawn)>", "write until 22 Probe"),
+        ("Team Base:\n<Standing(Train_Probe(), until dawn)>", "write until 22 and a type of units"),
         ("Team Base:\n<Standing(Train_Probe(), until minerals 100)>", "is reached already: minerals 100"),
         ("<Revoke(3)>", "You have no standing order 3; you have none."),
     ],

@@ -250,6 +250,9 @@ HEADINGS += [
     ("H6", '{"analysis":"<Stop()>","actions":{"A-1":["<Go()>"]}}', ["? <Stop()>", "A-1: <Go()>"]),
     ("H6", "Team A: <Stop()>, and Team B: <Go()>", ["A: <Stop()>", "B: <Go()>"]),
     ("H21", '{"team": "A-1", "do": "<Go()>"}', ["A-1: <Go()>"]),
+    ("H22", "Your last errors\n    A-1 <Stop()>\n\nActions:\n<Go()>", ["? <Stop()>", "<Go()>"]),
+    ("H22", "What will do for team A-1:\n    <Stop()>\nNot possible now:\n<Stop()>", ["? <Stop()>", "? <Stop()>"]),
+    ("H23", "Team A-1, unit 0x2:\n<Go()>", ["A-1, unit 0x2: <Go()>"]),
 ]  # fmt: skip
 SHOWN = ShownText("- <Attack_Unit(tag)>: Attack the enemy.\n- <Stop()>: Stop moving and firing.")
 INVOKE = '<function_calls><invoke name="Go_To"><parameter name="minimap">[3, 4]</parameter></invoke></function_calls>'
@@ -427,8 +430,10 @@ RULES = [
     ("S37", "<|python_tag|>Go_To.call(minimap=[3, 4])", ["<Go_To([3, 4])>"]),
     ("S37", "```tool_code\nprint(default_api.Go_To(team='A', minimap=[3, 4]))\n```", ["A: <Go_To([3, 4])>"]),
     ("S38", "- team: A\n  action: Go_To\n  minimap: [3, 4]\n- team: B\n  action: Hold_Position", YAML_READ),
+    ("S38", "- action: Go_To\n  team: A\n  args:\n    minimap:\n      - 3\n      - 4\n", ["A: <Go_To([3, 4])>"]),
     ("S38", "- action: gather at the ramp\n- target: 0x1", []),
     ("S39", 'go_to(team="A-1", minimap=(3, 4))', ["A-1: <go_to([3, 4])>"]),
+    ("S39", 'Go_To(minimap=(3, 4), team="A-1")', ["A-1: <Go_To([3, 4])>"]),
     ("S39", "**Final Answer:** `Go_To([3, 4])` for A-1", ["A-1: <Go_To([3, 4])>"]),
     ("S39", "We could use Go_To([3, 4]) for A-1 later", []),
     ("S40", "Actions:\n<Go()>\n\nGame\n    Time: 1:20\nActions:\n<Stop()>", ["<Go()>"]),
@@ -443,6 +448,8 @@ RULES = [
     ("E1", "Actions:\n- <Stop()>: Stop moving and firing.\n- <Stop()>: they are strong", ["? <Stop()>", "<Stop()>"]),
     ("E2", "accepted: A-1 <Stop()>\nrejected: <Go()>: no", ["? <Stop()>", "? <Go()>"]),
     ("E2", "(write it like <Stop()>)", ["? <Stop()>"]),
+    ("E2", "**Accepted**: <Stop()>\n**Rejected:** A-1: <Go()>", ["? <Stop()>", "? <Go()>"]),
+    ("E2", "write it like **<Stop()>**\ndid you mean <Go()>?", ["? <Stop()>", "? <Go()>"]),
     ("E3", "A: <Attack_Unit(tag)>, <Stop()>\n\n<Go()>", ["? <Attack_Unit(tag)>", "? <Stop()>", "A: <Go()>"]),
     ("E3", "Actions:\n<Attack_Unit(tag)>", ["<Attack_Unit(tag)>"]),
     ("E4", "Valid actions\n    Team A: <Stop()>\n\nTeam A: <Go()>", ["? <Stop()>", "A: <Go()>"]),

@@ -33,7 +33,7 @@ UNTIL: Final[Schema] = {
     "type": ["string", "null"],
     "maxLength": 40,
     "description": "null for an order that is given once; else the end of a standing order: a time of the game's clock "
-    "such as 4:30, '22 Probe', an upgrade, 'attacked', 'minerals 400', or 'revoked'",
+    "such as 4:30, 22 and a type of units, an upgrade, 'attacked', 'minerals 400', or 'revoked'",
 }
 
 

@@ -27,7 +27,7 @@ def how_to_answer_in_json(briefing: Briefing) -> str:
         if any(action.actors for action in briefing.actions):
             lines.append('  The first tag of an action whose name begins with Select_Unit_ is called "unit".')
         if briefing.standing_orders:
-            lines.append('  "until": null gives an order once; "until": "22 Probe" makes it a standing order.')
+            lines.append('  "until": null gives an order once; "until": "4:30" makes it a standing order.')
     if briefing.correspondents or briefing.channels:
         lines.append('- "messages": a list of messages, such as {"to": "name", "text": "words"}.')
     if briefing.channels:

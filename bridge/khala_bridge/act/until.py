@@ -33,7 +33,7 @@ Kind: TypeAlias = Literal["never", "count", "upgrade", "time", "attacked", "mine
 
 _TIME = re.compile(r"(\d{1,3}):([0-5]\d)(?::00)?")
 _AMOUNT = re.compile(r"(?P<a>\d{1,5})\s*(?P<what>[A-Za-z][\w ]*)|(?P<name>[A-Za-z][\w ]*?)[\s=:]*(?P<b>\d{1,5})")
-_FORMS = "write until 22 Probe, until WarpGateResearch, until 4:30, until attacked or until minerals 400"
+_FORMS = "write until 22 and a type of units, until an upgrade, until 4:30, until attacked or until minerals 400"
 
 
 @dataclass(frozen=True, slots=True)

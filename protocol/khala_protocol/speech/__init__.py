@@ -62,7 +62,7 @@ a row in the table test:
 | S36 | a message that is written again in the same reply is sent once | `<MessageTo(A, 'go')>` twice |
 | S37 | a tool call as text, as models of several makers write it | `<invoke name="Stop">` … |
 | S38 | an item of a list of YAML | `- action: Move_Screen`, then `screen: [3, 4]` |
-| S39 | a team as the first argument, or behind a call without angle brackets | `Stop(team="A")`, `Stop() for A-1` |
+| S39 | a team as an argument, or behind a call without angle brackets | `Stop(team="A")`, `Stop() for A-1` |
 | S40 | a made-up observation ends the reply, once orders stand before it | `Game`, then `Time: 1:20` |
 | S41 | a reply that is one object of JSON: only what stands in its lists counts | `{"orders": [`…`]}` |
 | S42 | an end of an order in JSON makes it a standing order | `{"action": "Train_Probe", "until": "22 Probe"}` |

@@ -6,7 +6,7 @@ the form that a refusal proposes. Above it: `khala_protocol.speech.reader`.
 | id | an echo is | example |
 |---|---|---|
 | E1 | a call between words that stood beside it in what was shown | `<Stop()>: Stop moving and firing` |
-| E2 | a call behind words that only the host writes | `accepted: A-1 <Stop()>`, `write it like <Stop()>` |
+| E2 | a call behind words that only the host writes | `accepted: A-1 <Stop()>`, `**Rejected**: <Stop()>` |
 | E3 | a form where no order stands; all of a list of forms, or of one that was shown | `<Move(screen)>, <Stop()>` |
 | E4 | a form, or a call without arguments, under the host's heading of what is possible | `Valid actions` |
 | E5 | all calls under its heading of what was ordered | `Your last actions` |
@@ -35,6 +35,7 @@ MANY: Final = 4
 
 _CALL = re.compile(r"<\s*+[A-Za-z][\w ]*+(?:\([^<>\n]*\))?\s*+/?>")  # in what the host wrote
 _MARKS = re.compile(r"[\s*_`#>|~]++")
+_EMPHASIS = re.compile(r"[*_`]++")
 _EDGES: Final = " :;,.-–—=→"  # noqa: RUF001  # dashes
 _NOTHING: Final = " \t*_`#>|.)-" + "0123456789"
 _KEY = re.compile(r"[\s'\"`<>/\\]|\(\)")
@@ -45,7 +46,8 @@ _FORM = re.compile(rf"<\s*+(?:\w++\(\s*+{_KIND}(?:\s*+,\s*+{_KIND})*+\s*+\)|{_AN
 _SAMPLE = re.compile(rf"<\s*+{_ANY}\s*+>?", re.IGNORECASE)
 _HOST_WORDS = re.compile(
     r"(?:^|[\s\"'(])"
-    r"(?:(?:accepted(?: before)?|rejected|refused)\s?+:[^<]{0,60}+|write (?:it like|it as)\s*+:?\s*+[\"'`]*+)$",
+    r"(?:(?:accepted(?: before)?|rejected|refused|what was possible)\s?+:[^<]{0,60}+"
+    r"|(?:write (?:it like|it as)|did you mean)\s*+:?\s*+[\"'`]*+)$",
     re.IGNORECASE,
 )
 
@@ -109,7 +111,7 @@ class ShownText:
             return True
         if _stands_alone(before) and _stands_alone(behind):
             return False
-        if _HOST_WORDS.search(before) or _lists_forms(text[line_start:line_end]):
+        if _HOST_WORDS.search(_EMPHASIS.sub("", before)) or _lists_forms(text[line_start:line_end]):
             return True
         own = _words_around(text[line_start:line_end], start - line_start, end - line_start)
         cut = line_end == len(text)

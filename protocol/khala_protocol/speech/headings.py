@@ -27,6 +27,8 @@ team exists.
 | H19 | an explanation or notes behind the actions belong to the analysis | `Explanation: <Stop()>?`, `## Notes` |
 | H20 | a team named in a sentence right before a call | `Team A should <Stop()>`, `A-1 will now <Stop()>` |
 | H21 | a team as a value of JSON | `"team": "Stalker-1"` |
+| H22 | other headings of an observation: calls below them are nobody's orders | `Your last errors:` |
+| H23 | a unit of a team is no team: the bridge refuses it | `Team A-1, unit 0x2:` |
 """
 
 from __future__ import annotations
@@ -95,11 +97,12 @@ _SECTION = (
 )
 _GAP = r"(?:(?=[^\w\n<:,&/+]*+[,&/+])[^\w\n<:]*+|[^\w\n<:]++and[^\w\n<:]++)(?:teams?[ \t]+)?+"
 _SEVERAL = rf"{_WORD}(?:{_GAP}{_WORD}){{1,8}}+"
+_UNIT_OF_TEAM = rf"{_WORD}[ \t]*,?[ \t]*units?[ \t]+{_WORD}"
 _SHALL = r"[ \t]+(?:should|shall|will|must|can|to|needs?[ \t]+to)(?:[ \t]+(?:now|then|also|first))?[ \t]*+(?=<)"
 _TEAM = (
     rf"(?P<every>{words.EVERY_TEAM}){_CLOSE}:"
     rf"|(?:(?:and|then|und|et|y)[ \t]+)?(?:for[ \t]+)?{_TEAM_WORD}(?:[^\w\n<]*+"
-    rf"(?:(?P<team>(?!teams?\b)(?:{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}})){_CLOSE}:"
+    rf"(?:(?P<team>(?!teams?\b)(?:{_UNIT_OF_TEAM}|{_SEVERAL}|{_WORD}(?:[ \t]+{_WORD}){{0,2}})){_CLOSE}:"
     rf"|(?P<short>{_WORD}){_CLOSE}{_TO_EDGE}|(?P<shall>{_WORD}){_SHALL})|[^\w\n<:]*+:{_TO_EDGE})"
     rf"|(?!(?:my|our|the|this|your)\b)(?P<behind>{_LATIN})(?:{words.TEAM_BEHIND}){_CLOSE}:"
 )
@@ -115,9 +118,10 @@ _EXPLAINS = (
     rf"(?P<explains>{words.EXPLANATION})(?![^\W_])[^\w\n<:]*+:"
     rf"|(?P<aside>{words.EXPLANATION}|{words.REMARKS})(?![^\W_])[^\w\n<]*+$"
 )
+_HOST = rf"(?P<host>{words.HOST_HEADINGS}){_CLOSE}(?::|$)"
 _NAMED_BY = ("team", "short", "shall", "every", "behind", "bare", "numbered", "cell", "alone", "acts", "several", "of")
 _FLAGS = re.IGNORECASE | re.MULTILINE
-_LINE = re.compile(rf"{_BULLET}(?:{_SECTION}|{_EXPLAINS}|{_TEAM}|{_BARE})", _FLAGS)
+_LINE = re.compile(rf"{_BULLET}(?:{_HOST}|{_SECTION}|{_EXPLAINS}|{_TEAM}|{_BARE})", _FLAGS)
 _TAG = re.compile(
     rf"<\s*+(?:(?P<section>{_KEYWORD})"
     rf"|team[ \t]+(?:name[ \t]*=[ \t]*)?(?P<quote>[\"']?)(?P<team>{_WORD}(?:[ \t]+{_WORD}){{0,2}}+)(?P=quote)"
@@ -129,7 +133,7 @@ _JSON_AHEAD = re.compile(r"[\s{\[,]{0,40}+(?=\"teams?\"\s*+:\s*+\"[^\"\n<>]{1,60
 _NO_TEAM = re.compile(
     "also|answer|because|commands?|comments?|decisions?|do|final|finally|first|goal|ideas?|lastly|next|notes?|now|optional|or|orders?|"
     "never|output|plan|priority|reason(?:s|ing)?|reply|response|result|second|so|steps?|strategy|summary|tactics?|targets?|"
-    "tasks?|then|therefore|thoughts?|thus|warning|why|assistant",
+    "tasks?|then|therefore|thoughts?|thus|warning|why|assistant|accepted|rejected|refused",
     re.IGNORECASE,
 )
 _SECTIONS = tuple(
@@ -168,7 +172,7 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
     if found["alone"] is not None and not line_start:
         return None
     name = next((found[group] for group in _NAMED_BY if found[group] is not None), None)
-    section = _section(found["section"])
+    section = ReplySection.ACTIONS if found["host"] else _section(found["section"])
     explains = bool(found["explains"] or found["aside"])
     return Heading(
         end=match.end(),
@@ -184,6 +188,8 @@ def heading_at(text: str, at: int, *, line_start: bool) -> Heading | None:
 def _tone(found: dict[str, str | None]) -> Tone:
     if found["instead"]:
         return Tone.INSTEAD
+    if found["host"]:
+        return Tone.PAST
     if found["speak_of"]:
         return Tone.SPEAK_OF
     return Tone.OFFERED if found["offered"] else Tone.PAST if found["past"] else Tone.DO

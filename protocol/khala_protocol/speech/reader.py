@@ -451,8 +451,10 @@ class _Walk:
         self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
     ) -> None:
         kind = name.lower()
-        if args and isinstance(args[0], str) and (own := _TEAM_ARGUMENT.fullmatch(args[0])):
-            team, args = own["team"], args[1:]
+        named = [arg if isinstance(arg, str) and _TEAM_ARGUMENT.fullmatch(arg) else None for arg in args]
+        if (own := next(filter(None, named), None)) is not None:
+            team = _TEAM_ARGUMENT.fullmatch(own)["team"]  # type: ignore[index]  # it matches
+            args = tuple(arg for arg in args if arg != own)
         if kind in (FORGET, REVOKE):
             make = Forget if kind == FORGET else Revoke
             for number in numbers_in(args, name):

@@ -28,7 +28,7 @@ _STANDING = re.compile(
     re.IGNORECASE,
 )
 _NUMBER = re.compile(r"([0-9]{1,6}+)(?:\.0)?$")
-_SAMPLE = "write <Standing(Train_Probe(), until 22 Probe)>"
+_SAMPLE = "write <Standing(Name(arguments), until 4:30)>"
 
 
 @dataclass(frozen=True, slots=True)

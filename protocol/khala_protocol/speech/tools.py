@@ -45,6 +45,10 @@ _END = re.compile(r"\s*+</\s*+(?:\w+:)?(?:invoke|function)\s*+>", re.IGNORECASE)
 _YAML_LINE = re.compile(
     r"[ \t]*+(?:-[ \t]++)?[\"']?(?P<key>[A-Za-z_]\w{0,40}+)[\"']?[ \t]*+:[ \t]*+(?P<value>[^\n<>]{1,200}+)(?:\n|$)"
 )
+_YAML_OPEN = re.compile(r"[ \t]*+[\"']?(?P<key>[A-Za-z_]\w{0,40}+)[\"']?[ \t]*+:[ \t]*+\n")
+_YAML_VALUE = re.compile(r"[ \t]*+-[ \t]++(?P<value>[^\n<>:]{1,60}+)(?:\n|$)")
+_NESTED = frozenset({"args", "arguments", "parameters", "params", "input"})
+"""Keys whose own keys below them are those of the call."""
 _YAML_BEGIN = re.compile(rf"[ \t]*+-[ \t]++[\"']?(?:{'|'.join((*TEAMS, *NAMES))})[\"']?[ \t]*+:", re.IGNORECASE)
 _YAML_ITEM = re.compile(r"[ \t]*+-[ \t]")
 _OBJECT = re.compile(r"\s*+(?=\{)")
@@ -73,15 +77,31 @@ def item_at(text: str, at: int) -> ObjectCall | None:
     if not _YAML_BEGIN.match(text, at):
         return None
     found: dict[str, str] = {}
-    while len(found) < _MOST_KEYS and (line := _YAML_LINE.match(text, at)):
+    while len(found) < _MOST_KEYS and (line := _YAML_LINE.match(text, at) or _YAML_OPEN.match(text, at)):
         if found and (line["key"].lower() in found or _YAML_ITEM.match(text, at)):
             break
-        found[line["key"].lower()] = line["value"].strip(QUOTES + " \t")
         at = line.end()
+        if line.re is _YAML_LINE:
+            found[line["key"].lower()] = line["value"].strip(QUOTES + " \t")
+            continue
+        values, at = _values_at(text, at)
+        if values:
+            found[line["key"].lower()] = f"[{', '.join(values)}]"
+        elif line["key"].lower() not in _NESTED:
+            return None
     key = next((key for key in NAMES if key in found), None)
     if key is None or "(" in found[key] or not ("_" in found[key] or len(found) > len(("team", "action"))):
         return None
     return call_of({"name": found.pop(key), "arguments": found}, at)
+
+
+def _values_at(text: str, at: int) -> tuple[list[str], int]:
+    """Return the values of a YAML list, one on each line from here on, and where it ends."""
+    values = []
+    while len(values) < _MOST_KEYS and (item := _YAML_VALUE.match(text, at)):
+        values.append(item["value"].strip(QUOTES + " \t"))
+        at = item.end()
+    return values, at
 
 
 def _element(text: str, raw: str, opened: re.Match[str]) -> ObjectCall | None:

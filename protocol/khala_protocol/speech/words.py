@@ -40,6 +40,11 @@ OFFERED = "valid|available|legal"
 """Words before "actions" that say, as the host does, that the following is possible."""
 PAST = "last|previous|past|earlier|rejected"
 """Words before "actions" that say, as the host does, that the following was ordered before."""
+HOST_HEADINGS = (
+    r"(?:your[ \t]+)?last[ \t]+errors|what[ \t]+will[ \t]+do[ \t]+for[ \t]+team[ \t]+[\w.-]+|"
+    r"not[ \t]+possible(?:[ \t]+now)?"
+)
+"""Headings of an observation above calls that nobody orders, besides those of its actions."""
 INSTEAD = "final|revised|corrected|updated|definitive|definite|actual"
 """Words before "actions" that withdraw earlier text under such a heading."""
 EXPLANATION = "explanations?|rationale|justification|summary|conclusion|erklärung|explicación|解释|说明|总结"
