@@ -9,6 +9,7 @@ import json
 from typing import TYPE_CHECKING, Any, Final
 
 from khala_bridge import data
+from khala_bridge.knowledge.facts import DATA_SETS
 from khala_protocol.files import MB, read_limited, write_together
 from khala_sc2.knowledge.abilities import ability_facts
 from khala_sc2.knowledge.buffs import buff_facts
@@ -37,6 +38,9 @@ def facts(version: str) -> dict[str, str]:
         "upgrades": upgrade_facts(catalog),
         "buffs": buff_facts(catalog),
     }
+    for data_set in DATA_SETS:
+        other = unit_facts(load_catalog(version, data_set))
+        made[f"units.{data_set}"] = {name: kind for name, kind in other.items() if kind != made["units"][name]}
     return {f"{kind}.json": _text(catalog.version, catalog.build, records) for kind, records in made.items()}
 
 

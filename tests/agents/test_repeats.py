@@ -81,7 +81,7 @@ def test_the_system_message_knows_the_types_of_the_agents_own_units() -> None:
     task = load_task("2s3z")
     text = system_text(brief(task, task.agents[0], "run", 0))
     assert "\n# Your units\n- Zealot: Sturdy melee fighter" in text
-    assert "\n  hits ground and air, range 6, damage 13" in text
+    assert "\n  hits ground and air, range 6, damage 10" in text
 
 
 def test_a_player_behind_an_endpoint_is_told_the_task_and_its_contacts(told: Briefing) -> None:

@@ -10,7 +10,7 @@ The state of a running game is not knowledge but observation: a unit's health an
 the game does not say of an enemy, and what an order costs and needs.
 """
 
-from khala_bridge.knowledge.facts import VERSION, VERSIONS
+from khala_bridge.knowledge.facts import VERSION, VERSIONS, version_of
 from khala_bridge.knowledge.load import (
     RACES,
     WORKERS,
@@ -48,4 +48,5 @@ __all__ = [
     "short",
     "stand_ins",
     "upgrades",
+    "version_of",
 ]

@@ -2,6 +2,9 @@
 
 `khala knowledge write` makes the files from the simulator's tables. They hold no words: `load` adds these. Each file
 is read on its first use.
+
+The facts are those of the multiplayer's maps. A map that depends on other data has units with other numbers: the
+version `4.10/void` has those of `units.void.json` in place of its own, and all else as `4.10`.
 """
 
 from __future__ import annotations
@@ -21,6 +24,15 @@ M = TypeVar("M", bound=Frozen)
 VERSION: Final = "4.10"
 """Version of the facts: the one that PySC2's ids belong to."""
 VERSIONS: Final = (VERSION, "5.0.13")
+MULTI: Final = "multi"
+"""The data of the multiplayer's maps."""
+DATA_SETS: Final = ("liberty", "void")
+"""Other data that maps depend on: those of the first and the last campaign."""
+
+
+def version_of(data_set: str) -> str:
+    """Return the version of the facts that hold on a map with these data, `4.10/void`."""
+    return VERSION if data_set == MULTI else f"{VERSION}/{data_set}"
 
 
 @functools.cache
@@ -58,6 +70,13 @@ def _records(model: type[M], raw: dict[str, Any]) -> dict[str, M]:
 
 
 def _entries(version: str, kind: str) -> dict[str, dict[str, Any]]:
-    path = data.path("knowledge") / version / f"{kind}.json"
-    entries: dict[str, dict[str, Any]] = json.loads(path.read_bytes())["entries"]
+    number, _, data_set = version.partition("/")
+    entries = _read(number, f"{kind}.json")
+    if data_set and kind == "units":
+        entries |= _read(number, f"{kind}.{data_set}.json")
+    return entries
+
+
+def _read(version: str, file: str) -> dict[str, dict[str, Any]]:
+    entries: dict[str, dict[str, Any]] = json.loads((data.path("knowledge") / version / file).read_bytes())["entries"]
     return entries

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Final
 
+from khala_bridge.knowledge.facts import VERSION
 from khala_bridge.knowledge.load import describe_abilities, knowledge, upgrades
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ _AGAINST: Final = "damage_against_"
 
 
 @functools.lru_cache(4096)
-def improve(name: str, researched: frozenset[str]) -> UnitFacts | None:
+def improve(name: str, researched: frozenset[str], version: str = VERSION) -> UnitFacts | None:
     """Return a type as it is with these upgrades; None if the type is unknown."""
-    kind = knowledge().get(name)
+    kind = knowledge(version).get(name)
     if kind is None or not researched:
         return kind
     body = _sum(name, researched)
@@ -32,7 +33,7 @@ def improve(name: str, researched: frozenset[str]) -> UnitFacts | None:
         update={
             **{field: getattr(kind, field) + body.get(field, 0) for field in _PLAIN},
             "weapons": tuple(_sharper(weapon, arms) for weapon in kind.weapons),
-            "abilities": describe_abilities(kind, researched),
+            "abilities": describe_abilities(kind, researched, version=version),
         }
     )
 

@@ -10,6 +10,7 @@ import functools
 from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Final
 
+from khala_bridge.knowledge.facts import VERSION
 from khala_bridge.knowledge.improve import improve
 from khala_bridge.knowledge.load import knowledge
 from khala_bridge.knowledge.words import number as n
@@ -25,14 +26,19 @@ HITS: Final = {"any": "ground and air", "ground": "ground", "air": "air"}
 
 
 @functools.lru_cache(4096)
-def short(name: str, among: frozenset[str] | None = None, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
+def short(
+    name: str,
+    among: frozenset[str] | None = None,
+    researched: frozenset[str] = frozenset(),
+    version: str = VERSION,
+) -> tuple[str, ...]:
     """Return a type as lines: `Stalker: Mobile ranged walker …`, its body, its weapons, its counters.
 
     `among` are the types that matter now, those in sight: only these are named as counters, in an order of their own.
-    Without it some units of each race are named. `researched` are the upgrades of its owner, in all numbers. There are
-    no lines about an unknown type.
+    Without it some units of each race are named. `researched` are the upgrades of its owner, in all numbers, `version`
+    the facts that hold on the map. There are no lines about an unknown type.
     """
-    kind = improve(name, researched)
+    kind = improve(name, researched, version)
     if kind is None:
         return ()
     about = f"{name}: {kind.about}" if kind.about else name
@@ -40,9 +46,9 @@ def short(name: str, among: frozenset[str] | None = None, researched: frozenset[
 
 
 @functools.lru_cache(4096)
-def advice(name: str, researched: frozenset[str] = frozenset()) -> tuple[str, ...]:
+def advice(name: str, researched: frozenset[str] = frozenset(), version: str = VERSION) -> tuple[str, ...]:
     """Return lines about the use of an own type, and its abilities apart from moving and attacking: `Blink: …`."""
-    kind = improve(name, researched)
+    kind = improve(name, researched, version)
     if kind is None:
         return ()
     uses = [f"Use: {kind.uses}"] if kind.uses else []

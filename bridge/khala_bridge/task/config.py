@@ -434,6 +434,11 @@ class TaskConfig(Frozen):
         return self._map.model_copy(update={k: v for k, v in changed.items() if v is not None})
 
     @property
+    def map_data(self) -> str:
+        """The data that the map depends on, see `khala_bridge.knowledge.version_of`."""
+        return (self.own_map or known_maps()[self.map]).data
+
+    @property
     def has_variants(self) -> bool:
         """Whether the paper and its files differ in this task, so that there is a choice."""
         return self.paper != PapersTask() or bool(self.map and known_maps()[self.map].paper)

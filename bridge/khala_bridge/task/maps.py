@@ -62,6 +62,8 @@ class MapSpec(Frozen):
     """Game loop at which the map itself ends the game."""
     endless: bool = False
     """Whether the map ends no battle: the episode is over when a side of its first units has none that fights."""
+    data: Literal["multi", "liberty", "void"] = "multi"
+    """Data of the game that the map depends on: units have other numbers in those of a campaign."""
     goal: str = ""
     """The task on the map."""
     units: tuple[str, ...] = ()

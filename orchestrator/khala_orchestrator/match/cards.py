@@ -34,7 +34,7 @@ def briefing(task: TaskConfig, agent: AgentConfig, run: str, episode: int, episo
         agent_kind=agent.kind,
         task="\n".join(text for text in (task.task, agent.task) if text),
         teams=agent.team_specs(),
-        knowledge=knowledge_of(agent),
+        knowledge=knowledge_of(agent, task.map_data),
         actions=agent.specs(),
         correspondents=tuple(Contact(name=other.name, role=other.role) for other in others),
         channels=task.channels if others else (),

@@ -97,7 +97,7 @@ def item_at(text: str, at: int) -> ObjectCall | None:
 
 def _values_at(text: str, at: int) -> tuple[list[str], int]:
     """Return the values of a YAML list, one on each line from here on, and where it ends."""
-    values = []
+    values: list[str] = []
     while len(values) < _MOST_KEYS and (item := _YAML_VALUE.match(text, at)):
         values.append(item["value"].strip(QUOTES + " \t"))
         at = item.end()

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import pytest
 
+from khala_bridge.knowledge import short, version_of
+from khala_bridge.task.maps import known_maps
 from khala_sc2.cli import main
 from khala_sc2.knowledge import files
+from khala_simulator.maps.game_map import load_map
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from khala_bridge.task.maps import MapSpec
 
 
 STALKER = "Made by Gateway and WarpGate in 30 s; needs CyberneticsCore"
@@ -81,6 +87,7 @@ def test_write_makes_files_that_are_missing_or_old(
 ) -> None:
     monkeypatch.setattr(files, "directory", lambda version: tmp_path / version)
     names = ["4.10/units.json", "4.10/abilities.json", "4.10/upgrades.json", "4.10/buffs.json"]
+    names += ["4.10/units.liberty.json", "4.10/units.void.json"]
     place = "bridge/khala_bridge/data/knowledge"
     error = f"khala: out of date in {place}: {', '.join(names)}; `khala knowledge write` makes them\n"
     assert said(["write", "--version", "4.10", "--check"], capsys) == (1, "", error)
@@ -93,3 +100,17 @@ def test_every_record_stands_on_a_line_of_its_own(version: str) -> None:
         entries = json.loads(text)["entries"]
         lines = [line.rstrip(",") for line in text.splitlines() if line.startswith('"') and ": {" in line]
         assert [json.loads(f"{{{line}}}") for line in lines[1:]] == [{key: entries[key]} for key in entries], name
+
+
+@pytest.mark.parametrize("spec", known_maps().values(), ids=attrgetter("name"))
+def test_the_bridge_knows_the_data_that_each_map_depends_on(spec: MapSpec) -> None:
+    assert spec.data == load_map(spec.file.removesuffix(".SC2Map")).scenario.data
+
+
+def test_numbers_are_those_of_the_data_that_a_map_depends_on() -> None:
+    liberty, multi, void = (short("Stalker", version=version_of(name)) for name in ("liberty", "multi", "void"))
+    assert "damage 10 (+4 against armored) every 1.03 s" in liberty[2]
+    assert "damage 13 (+5 against armored) every 1.34 s" in multi[2]
+    assert void == liberty
+    assert "health 90, shield 90" in short("Adept", version=version_of("void"))[1]
+    assert "+13 against light" in short("Adept", frozenset(), frozenset({"ResonatingGlaives"}), version_of("void"))[2]

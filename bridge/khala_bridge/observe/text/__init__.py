@@ -70,11 +70,16 @@ SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
 """Names of the sections of a page by the kind of the agent, in their order."""
 
 
-def knowledge_of(agent: AgentConfig) -> tuple[str, ...]:
-    """Return what is known of each type of an agent's units; () if its pages have nothing of the kind."""
+def knowledge_of(agent: AgentConfig, data_set: str) -> tuple[str, ...]:
+    """Return what is known of each type of an agent's units; () if its pages have nothing of the kind.
+
+    Args:
+        agent: whose units they are.
+        data_set: the data that the map depends on, `TaskConfig.map_data`.
+    """
     if known.unit_knowledge not in (found.write for found in sections_of(agent)):
         return ()
-    return known.own_types(name for team in agent.teams for name in team.unit_types)
+    return known.own_types((name for team in agent.teams for name in team.unit_types), data_set)
 
 
 def sections_of(agent: AgentConfig) -> tuple[Section, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import advice, is_armed, is_structure, is_worker, knowledge, short
+from khala_bridge.knowledge import advice, is_armed, is_structure, is_worker, knowledge, short, version_of
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2
 
@@ -18,19 +18,21 @@ if TYPE_CHECKING:
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
     """Show what is known of every type in sight, and of the army that it leads: most of own types, least of allies."""
-    return _written(_types(page), frozenset(page.view.upgrades))
+    return _written(_types(page), frozenset(page.view.upgrades), version_of(page.task.map_data))
 
 
-def own_types(names: Iterable[str]) -> tuple[str, ...]:
+def own_types(names: Iterable[str], data_set: str) -> tuple[str, ...]:
     """Return what is known of each of an agent's own types before any upgrade, for its briefing.
 
-    Pages have the same lines, and those about counters; prompts do not repeat them.
+    Pages have the same lines, and those about counters; prompts do not repeat them. `data_set` are the data of the map.
     """
-    return tuple("\n".join((*short(name, frozenset()), *advice(name))) for name in _known(names))
+    version = version_of(data_set)
+    told = ((*short(name, frozenset(), version=version), *advice(name, version=version)) for name in _known(names))
+    return tuple(map("\n".join, told))
 
 
 @functools.lru_cache(1024)
-def _written(types: _Types, researched: frozenset[str]) -> tuple[str, ...]:
+def _written(types: _Types, researched: frozenset[str], version: str) -> tuple[str, ...]:
     """Return the lines about some types; the own side has its upgrades.
 
     Cached, since types rarely change between steps.
@@ -38,12 +40,13 @@ def _written(types: _Types, researched: frozenset[str]) -> tuple[str, ...]:
     friends, foes = frozenset((*types.mine, *types.allies)), frozenset(types.enemies)
     lines = ["Unit knowledge"] if any(types) else []
     for name in _all(types):
-        heading, *more = short(name, _opponents(name, friends, foes), researched if name in friends else frozenset())
+        own = researched if name in friends else frozenset[str]()
+        heading, *more = short(name, _opponents(name, friends, foes), own, version)
         lines.append(f"{INDENT}{heading}")
         if name in types.mine or name in foes:
             lines += [f"{INDENT2}{line}" for line in more]
         if name in types.mine:
-            lines += [f"{INDENT2}{line}" for line in advice(name, researched)]
+            lines += [f"{INDENT2}{line}" for line in advice(name, researched, version)]
     return tuple(lines)
 
 
