@@ -121,6 +121,16 @@ def test_what_an_agent_does_not_have_is_not_spoken_of(briefing: Callable[..., Br
     assert example.endswith("    Team Stalker-1:\n        <Stop()>")
 
 
+def test_an_agent_that_can_order_single_units_hears_what_becomes_of_its_orders_to_their_team(
+    briefing: Callable[..., Briefing],
+) -> None:
+    of_team = ActionSpec(name="Move_Screen", args=("screen",))
+    of_unit = ActionSpec(name="Select_Unit_Move_Screen", args=("tag", "screen"), actors=1)
+    rule = "An action for a single unit takes it out of the actions of its team in the same answer."
+    assert rule in system_text(briefing(actions=(of_team, of_unit)))
+    assert rule not in system_text(briefing(actions=(of_team,)))
+
+
 def test_an_agent_without_teams_and_actions_still_has_a_prompt(briefing: Callable[..., Briefing]) -> None:
     example = Prompt(briefing(teams=(), actions=())).messages("")[2].content
     assert parse(example).faults == ()

@@ -20,6 +20,7 @@ ACTIONS = {
     "Stalker": ["Attack_Unit", "Stop", "No_Operation", "Ability_Blink_Screen"],
     "Zealot": ["Attack_Unit", "Stop"],
     "HighTemplar": ["Move_Screen", "Ability_PsiStorm_Screen"],
+    "Adept": ["Move_Screen", "Ability_AdeptPhaseShift_Screen", "Ability_CancelPhaseShift"],
 }
 
 
@@ -245,3 +246,22 @@ def test_the_units_and_the_targets_that_will_do_are_named(unit: Any, team: Any) 
     ]
     assert reasons(team([*zealots, foes[1]], abilities=given))["Attack_Unit"] == "no enemy on the screen that fits"
     assert team([*zealots, foes[0]], abilities=given).arguments == ()
+
+
+def test_a_skill_has_one_name_and_calling_it_off_is_none(unit: Any, team: Any) -> None:
+    """An Adept whose shade is out may call it off, and is told that the shade is not ready."""
+    adept = unit(1, "Adept", 16, 16)
+    with_shade = {1: able("Move_screen", "Cancel_AdeptPhaseShift_quick")}
+    (seen,) = team([adept], abilities=with_shade).units
+    assert seen.details is None
+    ready = {1: able("Move_screen", "Effect_AdeptPhaseShift_screen")}
+    (seen,) = team([adept], abilities=ready).units
+    assert seen.details.ready == ("AdeptPhaseShift",)
+
+
+def test_targets_are_listed_by_their_distance(unit: Any, team: Any) -> None:
+    far = [unit(10 + x, "Zergling", 16 + x, 16, alliance="enemy") for x in (9, 3, 6)]
+    overlord = unit(30, "Overlord", 17, 16, alliance="enemy", is_flying=True)
+    view = team([unit(1, "Zealot", 16, 16), *far, overlord], abilities={1: able("Attack_screen")})
+    (attack,) = (argument for argument in view.arguments if argument.action == "Attack_Unit")
+    assert attack.tags == (hex(13), hex(16), hex(19))
