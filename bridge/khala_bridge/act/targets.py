@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.act.rejected import CallRejected
 from khala_bridge.auto.aims import aim_of, needs_sight, unfit
-from khala_bridge.frames import CAMERA_WIDTH, Camera, MinimapPoint, ScreenPoint, WorldPoint
+from khala_bridge.frames import CAMERA_WIDTH, Camera, MinimapPoint, ScreenPoint, WorldPoint, central
 from khala_bridge.state import Alliance
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import SEEN_NOW
@@ -129,7 +129,8 @@ class Targets:
         team = self._observation.team_now(said.team)
         if then is None or team is None:
             return None
-        return Camera(*self._units[team.head].pos, then.size)
+        places = [self._units[tag].pos for tag in team.tags]
+        return Camera(*places[central(places)], then.size)
 
     def _is_seen(self, point: WorldPoint) -> bool:
         """Return True if the player sees a place now."""
