@@ -188,17 +188,35 @@ def by_agent(turns: Sequence[AgentTurn]) -> dict[str, list[AgentTurn]]:
 
 def credit(recording: Recording) -> dict[tuple[str, int], list[AgentTurn]]:
     """Return the turns of a recording by side and episode, in the order of their decisions."""
-    books: dict[tuple[str, int], CreditBook] = defaultdict(CreditBook)
+    return dict(credit_by_episode(recording))
+
+
+def credit_by_episode(recording: Recording) -> Iterator[tuple[tuple[str, int], list[AgentTurn]]]:
+    """Yield each side and episode with its turns; the messages of one episode alone are kept meanwhile."""
+    results = {(result.side, result.episode): result for result in recording.results}
+    books: dict[str, tuple[int, CreditBook]] = {}
     for sample in recording:
         message = sample.message if sample.is_of(Observation) or sample.is_of(Report) else None
-        match message:
-            case Observation():
-                books[message.side, message.episode].observe(message)
-            case Report():
-                books[message.side, message.episode].report(message)
-    for result in recording.results:
-        books[result.side, result.episode].end(result)
-    return {place: book.turns for place, book in books.items()}
+        if not isinstance(message, Observation | Report):
+            continue
+        episode, book = books.get(message.side, (-1, CreditBook()))
+        if episode != message.episode:
+            if episode >= 0:
+                yield (message.side, episode), _ended(book, results.get((message.side, episode)))
+            episode, book = message.episode, CreditBook()
+            books[message.side] = episode, book
+        if isinstance(message, Observation):
+            book.observe(message)
+        else:
+            book.report(message)
+    for side, (episode, book) in books.items():
+        yield (side, episode), _ended(book, results.get((side, episode)))
+
+
+def _ended(book: CreditBook, result: Result | None) -> list[AgentTurn]:
+    if result is not None:
+        book.end(result)
+    return book.turns
 
 
 def own_rewards(
@@ -212,7 +230,7 @@ def own_rewards(
         reward: of a turn.
     """
     found = {}
-    for (side, episode), turns in credit(recording).items():
+    for (side, episode), turns in credit_by_episode(recording):
         for agent, own in by_agent(turns).items():
             values = [reward(turn) for turn in own]
             for turn, value, to_go in zip(own, values, rewards_to_go(values, gamma), strict=True):
