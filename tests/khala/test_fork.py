@@ -107,7 +107,7 @@ async def test_a_fork_is_the_recorded_match_up_to_its_step_and_goes_on_as_others
 @pytest.mark.parametrize("step", [0, 7, 30, -1])
 async def test_the_model_that_was_recorded_comes_to_the_recorded_end(golden: Trunk, tmp_path: Path, step: int) -> None:
     step = step % len(golden.loops)
-    futures = await play_all(planned(golden, tmp_path, "scripted").forks(step, 2), Here())
+    futures = await play_all(planned(golden, tmp_path, "scripted/focus-fire").forks(step, 2), Here())
     steps = range(len(golden.loops))
     for future in futures:
         assert seen_in(Recording.open(future.fork.record), steps) == seen_in(golden.recording, steps)
