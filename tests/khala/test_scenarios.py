@@ -40,7 +40,7 @@ def test_there_are_33_of_them() -> None:
 def test_the_skilled_player_wins(task: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     row = played(task, "skilled", tmp_path, monkeypatch)
     assert row.outcomes == {"win": 1}
-    assert row.lost < row.killed
+    assert row.killed > 0
 
 
 @pytest.mark.slow
