@@ -69,9 +69,10 @@ def python_of(version: str) -> str | None:
 
 
 @functools.cache
-def wheels_of(python: str, directory: Path) -> Path:
+def wheels_of(python: str, directory: Path, *, compiled: bool = True) -> Path:
     """Return a directory with a wheel of every distribution, as `make wheels` builds them for a Python."""
-    run("make", "--silent", "wheels", f"PYTHON={python}", f"DIST={directory}", cwd=ROOT)
+    engine = {} if compiled else {"KHALA_ENGINE": "python"}
+    run("make", "--silent", "wheels", f"PYTHON={python}", f"DIST={directory}", cwd=ROOT, **engine)
     return directory
 
 
@@ -130,7 +131,7 @@ def test_every_door_opens_after_plain_pip_installed_a_folder(
     python = python_of(version)
     if python is None:
         pytest.skip(f"this machine has no Python {version}")
-    dist = wheels_of(python, tmp_path_factory.getbasetemp() / f"dist-{version}")
+    dist = wheels_of(python, tmp_path_factory.getbasetemp() / f"dist-{version}", compiled=False)
     khala = Environment(tmp_path / "env", *sorted(dist.glob("*.whl")), python=python)
     cache = {"KHALA_CACHE": str(tmp_path / "cache")}
 
