@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import logging
 import signal
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -80,6 +81,8 @@ class Ray:
         return self
 
     async def _begin(self) -> None:
+        # Ray prints on stdout when a node is gone, and stdout is for the result
+        self._stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         if self._head is not None:
             await self._stack.enter_async_context(running_head(self._head))
             self._address = self._head
