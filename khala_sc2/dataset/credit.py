@@ -202,18 +202,20 @@ def credit_by_episode(recording: Recording) -> Iterator[tuple[tuple[str, int], l
         episode, book = books.get(message.side, (-1, CreditBook()))
         if episode != message.episode:
             if episode >= 0:
-                yield (message.side, episode), _ended(book, results.get((message.side, episode)))
-            episode, book = message.episode, CreditBook()
+                yield (message.side, episode), _close(book, results.get((message.side, episode)))
+            episode = message.episode
+            book = CreditBook()
             books[message.side] = episode, book
         if isinstance(message, Observation):
             book.observe(message)
         else:
             book.report(message)
     for side, (episode, book) in books.items():
-        yield (side, episode), _ended(book, results.get((side, episode)))
+        yield (side, episode), _close(book, results.get((side, episode)))
 
 
-def _ended(book: CreditBook, result: Result | None) -> list[AgentTurn]:
+def _close(book: CreditBook, result: Result | None) -> list[AgentTurn]:
+    """End an account, and return its turns."""
     if result is not None:
         book.end(result)
     return book.turns
