@@ -20,7 +20,7 @@ from khala_agents.prompt import Prompt
 from khala_orchestrator.roster import Seat
 from khala_protocol.messages import LOOPS_PER_S, Briefing, ChatMessage, Observation, Report, Scene, TokenTrace, Usage
 from khala_sc2.dataset.rewards import UNKNOWN, Reward, value_of
-from khala_sc2.dataset.row import UNFINISHED, NextObservation, OrderOfSide, Row
+from khala_sc2.dataset.row import NextObservation, OrderOfSide, Row, origin_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -156,17 +156,7 @@ class Transitions:
         rejections: tuple[Rejection, ...] = tuple(refused for told in told for refused in told.report.rejections)
         result = self._results.get((before.side, before.episode))
         return Row(
-            run=self._run.run,
-            task=self._run.task,
-            map_name=self._run.map_name,
-            game=self._run.game,
-            versions=self._run.versions,
-            seed=self._run.seed + before.episode,
-            side=before.side,
-            agent=before.agent,
-            episode=before.episode,
-            step=before.step,
-            game_loop=before.game_loop,
+            **origin_of(self._run, before, result),
             prompt=request(seen.text, orders, before, after, self._run.clock),
             prompt_recorded=False,
             example=0,
@@ -182,8 +172,6 @@ class Transitions:
             reward=_reward(episode, range(before.step, after.step)),
             own_reward=UNKNOWN,
             tokens=TokenTrace(),
-            outcome=result.outcome if result else UNFINISHED,
-            valid=result.valid if result else False,
             following=NextObservation(
                 step=after.step,
                 game_loop=after.game_loop,

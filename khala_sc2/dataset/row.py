@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 from khala_sc2.dataset.prompts import without_example
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from khala_protocol.messages import ChatMessage, Clock, Fate, ImageRef, Rejection, TokenTrace, Usage, View
+    from khala_protocol.messages import (
+        ChatMessage,
+        Clock,
+        Fate,
+        ImageRef,
+        Observation,
+        Rejection,
+        Result,
+        Run,
+        TokenTrace,
+        Usage,
+        View,
+    )
     from khala_sc2.dataset.rewards import Reward
 
 UNFINISHED = "unfinished"
@@ -107,3 +119,40 @@ class Row:
     def without_example(self) -> Row:
         """Return the row with a prompt that has no worked example."""
         return replace(self, prompt=without_example(self.prompt, self.example), example=0)
+
+
+class RowOrigin(TypedDict):
+    """The fields of a row that say where it is from, and how its episode ended."""
+
+    run: str
+    task: str
+    map_name: str
+    game: str
+    versions: Mapping[str, str]
+    seed: int
+    side: str
+    agent: str
+    episode: int
+    step: int
+    game_loop: int
+    outcome: str
+    valid: bool
+
+
+def origin_of(run: Run, seen: Observation, result: Result | None) -> RowOrigin:
+    """Return where the row of an observation is from; `result` is that of its episode, None if that has no end."""
+    return RowOrigin(
+        run=run.run,
+        task=run.task,
+        map_name=run.map_name,
+        game=run.game,
+        versions=run.versions,
+        seed=run.seed + seen.episode,
+        side=seen.side,
+        agent=seen.agent,
+        episode=seen.episode,
+        step=seen.step,
+        game_loop=seen.game_loop,
+        outcome=result.outcome if result else UNFINISHED,
+        valid=result.valid if result else False,
+    )

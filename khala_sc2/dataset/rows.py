@@ -20,7 +20,7 @@ from khala_protocol.messages import Briefing, ModelCall, Observation, Reply, Rep
 from khala_sc2.dataset.credit import own_rewards
 from khala_sc2.dataset.prompts import Prompter, count_example
 from khala_sc2.dataset.rewards import COUNTED, UNKNOWN, rewards
-from khala_sc2.dataset.row import UNFINISHED, Row, RowPicture
+from khala_sc2.dataset.row import Row, RowPicture, origin_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -219,17 +219,7 @@ class Rows:
         result = self._results.get((seen.side, seen.episode))
         shown = [ref for message in prompt for ref in message.images if ref.sha256 in decision.pictures]
         return Row(
-            run=self._run.run,
-            task=self._run.task,
-            map_name=self._run.map_name,
-            game=self._run.game,
-            versions=self._run.versions,
-            seed=self._run.seed + seen.episode,
-            side=seen.side,
-            agent=seen.agent,
-            episode=seen.episode,
-            step=seen.step,
-            game_loop=seen.game_loop,
+            **origin_of(self._run, seen, result),
             prompt=prompt,
             prompt_recorded=call is not None and self._as_sent,
             example=count_example(prompt, decision.example),
@@ -245,8 +235,6 @@ class Rows:
             reward=reward,
             own_reward=UNKNOWN if reward.reward is None else self._own_rewards.get(place, UNKNOWN),
             tokens=(call.tokens if call is not None and answered else None) or TokenTrace(),
-            outcome=result.outcome if result else UNFINISHED,
-            valid=result.valid if result else False,
         )
 
 

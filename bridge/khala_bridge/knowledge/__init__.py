@@ -10,7 +10,7 @@ The state of a running game is not knowledge but observation: a unit's health an
 the game does not say of an enemy, and what an order costs and needs.
 """
 
-from khala_bridge.knowledge.facts import VERSION, VERSIONS, version_of
+from khala_bridge.knowledge.facts import VERSION, VERSIONS, DataSet, version_of
 from khala_bridge.knowledge.load import (
     RACES,
     WORKERS,
@@ -34,6 +34,7 @@ __all__ = [
     "WORKERS",
     "AbilityFacts",
     "BuffFacts",
+    "DataSet",
     "UnitFacts",
     "UpgradeFacts",
     "WeaponFacts",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import json
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Literal, TypeAlias, TypeVar, get_args
 
 from pydantic import TypeAdapter
 
@@ -24,13 +24,14 @@ M = TypeVar("M", bound=Frozen)
 VERSION: Final = "4.10"
 """Version of the facts: the one that PySC2's ids belong to."""
 VERSIONS: Final = (VERSION, "5.0.13")
+DataSet: TypeAlias = Literal["multi", "liberty", "void"]
+"""Data of the game that a map depends on: the multiplayer's, or those of the first or the last campaign."""
 MULTI: Final = "multi"
-"""The data of the multiplayer's maps."""
-DATA_SETS: Final = ("liberty", "void")
-"""Other data that maps depend on: those of the first and the last campaign."""
+DATA_SETS: Final[tuple[DataSet, ...]] = tuple(name for name in get_args(DataSet) if name != MULTI)
+"""Those with files of their own."""
 
 
-def version_of(data_set: str) -> str:
+def version_of(data_set: DataSet) -> str:
     """Return the version of the facts that hold on a map with these data, `4.10/void`."""
     return VERSION if data_set == MULTI else f"{VERSION}/{data_set}"
 

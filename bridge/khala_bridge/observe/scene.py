@@ -32,7 +32,7 @@ from __future__ import annotations
 import functools
 import math
 from collections import Counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.auto.aims import Aim
     from khala_bridge.auto.warp import PowerField
+    from khala_bridge.frames import WorldPoint
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.events import Events
     from khala_bridge.observe.looks import Look, Shown
@@ -66,6 +67,9 @@ if TYPE_CHECKING:
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import Alliance as Whose
     from khala_protocol.messages import Frames, Point, UnitView
+
+    _Effect: TypeAlias = tuple[str, Alliance, float, tuple[WorldPoint, ...], float | None]
+    """Name, owner, radius, places and seconds that are left."""
 
 _WHOSE: dict[Alliance, Whose] = {
     Alliance.OWN: "own",
@@ -230,10 +234,11 @@ class SideScene:
         seen = [b for b in self.resources if on_screen(camera, b)]
         return tuple(b.view.but(screen=screen_of(camera, b)) for b in sorted(seen, key=lambda b: (b.name, b.tag)))
 
-    def _effects_on(self, camera: Camera) -> tuple[EffectView, ...]:
-        """Return the effects on the ground that a camera shows, and barriers that belong to nobody, by name."""
+    @functools.cached_property
+    def _effects(self) -> list[_Effect]:
+        """The effects on the ground and the barriers that belong to nobody, by name."""
         left_s = self._timers.effect_left_s
-        found = []
+        found: list[_Effect] = []
         for effect in self.snapshot.effects:
             name = effect_name(effect.effect_id)
             left = left_s((effect.effect_id, effect.places), name)
@@ -242,8 +247,12 @@ class SideScene:
         found += [
             (unit.name, unit.alliance, unit.radius, (unit.pos,), left_s(unit.tag, unit.name)) for unit in barriers
         ]
+        return sorted(found, key=lambda effect: effect[:4])
+
+    def _effects_on(self, camera: Camera) -> tuple[EffectView, ...]:
+        """Return the effects on the ground that a camera shows, and barriers that belong to nobody, by name."""
         made = []
-        for name, alliance, radius, places, left in sorted(found, key=lambda effect: effect[:4]):
+        for name, alliance, radius, places, left in self._effects:
             shown = [place for place in places if _shows(camera, *place)]
             if shown:
                 points = tuple(to_tenth(camera.screen(*place), camera.size) for place in shown)

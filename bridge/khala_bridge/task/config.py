@@ -43,6 +43,8 @@ from khala_protocol.messages import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
+    from khala_bridge.knowledge import DataSet
+
 T = TypeVar("T")
 
 MOST_ACTIONS = 1000
@@ -434,7 +436,7 @@ class TaskConfig(Frozen):
         return self._map.model_copy(update={k: v for k, v in changed.items() if v is not None})
 
     @property
-    def map_data(self) -> str:
+    def map_data(self) -> DataSet:
         """The data that the map depends on, see `khala_bridge.knowledge.version_of`."""
         return (self.own_map or known_maps()[self.map]).data
 

@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 from pydantic import Field, field_validator
 
 from khala_bridge import data
+from khala_bridge.knowledge import DataSet  # noqa: TC001  # pydantic evaluates it
 from khala_protocol.messages import Frozen
 
 Race: TypeAlias = Literal["protoss", "terran", "zerg", "random"]
@@ -62,7 +63,7 @@ class MapSpec(Frozen):
     """Game loop at which the map itself ends the game."""
     endless: bool = False
     """Whether the map ends no battle: the episode is over when a side of its first units has none that fights."""
-    data: Literal["multi", "liberty", "void"] = "multi"
+    data: DataSet = "multi"
     """Data of the game that the map depends on: units have other numbers in those of a campaign."""
     goal: str = ""
     """The task on the map."""

@@ -451,10 +451,10 @@ class _Walk:
         self, name: str, args: tuple[str | Point, ...], start: int, end: int, *, team: str | None = None
     ) -> None:
         kind = name.lower()
-        named = [arg if isinstance(arg, str) and _TEAM_ARGUMENT.fullmatch(arg) else None for arg in args]
+        named = (_TEAM_ARGUMENT.fullmatch(arg) for arg in args if isinstance(arg, str))
         if (own := next(filter(None, named), None)) is not None:
-            team = _TEAM_ARGUMENT.fullmatch(own)["team"]  # type: ignore[index]  # it matches
-            args = tuple(arg for arg in args if arg != own)
+            team = own["team"]
+            args = tuple(arg for arg in args if arg != own.string)
         if kind in (FORGET, REVOKE):
             make = Forget if kind == FORGET else Revoke
             for number in numbers_in(args, name):

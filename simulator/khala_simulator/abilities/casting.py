@@ -126,8 +126,7 @@ def aim_refusal(world: World, cast: Cast) -> ActionResult:
     """Return why a unit can't aim an ability like this, or success; the way there only counts if it can't walk."""
     slot, ability, target = cast.slot, cast.ability, cast.target
     if target == NOBODY and cast.point is None and ability.requires_point:
-        aims_at_units = AbilityAim.POINT not in ability.aim
-        return ActionResult.MUST_TARGET_UNIT if aims_at_units else ActionResult.MUST_TARGET_VISIBLE_LOCATION
+        return wrong_aim(ability)
     if target != NOBODY:
         wrong = fits(world, slot, target, ability.filters)
         if wrong is not ActionResult.SUCCESS:
@@ -140,6 +139,13 @@ def aim_refusal(world: World, cast: Cast) -> ActionResult:
     if far and world.step_max[slot] <= 0.0 and not in_range(world, cast, slop=0.0):
         return ActionResult.TARGET_IS_OUT_OF_RANGE
     return SKILLS[ability.effect].refuse(world, cast)
+
+
+def wrong_aim(ability: Ability) -> ActionResult:
+    """Return the refusal of an ability that is aimed at another kind of target than it can be."""
+    if AbilityAim.POINT in ability.aim:
+        return ActionResult.MUST_TARGET_VISIBLE_LOCATION
+    return ActionResult.MUST_TARGET_UNIT if AbilityAim.UNIT in ability.aim else ActionResult.ERROR
 
 
 def fits(world: World, slot: int, target: int, words: Filter) -> ActionResult:

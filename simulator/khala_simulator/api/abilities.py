@@ -241,10 +241,7 @@ def _aim_result(world: World, player: int, ability: Ability, command: UnitComman
     aim = command.aim
     allowed = ability.aim
     if not aim & allowed:
-        aimless = AbilityAim.POINT not in ability.aim
-        return ActionResult.MUST_TARGET_UNIT if aimless and AbilityAim.UNIT in ability.aim else (
-            ActionResult.ERROR if aimless else ActionResult.MUST_TARGET_VISIBLE_LOCATION
-        )  # fmt: skip
+        return casting.wrong_aim(ability)
     if aim == UNIT:
         remembered = target != NOBODY and command.target in world.memories[player].of_unit
         c = columns.columns_of(world)

@@ -18,6 +18,10 @@ cdef int64_t _INDEX_SHIFT
 cdef int64_t _SLOT
 
 
+@cython.locals(slot=int64_t)
+cdef int64_t slot_of(Columns c, int64_t tag) noexcept
+
+
 @cython.final
 cdef class Reader:
     cdef tuple arrays

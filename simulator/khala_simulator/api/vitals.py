@@ -53,6 +53,12 @@ def look(
             reader.read(slot, cells, n, i)
 
 
+def slot_of(c: Columns, tag: int) -> int:
+    """Return the slot of a unit, or NOBODY if it is not in the world; as `World.slot_of`, for compiled rules."""
+    slot = tag >> _INDEX_SHIFT & _SLOT
+    return slot if slot < c.capacity and c.tag[slot] == tag else NOBODY
+
+
 class Reader:
     """Reads the vitals of units of one world; it holds until the world grows or an upgrade is done."""
 
@@ -67,9 +73,8 @@ class Reader:
 
     def find(self, tag: int) -> int:
         """Return the slot of a unit, or NOBODY if it is not in the world."""
-        slot = tag >> _INDEX_SHIFT & _SLOT
-        is_there = self.c.tag[slot] == tag and self.c.carrier[slot] == NOBODY
-        return slot if is_there else NOBODY
+        slot = slot_of(self.c, tag)
+        return slot if slot != NOBODY and self.c.carrier[slot] == NOBODY else NOBODY
 
     def read(self, slot: int, numbers: Cells, n: int, i: int) -> None:
         """Write the numbers of the unit in a slot into a column of a table with n columns."""

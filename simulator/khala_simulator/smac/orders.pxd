@@ -2,14 +2,14 @@ cimport cython
 from libc.stdint cimport int64_t
 
 from khala_simulator.abilities cimport casting
+from khala_simulator.api cimport vitals
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.smac.fighters cimport Fighters
 
 cdef int64_t HEAL
 cdef int64_t PLAYER
-cdef int64_t _INDEX_SHIFT
-cdef int64_t _SLOT
+cdef int64_t NOBODY
 cdef int64_t NO_OP
 cdef int64_t STOP_ACTION
 cdef int64_t FIRST_MOVE
@@ -28,5 +28,3 @@ cdef _goal(Fighters fighters, int64_t agent, int64_t way, double far)
 cdef _order(object world, int64_t tag, int64_t ability, int64_t target, object point)
 @cython.locals(victim=int64_t)
 cdef bint _may_attack(Columns c, int64_t tag) noexcept
-@cython.locals(slot=int64_t)
-cdef int64_t _find(Columns c, int64_t tag) noexcept

@@ -10,12 +10,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.api import vitals
 from khala_simulator.api.abilities import UnitCommand, forms, judge
 from khala_simulator.api.giving import carry_out
+from khala_simulator.battle import PLAYER
 from khala_simulator.native import columns, memory
 from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP
 from khala_simulator.smac.rules import STOP as STOP_ACTION
 from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import ATTACK, MOVE, STOP
 from khala_simulator.world.world import NO_TAG
 
@@ -30,10 +33,7 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
 
 HEAL: Final = 386
-PLAYER: Final = 1
 _EFFECTS: Final = {STOP: "stop", MOVE: "move", ATTACK: "attack"}
-_INDEX_SHIFT: Final = 18
-_SLOT: Final = 0x3FFF
 
 
 def give_orders(world: World, fighters: Fighters, actions: NDArray[np.int64], move_amount: float) -> None:
@@ -72,8 +72,8 @@ def _goal(fighters: Fighters, agent: int, way: int, far: float) -> Point:
 def _order(world: World, tag: int, ability: int, target: int, point: Point | None) -> None:
     """Give a unit one order."""
     c = columns.columns_of(world)
-    slot = _find(c, tag)
-    own = forms(world.catalog, c.type[slot], ability)[0] if slot >= 0 else None
+    slot = vitals.slot_of(c, tag)
+    own = forms(world.catalog, c.type[slot], ability)[0] if slot != NOBODY else None
     if own is None or own.effect != _EFFECTS.get(ability):
         carry_out(world, judge(world, PLAYER, UnitCommand(ability, (tag,), target, point)))
     elif casting.refusal(world, slot, own) is not ActionResult.SUCCESS:
@@ -88,11 +88,5 @@ def _order(world: World, tag: int, ability: int, target: int, point: Point | Non
 
 def _may_attack(c: Columns, tag: int) -> bool:
     """Return whether the player may aim at a unit: whether it is there and in sight."""
-    victim = _find(c, tag)
-    return victim >= 0 and bool(c.visible[PLAYER * c.capacity + victim])
-
-
-def _find(c: Columns, tag: int) -> int:
-    """Return the slot of a unit, or -1 if it is not in the world."""
-    slot = tag >> _INDEX_SHIFT & _SLOT
-    return slot if slot < c.capacity and c.tag[slot] == tag else -1
+    victim = vitals.slot_of(c, tag)
+    return victim != NOBODY and bool(c.visible[PLAYER * c.capacity + victim])

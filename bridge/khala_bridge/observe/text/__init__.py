@@ -20,6 +20,7 @@ from khala_bridge.observe.text.page import SECTIONS, Page, Section, find_section
 from khala_bridge.observe.text.tokens import tokens
 
 if TYPE_CHECKING:
+    from khala_bridge.knowledge import DataSet
     from khala_bridge.task.config import AgentConfig
     from khala_protocol.messages import AgentKind
 
@@ -70,7 +71,7 @@ SECTIONS_OF: dict[AgentKind, tuple[str, ...]] = {
 """Names of the sections of a page by the kind of the agent, in their order."""
 
 
-def knowledge_of(agent: AgentConfig, data_set: str) -> tuple[str, ...]:
+def knowledge_of(agent: AgentConfig, data_set: DataSet) -> tuple[str, ...]:
     """Return what is known of each type of an agent's units; () if its pages have nothing of the kind.
 
     Args:

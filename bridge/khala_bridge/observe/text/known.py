@@ -12,6 +12,7 @@ from khala_bridge.observe.text.words import INDENT, INDENT2
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from khala_bridge.knowledge import DataSet
     from khala_bridge.observe.text.page import Page
 
 
@@ -21,7 +22,7 @@ def unit_knowledge(page: Page) -> Iterable[str]:
     return _written(_types(page), frozenset(page.view.upgrades), version_of(page.task.map_data))
 
 
-def own_types(names: Iterable[str], data_set: str) -> tuple[str, ...]:
+def own_types(names: Iterable[str], data_set: DataSet) -> tuple[str, ...]:
     """Return what is known of each of an agent's own types before any upgrade, for its briefing.
 
     Pages have the same lines, and those about counters; prompts do not repeat them. `data_set` are the data of the map.
