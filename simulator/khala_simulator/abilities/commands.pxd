@@ -4,23 +4,24 @@ from libc.stdint cimport int64_t
 from khala_simulator.combat cimport targets
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t IDLE
 
 
 @cython.locals(c=Columns)
-cdef _soon(object world, int64_t slot)
+cdef _soon(WorldFields world, int64_t slot)
 @cython.locals(c=Columns, step=double)
-cpdef bint can_move(object world, int64_t slot) except -1
+cpdef bint can_move(WorldFields world, int64_t slot) except -1
 @cython.locals(c=Columns, armed=bint)
-cpdef bint can_attack(object world, int64_t slot) except -1
-cpdef bint can_reach(object world, int64_t slot, int64_t victim) except -1
+cpdef bint can_attack(WorldFields world, int64_t slot) except -1
+cpdef bint can_reach(WorldFields world, int64_t slot, int64_t victim) except -1
 cdef bint _commandable(object unit) except -1
 @cython.locals(c=Columns, waiting=list)
-cdef bint _give(object world, int64_t slot, object wanted, bint queue) except -1
-cdef _of_its_own(object world, int64_t row, object order)
+cdef bint _give(WorldFields world, int64_t slot, object wanted, bint queue) except -1
+cdef _of_its_own(WorldFields world, int64_t row, object order)
 @cython.locals(c=Columns, target=int64_t, opponent=int64_t, fights_on=bint, attacks=bint, casts=bint)
-cpdef begin(object world, int64_t slot, object order)
+cpdef begin(WorldFields world, int64_t slot, object order)
 @cython.locals(x=double, y=double)
 cdef memory.Point _point(object given, memory.Point place) except *

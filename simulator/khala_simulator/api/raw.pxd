@@ -6,6 +6,7 @@ from khala_simulator.maps.heights cimport Heights
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point, boolean
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef uint32_t ATTACK
@@ -22,7 +23,7 @@ cdef int64_t CAST
 
 cdef class _View:
     cdef object units
-    cdef object world
+    cdef WorldFields world
     cdef Columns c
     cdef Heights heights
     cdef wire.MessageWriter part
@@ -73,7 +74,7 @@ cdef class _View:
 
 
 cdef dict _buffs_by_row(object worn)
-cdef dict _last_ends(object world)
+cdef dict _last_ends(WorldFields world)
 @cython.locals(n=Py_ssize_t, message=wire.MessageWriter, unit=wire.MessageWriter, i=Py_ssize_t, is_here=bint, own=bint)
 cdef _encode(object units)
 cdef int _put_known(wire.MessageWriter unit, _View view, Py_ssize_t i, bint is_here) except -1

@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.api cimport fields, wire
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t SELF
 cdef int64_t NEUTRAL
@@ -27,6 +28,6 @@ cdef class _Infos:
 
 
 @cython.locals(infos=_Infos, message=wire.MessageWriter, slot=int64_t)
-cdef _encode_multi(object world, object types, list slots, int64_t player)
+cdef _encode_multi(WorldFields world, object types, list slots, int64_t player)
 @cython.locals(infos=_Infos)
-cdef _unit(object world, object types, int64_t slot, int64_t player)
+cdef _unit(WorldFields world, object types, int64_t slot, int64_t player)

@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport boolean
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t X
@@ -38,4 +39,4 @@ cdef class Reader:
 
 
 @cython.locals(reader=Reader, n=int64_t, i=int64_t, slot=int64_t)
-cpdef look(object world, object types, object tags, object there, object numbers)
+cpdef look(WorldFields world, object types, object tags, object there, object numbers)

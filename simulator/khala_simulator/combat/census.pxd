@@ -5,6 +5,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport boolean
+from khala_simulator.world.fields cimport WorldFields
 
 
 @cython.final
@@ -18,4 +19,4 @@ cdef class Census:
     cdef readonly bint weapons_with_filters
 
 
-cpdef Census census(object world)
+cpdef Census census(WorldFields world)

@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native cimport memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
+from khala_simulator.world.fields cimport WorldFields
 
 cdef double SKIN
 cdef double OVERLAP_ALLOWED
@@ -64,4 +65,4 @@ cdef class Crowd:
     cdef bint _meet(self, Py_ssize_t k, Py_ssize_t end) except -1
 
 
-cdef Crowd crowd_of(object world)
+cdef Crowd crowd_of(WorldFields world)

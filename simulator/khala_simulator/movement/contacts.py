@@ -262,5 +262,5 @@ def crowd_of(world: World) -> Crowd:
     """Return the crowd of a world."""
     if world.bodies is None:
         world.bodies = Crowd()
-    crowd: Crowd = world.bodies  # type: ignore[assignment]  # its caches say less
+    crowd: Crowd = world.bodies  # type: ignore[assignment]  # its fields say less
     return crowd

@@ -20,6 +20,7 @@ DECLARATION: Final = '''\
 from libc.stdint cimport int64_t
 
 from khala_simulator.native.memory cimport Point, boolean
+from khala_simulator.world.fields cimport WorldFields
 
 cdef class Columns:
     """One world's columns; they hold until it grows."""
@@ -29,11 +30,10 @@ cdef class Columns:
     cdef boolean* visible  # (players, capacity)
 {pointers}
 
-cdef Columns bind(object world)
+cdef Columns bind(WorldFields world)
 
-cdef inline Columns columns_of(object world):
-    native = world.native
-    return bind(world) if native is None else <Columns>native
+cdef inline Columns columns_of(WorldFields world):
+    return bind(world) if world.native is None else <Columns>world.native
 '''
 DEFINITION: Final = '''\
 # Written by khala_simulator.native.declare from world.columns.
@@ -67,7 +67,7 @@ cdef tuple NAMES = (
 cdef tuple EMPTY = tuple(COLUMNS[name].make(1) for name in NAMES)
 
 
-cdef Columns bind(object world):
+cdef Columns bind(WorldFields world):
     cdef Columns c = Columns.__new__(Columns)
     cdef tuple arrays = (world.visible, *[getattr(world, name) for name in NAMES])
     for array in arrays:

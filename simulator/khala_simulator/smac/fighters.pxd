@@ -5,6 +5,7 @@ from khala_simulator.api cimport vitals
 from khala_simulator.api.vitals cimport Reader
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport boolean
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t LIFE
@@ -40,7 +41,7 @@ cdef class Fighters:
 
     cdef _bind(self)
     @cython.locals(reader=Reader, n=int64_t, i=int64_t, slot=int64_t, there=bint)
-    cpdef look(self, object world, object types)
+    cpdef look(self, WorldFields world, object types)
     @cython.locals(damage=double, kills=double, deaths=double)
     cpdef double reward(self, double death_value, double negative_scale, bint only_positive)
     @cython.locals(total=double, i=int64_t)

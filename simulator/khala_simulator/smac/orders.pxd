@@ -6,6 +6,7 @@ from khala_simulator.api cimport vitals
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.smac.fighters cimport Fighters
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t HEAL
 cdef int64_t PLAYER
@@ -21,10 +22,10 @@ cdef int64_t ATTACK
 
 
 @cython.locals(agent=int64_t, action=int64_t, tag=int64_t)
-cpdef give_orders(object world, Fighters fighters, object actions, double move_amount)
+cpdef give_orders(WorldFields world, Fighters fighters, object actions, double move_amount)
 @cython.locals(x=double, y=double, dx=double, dy=double)
 cdef _goal(Fighters fighters, int64_t agent, int64_t way, double far)
 @cython.locals(c=Columns, slot=int64_t)
-cdef _order(object world, int64_t tag, int64_t ability, int64_t target, object point)
+cdef _order(WorldFields world, int64_t tag, int64_t ability, int64_t target, object point)
 @cython.locals(victim=int64_t)
 cdef bint _may_attack(Columns c, int64_t tag) noexcept

@@ -5,6 +5,7 @@ from khala_simulator.combat cimport census, targets
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
+from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t AIR_PLANE
@@ -44,7 +45,7 @@ cdef class _Foes:
 
 
 @cython.locals(loop=int64_t, slot=int64_t, player=int64_t)
-cpdef choose_targets(object world)
+cpdef choose_targets(WorldFields world)
 @cython.locals(target=int64_t)
 cdef bint _is_due(Columns c, int64_t slot, int64_t loop) noexcept
 cdef bint _loses(Columns c, int64_t slot) noexcept
@@ -60,7 +61,7 @@ cdef int64_t _foe_of(Columns c, int64_t slot) noexcept
 @cython.locals(threatens=bint)
 cdef double rank_of(Columns c, int64_t seeker, int64_t foe) noexcept
 @cython.locals(slot=int64_t, foe=int64_t)
-cdef _seek(object world, Columns c, int64_t player, list seekers)
+cdef _seek(WorldFields world, Columns c, int64_t player, list seekers)
 @cython.locals(now=int64_t, is_free=bint, best=int64_t, rank=double, rank_now=double)
 cdef int64_t _choose(Columns c, _Foes foes, int64_t slot) noexcept
 @cython.locals(planes=int64_t, margin=double, on_ground=double, in_air=double, best=int64_t, best_gap=double,
@@ -70,10 +71,10 @@ cdef (int64_t, double) _find_best(Columns c, _Foes foes, int64_t slot, bint in_r
 cdef bint _may_aim(Columns c, int64_t slot, int64_t foe, double gap) noexcept
 @cython.locals(on_ground=bint, row=int64_t, touch=double)
 cdef bint _reaches(Columns c, _Foes foes, int64_t slot, int64_t foe, double gap) noexcept
-cdef _take(object world, Columns c, int64_t slot, int64_t target)
+cdef _take(WorldFields world, Columns c, int64_t slot, int64_t target)
 @cython.locals(loop=int64_t, victim=int64_t, attacker=int64_t, friend=int64_t, i=Py_ssize_t)
-cdef _answer(object world, Columns c)
+cdef _answer(WorldFields world, Columns c)
 cdef bint _hears(Columns c, int64_t friend, int64_t victim) noexcept
 @cython.locals(roams=bint, is_free=bint)
-cdef _turn_on(object world, Columns c, int64_t slot, int64_t attacker)
-cdef _flee(object world, int64_t victim, int64_t attacker)
+cdef _turn_on(WorldFields world, Columns c, int64_t slot, int64_t attacker)
+cdef _flee(WorldFields world, int64_t victim, int64_t attacker)

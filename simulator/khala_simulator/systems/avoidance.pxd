@@ -7,6 +7,7 @@ from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
 from khala_simulator.systems cimport flanking
+from khala_simulator.world.fields cimport WorldFields
 
 cdef double* FAN_COS
 cdef double* FAN_SIN
@@ -26,12 +27,12 @@ cdef int64_t NOBODY
 
 
 @cython.locals(loop=int64_t, slot=int64_t)
-cpdef find_headings(object world)
+cpdef find_headings(WorldFields world)
 cdef bint _flows(Columns c, int64_t slot) noexcept
 @cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double, standing=_Standing)
-cpdef begin(object world, object slots, object shift)
+cpdef begin(WorldFields world, object slots, object shift)
 @cython.locals(loop=int64_t, stalled=int64_t, slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
-cdef _look(object world, Columns c, list turning)
+cdef _look(WorldFields world, Columns c, list turning)
 @cython.locals(turn=int64_t)
 cdef int64_t _first_free(Columns c, _Crowd crowd, SurfaceGrid grid, int64_t slot, Point way) noexcept
 cdef Point _heading(Point way, int64_t turn, double side) noexcept

@@ -7,6 +7,7 @@ from khala_simulator.movement cimport turning
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point, boolean
+from khala_simulator.world.fields cimport WorldFields
 
 cdef double TURNING_CIRCLES
 cdef double NO_DISTANCE
@@ -24,13 +25,13 @@ cdef class _Walks:
 
 
 @cython.locals(n=Py_ssize_t, slot=Py_ssize_t, walking=Py_ssize_t, drifts=bint, anyone=bint)
-cpdef move(object world)
+cpdef move(WorldFields world)
 @cython.locals(i=Py_ssize_t, slot=int64_t)
-cdef _face_targets(object world, Columns c)
+cdef _face_targets(WorldFields world, Columns c)
 cdef bint _coasts(Columns c, int64_t slot) noexcept
 cdef void _drift(Columns c, int64_t slot) noexcept
 @cython.locals(creeps=bint, width=int64_t, height=int64_t, late=bint, i=Py_ssize_t, slot=int64_t, top_speed=double)
-cdef _walk(object world, Columns c, Py_ssize_t walking, bint brakers)
+cdef _walk(WorldFields world, Columns c, Py_ssize_t walking, bint brakers)
 @cython.locals(column=int64_t, row=int64_t)
 cdef int64_t _cell(Point at, int64_t width, int64_t height) noexcept
 @cython.locals(slot=int64_t, speed=double, left=double)

@@ -7,6 +7,7 @@ from khala_simulator.movement.ways cimport Way
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
+from khala_simulator.world.fields cimport WorldFields
 
 cdef double CORNER_REACHED
 cdef double NEAR_CORNER
@@ -20,17 +21,17 @@ cdef int64_t LAYERS
 
 
 @cython.locals(loop=int64_t, latest=int64_t, due=int64_t, slot=int64_t)
-cpdef find_ways(object world)
+cpdef find_ways(WorldFields world)
 @cython.locals(i=int64_t, slot=int64_t, layer=int64_t, many=int64_t, loop=int64_t, soon=bint)
-cdef _check(object world, Columns c, int64_t due, int64_t latest)
+cdef _check(WorldFields world, Columns c, int64_t due, int64_t latest)
 cdef double _away(Point point, Point other) noexcept
 @cython.locals(loop=int64_t, i=int64_t, slot=int64_t)
-cdef _look_over(object world, Columns c, int64_t* slots, int64_t n, int64_t layer)
+cdef _look_over(WorldFields world, Columns c, int64_t* slots, int64_t n, int64_t layer)
 @cython.locals(grid=SurfaceGrid, lines=Lines, i=int64_t, crooked=bint)
-cdef _go_straight(object world, Columns c, int64_t* slots, int64_t n, int64_t layer)
+cdef _go_straight(WorldFields world, Columns c, int64_t* slots, int64_t n, int64_t layer)
 cdef Point _stopping_point(Columns c, int64_t slot) noexcept
 @cython.locals(i=int64_t, slot=int64_t, way=Way)
-cdef _go_round(object world, Columns c, SurfaceGrid grid, int64_t* slots, int64_t n)
+cdef _go_round(WorldFields world, Columns c, SurfaceGrid grid, int64_t* slots, int64_t n)
 @cython.locals(centre=Point)
 cdef void _turn_corner(Columns c, SurfaceGrid grid, Way way) noexcept
 @cython.locals(i=Py_ssize_t, best=Py_ssize_t, cost=double, least=double)

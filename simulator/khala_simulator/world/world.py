@@ -23,7 +23,7 @@ from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
 from khala_simulator.world import shots
 from khala_simulator.world.active_buffs import ActiveBuffs
-from khala_simulator.world.caches import WorldCaches
+from khala_simulator.world.fields import WorldFields
 from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
 from khala_simulator.world.creep import Creep
 from khala_simulator.world.ground import BuiltGround
@@ -93,7 +93,7 @@ class Rally:
     target: int = NO_TAG
 
 
-class World(UnitColumns, WorldCaches):
+class World(UnitColumns, WorldFields):
     """One running game. The columns have ``capacity`` rows; ``live`` lists the slots in use, ascending.
 
     The world grows by itself; keep no reference to a column across ``spawn``.
@@ -109,7 +109,7 @@ class World(UnitColumns, WorldCaches):
         fog: bool = True,
     ) -> None:
         UnitColumns.__init__(self)
-        WorldCaches.__init__(self)
+        WorldFields.__init__(self)
         self.map: GameMap = game_map
         self.catalog: Catalog = catalog or load_catalog(data=game_map.scenario.data)
         self.seed = seed

@@ -1,8 +1,9 @@
-"""What the world keeps so that the systems need not look at every unit in every loop.
+"""The fields of a world that rules ask for in every loop; in compiled rules they are those of a C structure.
 
-All of it follows from the state and is written again when a unit comes, goes or changes; it is no part of the world's
-digest. Each cache notes for which ``population`` it holds. Values that only a layer above understands are of type
-``object`` here.
+``fields.pxd`` lists them all with their types, because reading one by its name would cost more than many a rule. Those
+that are set here are notes: what the world keeps so that the systems need not look at every unit in every loop. A note
+follows from the state and is written again when a unit comes, goes or changes; it is no part of the world's digest, and
+says for which ``population`` it holds. Values that only a layer above understands are of type ``object`` here.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Bools, Ints
 
 
-class WorldCaches:
-    """Notes between changes of the population."""
+class WorldFields:
+    """Notes between changes of the population; ``World`` sets the others."""
 
     def __init__(self) -> None:
         self.population = 0  # counts births and deaths, for what is worth remembering between them
