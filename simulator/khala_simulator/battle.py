@@ -24,7 +24,7 @@ from khala_simulator.api.vital_rows import ROWS
 from khala_simulator.maps.game_map import load_map
 from khala_simulator.tables.versions import DEFAULT_VERSION
 from khala_simulator.tick import advance
-from khala_simulator.world.world import INDEX_SHIFT
+from khala_simulator.world.columns import INDEX_SHIFT, SLOT_BITS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
 PLAYER: Final = 1
 ENEMY: Final = 2
-_SLOT = 0x3FFF
 
 
 class BattleGround(NamedTuple):
@@ -202,7 +201,7 @@ class Battle:
         there = np.empty(len(tags), dtype=np.bool_)
         numbers = np.zeros((ROWS, len(tags)))
         vitals.look(world, self._game.types, np.ascontiguousarray(tags), there, numbers)
-        rows = world.type[tags >> INDEX_SHIFT & _SLOT]
+        rows = world.type[tags >> INDEX_SHIFT & SLOT_BITS]
         return there, Units(tags, self._game.types.id[rows], numbers)
 
     def see(self, watcher: BattleWatcher) -> None:

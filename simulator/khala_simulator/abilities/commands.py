@@ -15,6 +15,7 @@ from khala_simulator.combat import lifecycle, targets
 from khala_simulator.combat.traits import refresh
 from khala_simulator.economy import harvesting
 from khala_simulator.native import columns, memory
+from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import (
     ATTACK,
@@ -39,7 +40,12 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 QUEUE_LIMIT = 32
-IDLE: Final = OrderKind.IDLE.value
+IDLE: Final = int(OrderKind.IDLE)
+ATTACK_UNIT: Final = int(OrderKind.ATTACK_UNIT)
+HOLD: Final = int(OrderKind.HOLD)
+CAST: Final = int(OrderKind.CAST)
+GATHER: Final = int(OrderKind.GATHER)
+RETURN: Final = int(OrderKind.RETURN)
 IDLENESS: Final = Order(OrderKind.IDLE, 0)
 """The order of a unit without one."""
 
@@ -300,14 +306,14 @@ def _give(world: World, slot: int, wanted: Order, queue: bool) -> bool:
     return True
 
 
-ORDINARY = {
-    OrderKind.MOVE: "move",
-    OrderKind.FOLLOW: "move",
-    OrderKind.ATTACK_MOVE: "attack",
-    OrderKind.ATTACK_UNIT: "attack",
-    OrderKind.HOLD: "hold_position",
-    OrderKind.PATROL: "patrol",
-    OrderKind.SCAN_MOVE: "scan_move",
+ORDINARY: Final[dict[int, str]] = {
+    int(OrderKind.MOVE): "move",
+    int(OrderKind.FOLLOW): "move",
+    int(OrderKind.ATTACK_MOVE): "attack",
+    ATTACK_UNIT: "attack",
+    HOLD: "hold_position",
+    int(OrderKind.PATROL): "patrol",
+    int(OrderKind.SCAN_MOVE): "scan_move",
 }
 
 
@@ -316,9 +322,11 @@ GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
 
 def _of_its_own(world: World, row: int, order: Order) -> Order:
     """Return the order with the ability id of a type of units; a Battlecruiser has its own move."""
-    effect = ORDINARY.get(order.kind) if order.ability in GENERAL else None
-    own = None if effect is None else world.catalog.ordinary[row].get(effect)
-    return order if own in (None, order.ability) else order._replace(ability=own or order.ability)
+    effect = ORDINARY.get(int(order.kind)) if order.ability in GENERAL else None
+    if effect is None:
+        return order
+    own: int = world.catalog.ordinary[row].get(effect, order.ability)
+    return order if own == order.ability else order._replace(ability=own)
 
 
 def begin(world: World, slot: int, order: Order | None) -> None:
@@ -328,11 +336,11 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     and again interrupts nothing.
     """
     order = order or IDLENESS
-    kind = order.kind
-    target = world.slot_of(order.target)
+    kind = int(order.kind)
     c = columns.columns_of(world)
+    target = tags.slot_of(c, order.target)
     opponent = c.target[slot]
-    fights_on = kind in SEEKS_FIGHTS and c.order_kind[slot] in LOOKS_AROUND
+    fights_on = SEEKS_FIGHTS >> kind & LOOKS_AROUND >> c.order_kind[slot] & 1 != 0
     if c.harvest[slot]:
         _end_harvest(world, slot)
     c.order_kind[slot] = kind
@@ -342,14 +350,14 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     c.order_point[slot] = _point(order.point, c.pos[slot])
     c.order_aimed[slot] = order.point is not None
     c.order_origin[slot] = _point(order.origin, c.pos[slot])
-    attacks = kind is OrderKind.ATTACK_UNIT and target != NOBODY and targets.engage(world, slot, target)
+    attacks = kind == ATTACK_UNIT and target != NOBODY and targets.engage(world, slot, target)
     if not (attacks or fights_on):
         targets.disengage(world, slot)
-    casts = kind is OrderKind.CAST
-    c.walks[slot] = kind in WALKS
-    c.looks_around[slot] = kind in LOOKS_AROUND
-    c.holds[slot] = kind is OrderKind.HOLD
-    c.needs_target[slot] = kind in NEEDS_TARGET or (casts and target != NOBODY)
+    casts = kind == CAST
+    c.walks[slot] = WALKS >> kind & 1 != 0
+    c.looks_around[slot] = LOOKS_AROUND >> kind & 1 != 0
+    c.holds[slot] = kind == HOLD
+    c.needs_target[slot] = NEEDS_TARGET >> kind & 1 != 0 or (casts and target != NOBODY)
     c.casts[slot] = casts
     c.cast_at[slot] = -1.0
     c.channels[slot] = False
@@ -365,7 +373,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     c.blocked[slot] = 0
     c.detour[slot] = 0
     c.scan_loop[slot] = 0
-    if kind is OrderKind.GATHER or kind is OrderKind.RETURN:
+    if kind in (GATHER, RETURN):
         _begin_harvest(world, slot, kind, target)
 
 
@@ -377,10 +385,10 @@ def _point(given: Point | None, place: memory.Point) -> memory.Point:
     return memory.point(x, y)
 
 
-def _begin_harvest(world: World, slot: int, kind: OrderKind, target: int) -> None:
+def _begin_harvest(world: World, slot: int, kind: int, target: int) -> None:
     """Begin a round of harvesting; other bodies are no obstacle on it."""
     world.harvesting = True
-    if kind is OrderKind.GATHER and target != NOBODY:
+    if kind == GATHER and target != NOBODY:
         harvesting.head_for_resource(world, slot, target)
     elif not harvesting.head_for_hall(world, slot):
         begin(world, slot, None)

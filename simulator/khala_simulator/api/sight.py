@@ -21,9 +21,9 @@ from khala_simulator.numeric import geometry
 from khala_simulator.numeric.arrays import some
 from khala_simulator.systems import vision
 from khala_simulator.systems.vision import are_detected
-from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.columns import INDEX_SHIFT, NOBODY
 from khala_simulator.world.orders import OrderKind
-from khala_simulator.world.snapshots import INDEX_SHIFT, RememberedUnit
+from khala_simulator.world.snapshots import RememberedUnit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

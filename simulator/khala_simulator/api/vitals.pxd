@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport boolean
+from khala_simulator.world cimport tags
 from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
@@ -15,12 +16,6 @@ cdef int64_t SHIELDS
 cdef int64_t SHIELDS_MAX
 cdef int64_t ENERGY
 cdef int64_t COOLDOWN
-cdef int64_t _INDEX_SHIFT
-cdef int64_t _SLOT
-
-
-@cython.locals(slot=int64_t)
-cdef int64_t slot_of(Columns c, int64_t tag) noexcept
 
 
 @cython.final

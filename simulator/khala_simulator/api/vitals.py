@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from khala_simulator.api.vital_rows import COOLDOWN, ENERGY, LIFE, LIFE_MAX, SHIELDS, SHIELDS_MAX, X, Y
 from khala_simulator.native import columns, memory
+from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from khala_simulator.native.columns import Columns
     from khala_simulator.native.memory import Cells
     from khala_simulator.world.world import World
-
-_INDEX_SHIFT: Final = 18
-_SLOT: Final = 0x3FFF
 
 
 def look(
@@ -53,12 +51,6 @@ def look(
             reader.read(slot, cells, n, i)
 
 
-def slot_of(c: Columns, tag: int) -> int:
-    """Return the slot of a unit, or NOBODY if it is not in the world; as `World.slot_of`, for compiled rules."""
-    slot = tag >> _INDEX_SHIFT & _SLOT
-    return slot if slot < c.capacity and c.tag[slot] == tag else NOBODY
-
-
 class Reader:
     """Reads the vitals of units of one world; it holds until the world grows or an upgrade is done."""
 
@@ -73,7 +65,7 @@ class Reader:
 
     def find(self, tag: int) -> int:
         """Return the slot of a unit, or NOBODY if it is not in the world."""
-        slot = slot_of(self.c, tag)
+        slot = tags.slot_of(self.c, tag)
         return slot if slot != NOBODY and self.c.carrier[slot] == NOBODY else NOBODY
 
     def read(self, slot: int, numbers: Cells, n: int, i: int) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from khala_simulator.native import columns, memory
 from khala_simulator.world.players import NEUTRAL
-from khala_simulator.world.snapshots import INDEX_SHIFT, TAG_BASE, RememberedUnit
+from khala_simulator.world.columns import INDEX_SHIFT
+from khala_simulator.world.snapshots import TAG_BASE, RememberedUnit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

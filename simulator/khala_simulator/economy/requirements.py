@@ -47,6 +47,22 @@ def missing_to_all(world: World, slot: int, ability: Ability) -> bool:
     return any(not met(world, slot, need) for need in _shared_needs(world.catalog, ability.id))
 
 
+def lacks_upgrade(world: World, player: int, ability: int) -> bool:
+    """Return whether a player lacks an upgrade without which none of its units can use an ability."""
+    needed = _upgrades_needed(world.catalog, ability)
+    if not needed:
+        return False
+    owner = world.players[player]
+    return "tech_tree" not in owner.cheats and not all(upgrade in owner.upgrades for upgrade in needed)
+
+
+@lru_cache(maxsize=4096)
+def _upgrades_needed(catalog: Catalog, ability: int) -> tuple[int, ...]:
+    """Return the ids of the upgrades that are conditions of an ability by themselves."""
+    names = [need.name for need in _shared_needs(catalog, ability) if need.kind == "upgrade" and need.state == "done"]
+    return tuple(catalog.upgrade_of[name].id for name in names if name in catalog.upgrade_of)
+
+
 @lru_cache(maxsize=4096)
 def _shared_needs(catalog: Catalog, ability: int) -> tuple[Need, ...]:
     """Return the conditions of an ability that all units of a player share."""

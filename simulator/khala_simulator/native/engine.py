@@ -85,7 +85,7 @@ def compiled_rules() -> tuple[str, ...]:
 
 def _sources() -> Iterator[Path]:
     """Yield what is compiled: each rule that has a ``.pxd`` or, where there is one, the ``.pyx``, and the ``.pxd``."""
-    for types in ROOT.glob("*/*.pxd"):
+    for types in ROOT.rglob("*.pxd"):
         kernel = types.with_suffix(".pyx")
         source = kernel if kernel.exists() else types.with_suffix(".py")
         if source.exists():

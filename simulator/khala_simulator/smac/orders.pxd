@@ -2,10 +2,10 @@ cimport cython
 from libc.stdint cimport int64_t
 
 from khala_simulator.abilities cimport casting
-from khala_simulator.api cimport vitals
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.smac.fighters cimport Fighters
+from khala_simulator.world cimport tags
 from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t HEAL

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import casting, commands
-from khala_simulator.api import vitals
 from khala_simulator.api.abilities import UnitCommand, forms, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import PLAYER
@@ -18,6 +17,7 @@ from khala_simulator.native import columns, memory
 from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP
 from khala_simulator.smac.rules import STOP as STOP_ACTION
 from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import ATTACK, MOVE, STOP
 from khala_simulator.world.world import NO_TAG
@@ -72,11 +72,11 @@ def _goal(fighters: Fighters, agent: int, way: int, far: float) -> Point:
 def _order(world: World, tag: int, ability: int, target: int, point: Point | None) -> None:
     """Give a unit one order."""
     c = columns.columns_of(world)
-    slot = vitals.slot_of(c, tag)
+    slot = tags.slot_of(c, tag)
     own = forms(world.catalog, c.type[slot], ability)[0] if slot != NOBODY else None
     if own is None or own.effect != _EFFECTS.get(ability):
         carry_out(world, judge(world, PLAYER, UnitCommand(ability, (tag,), target, point)))
-    elif casting.refusal(world, slot, own) is not ActionResult.SUCCESS:
+    elif casting.ordinary_refusal(world, slot, own) is not ActionResult.SUCCESS:
         return
     elif ability == STOP:
         commands.stop(world, [slot])
@@ -88,5 +88,5 @@ def _order(world: World, tag: int, ability: int, target: int, point: Point | Non
 
 def _may_attack(c: Columns, tag: int) -> bool:
     """Return whether the player may aim at a unit: whether it is there and in sight."""
-    victim = vitals.slot_of(c, tag)
+    victim = tags.slot_of(c, tag)
     return victim != NOBODY and bool(c.visible[PLAYER * c.capacity + victim])

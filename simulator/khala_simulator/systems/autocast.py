@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.abilities import casting, commands
-from khala_simulator.economy.requirements import missing_to_all
+from khala_simulator.economy.requirements import lacks_upgrade
 from khala_simulator.native import columns
 from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tables.action_result import ActionResult
@@ -33,28 +33,19 @@ def look_out(world: World) -> None:
     loop = world.loop
     if not world.autocast or loop % SCAN_PERIOD:
         return
-    closed: dict[tuple[int, int], bool] = {}
     for slot in sorted(world.autocast):
         c = columns.columns_of(world)
-        is_free = c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]
-        if is_free and _use_first_wanted(world, slot, c.owner[slot], closed):
-            closed.clear()
+        if c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]:
+            _use_first_wanted(world, slot, c.owner[slot])
 
 
-def _use_first_wanted(world: World, slot: int, owner: int, closed: dict[tuple[int, int], bool]) -> bool:
-    """Make a unit use the first of its abilities that its player would want now; return whether it does.
-
-    ``closed`` has whether an ability, by owner and id, lacks what it requires, whichever unit uses it.
-    """
+def _use_first_wanted(world: World, slot: int, owner: int) -> None:
+    """Make a unit use the first of its abilities that its player would want now."""
     for number in world.autocast[slot]:
-        is_closed = closed.get((owner, number))
-        if is_closed is None:
-            ability = world.catalog.ability(number)
-            is_closed = ability.effect not in casting.ORDINARY and missing_to_all(world, slot, ability)
-            closed[owner, number] = is_closed
-        if not is_closed and attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
-            return True
-    return False
+        if lacks_upgrade(world, owner, number):
+            continue
+        if attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
+            return
 
 
 def attempt(world: World, slot: int, ability: Ability) -> bool:

@@ -15,6 +15,7 @@ cdef double NO_DISTANCE
 
 @cython.final
 cdef class _Walks:
+    cdef Py_ssize_t room
     cdef tuple arrays
     cdef int64_t* slot
     cdef Point* way
@@ -30,7 +31,9 @@ cpdef move(WorldFields world)
 cdef _face_targets(WorldFields world, Columns c)
 cdef bint _coasts(Columns c, int64_t slot) noexcept
 cdef void _drift(Columns c, int64_t slot) noexcept
-@cython.locals(creeps=bint, width=int64_t, height=int64_t, late=bint, i=Py_ssize_t, slot=int64_t, top_speed=double)
+@cython.locals(walks=_Walks)
+cdef _Walks _walks_of(WorldFields world, Py_ssize_t walking)
+@cython.locals(walks=_Walks, creeps=bint, width=int64_t, height=int64_t, late=bint, i=Py_ssize_t, slot=int64_t, top_speed=double)
 cdef _walk(WorldFields world, Columns c, Py_ssize_t walking, bint brakers)
 @cython.locals(column=int64_t, row=int64_t)
 cdef int64_t _cell(Point at, int64_t width, int64_t height) noexcept

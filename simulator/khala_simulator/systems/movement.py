@@ -89,6 +89,7 @@ class _Walks:
     """The steps of all walkers; the i-th of each column belongs to the i-th walker."""
 
     def __init__(self, walkers: int) -> None:
+        self.room = walkers
         self.arrays = (
             memory.new_ints(walkers),
             memory.new_points(walkers),
@@ -104,10 +105,22 @@ class _Walks:
         self.left = memory.floats(self.arrays[4])  # to the corner or the goal
         self.error_cos = memory.floats(self.arrays[5])  # between the heading and that way
 
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world takes its own."""
+        return type(None), ()
+
+
+def _walks_of(world: World, walking: int) -> _Walks:
+    """Return room for the steps of so many walkers."""
+    walks: _Walks | None = world.steps  # type: ignore[assignment]  # its fields say less
+    if walks is None or walks.room < walking:
+        walks = world.steps = _Walks(2 * walking)
+    return walks
+
 
 def _walk(world: World, c: Columns, walking: int, brakers: bool) -> None:
     """Choose the steps of all walkers, and turn them."""
-    walks = _Walks(walking)
+    walks = _walks_of(world, walking)
     queue = world.queue
     creeps = world.growth.anywhere
     covered = np.ascontiguousarray(world.creep) if creeps else memory.new_bools(0)

@@ -21,6 +21,8 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 NOBODY: Final = -1  # no slot
+INDEX_SHIFT: Final = 18  # of the slot in a tag
+SLOT_BITS: Final = 0x3FFF  # of the slot, once shifted
 LONG_AGO: Final = -(1 << 30)
 DTYPES: Final[dict[type, type[np.generic]]] = {bool: np.bool_, int: np.int64, float: np.float64}
 

@@ -42,6 +42,7 @@ cdef class WorldFields:
     cdef public int64_t looked_at
     cdef public int64_t resting_version
     cdef public object bodies
+    cdef public object steps
     cdef public object census
     cdef public object tally
     cdef public int64_t tallied

@@ -26,6 +26,7 @@ class WorldFields:
         self.looked_at = -1  # the population for which ``visible`` was written
         self.resting_version = -1  # the population among which no body touched another when all last stood still
         self.bodies: object | None = None  # room for what is measured between them, for ``contacts``
+        self.steps: object | None = None  # room for the steps of those that walk, for ``movement``
         self.census: object | None = None  # of this population, for ``census``
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``requirements``
         self.tallied = -1  # the loop in which that was counted

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from khala_simulator.world.columns import Floats, Ints
 
 TAG_BASE: Final = 2 << 32
-INDEX_SHIFT: Final = 18
 
 
 @dataclass(frozen=True, slots=True)

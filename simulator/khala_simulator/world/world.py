@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.numeric.arrays import which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
-from khala_simulator.world import shots
+from khala_simulator.world import shots, stock
 from khala_simulator.world.active_buffs import ActiveBuffs
 from khala_simulator.world.fields import WorldFields
-from khala_simulator.world.columns import NOBODY, Bools, Floats, Ints, UnitColumns
+from khala_simulator.world.columns import INDEX_SHIFT, NOBODY, SLOT_BITS, Bools, Floats, Ints, UnitColumns
 from khala_simulator.world.creep import Creep
 from khala_simulator.world.ground import BuiltGround
 from khala_simulator.world.orders import ATTACK, Order, OrderKind
@@ -49,7 +49,6 @@ __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
 NO_TAG: Final = 0
 TAG_BASE: Final = 1 << 32
-INDEX_SHIFT: Final = 18
 MOST_UNITS: Final = 4_000
 """Units up to which scripts and debug commands fill a world; tags have room for 16 383, and loops are slow by then."""
 
@@ -179,12 +178,7 @@ class World(UnitColumns, WorldFields):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        self.in_reach[self.target == slot] = False
-        for column in (
-            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
-            self.occupant,
-        ):  # fmt: skip
-            column[column == slot] = NOBODY
+        stock.forget(self, slot)
         self.buffs.forget(slot)
         for job in self.jobs.pop(slot, ()):
             self.players[job.owner].underway.remove(job.makes)
@@ -236,7 +230,7 @@ class World(UnitColumns, WorldFields):
 
     def slot_of(self, tag: int) -> int:
         """Return the slot of a living unit with this tag, or NOBODY."""
-        slot = tag >> INDEX_SHIFT & 0x3FFF
+        slot = tag >> INDEX_SHIFT & SLOT_BITS
         return slot if slot < self.capacity and tag != NO_TAG and self.tag[slot] == tag else NOBODY
 
     def tag_of(self, slot: int) -> int:
@@ -363,14 +357,10 @@ class World(UnitColumns, WorldFields):
 
     def population_changed(self) -> None:
         """Note that a unit came, went or changed its type."""
-        self.live = which(self.alive & (self.carrier == NOBODY))
+        stock.look_over(self)
         self.population += 1
         self.census = self.tally = None
         self.scan_now = self.orders_changed = True
-        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
-        self.regenerating = _any(shields), _any(life), _any(energy)
-        self.mortal = _any(self.expires)
-        self.hiding = some(self.cloaked | self.burrowed)
 
     def note_traits(self, slot: int) -> None:
         """Note a unit's changed traits for the systems that skip worlds without such units."""
@@ -409,11 +399,6 @@ class World(UnitColumns, WorldFields):
 def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
     """Return the cells of a footprint as an array (k, 2)."""
     return np.array(cells, dtype=np.int64)
-
-
-def _any(column: Floats | Ints) -> bool:
-    """Return whether any number is not zero; four times as fast as ``any``."""
-    return bool(np.count_nonzero(column))
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:
