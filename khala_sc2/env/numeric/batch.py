@@ -159,9 +159,10 @@ class Batch:
         """Write what a step was worth and how it ended."""
         arrays = self._arrays
         battle = self.battles[row]
+        timed_out = battle.timed_out
         arrays["reward"][row] = reward
-        arrays["truncated"][row] = battle.timed_out
-        arrays["terminated"][row] = battle.over and not battle.timed_out
+        arrays["truncated"][row] = timed_out
+        arrays["terminated"][row] = battle.over and not timed_out
         arrays["elapsed"][row] = battle.steps
         for name in ("battle_won", "dead_allies", "dead_enemies"):
             arrays[name][row] = info.get(name, 0)

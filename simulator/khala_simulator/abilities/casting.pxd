@@ -13,5 +13,5 @@ cpdef bint is_modelled(object ability) except -1
 cpdef as_is(WorldFields world, int64_t slot, object ability)
 cdef _unready(WorldFields world, int64_t slot, object ability)
 @cython.locals(c=Columns)
-cdef ordinary_refusal(WorldFields world, int64_t slot, object ability)
+cdef _ordinary_refusal(WorldFields world, int64_t slot, object ability)
 cdef _unaffordable(WorldFields world, int64_t slot, object ability)

@@ -75,7 +75,7 @@ def refusal(world: World, slot: int, ability: Ability, *, free: bool = False) ->
     if not is_modelled(ability):
         return ActionResult.NOT_SUPPORTED
     if ability.effect in ORDINARY:
-        return ordinary_refusal(world, slot, ability)
+        return _ordinary_refusal(world, slot, ability)
     why = _unready(world, slot, ability)
     return why if free or why is not ActionResult.SUCCESS else _unaffordable(world, slot, ability)
 
@@ -91,8 +91,7 @@ def _unready(world: World, slot: int, ability: Ability) -> ActionResult:
     return ActionResult.SUCCESS if skill.ready is None else skill.ready(world, slot, ability)
 
 
-def ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
-    """Return why a unit can't carry out an order that is no skill, or success."""
+def _ordinary_refusal(world: World, slot: int, ability: Ability) -> ActionResult:
     c = columns.columns_of(world)
     if c.build_progress[slot] < 1.0:
         return ActionResult.BUILDING_IS_UNDER_CONSTRUCTION

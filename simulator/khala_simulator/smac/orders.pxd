@@ -1,7 +1,6 @@
 cimport cython
 from libc.stdint cimport int64_t
 
-from khala_simulator.abilities cimport casting
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.smac.fighters cimport Fighters
@@ -27,5 +26,6 @@ cpdef give_orders(WorldFields world, Fighters fighters, object actions, double m
 cdef _goal(Fighters fighters, int64_t agent, int64_t way, double far)
 @cython.locals(c=Columns, slot=int64_t)
 cdef _order(WorldFields world, int64_t tag, int64_t ability, int64_t target, object point)
+cdef bint _has(WorldFields world, int64_t row, int64_t ability) except -1
 @cython.locals(victim=int64_t)
 cdef bint _may_attack(Columns c, int64_t tag) noexcept

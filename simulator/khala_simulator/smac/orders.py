@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from khala_simulator.abilities import casting, commands
-from khala_simulator.api.abilities import UnitCommand, forms, judge
+from khala_simulator.abilities import commands
+from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import PLAYER
 from khala_simulator.native import columns, memory
 from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP
 from khala_simulator.smac.rules import STOP as STOP_ACTION
-from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import ATTACK, MOVE, STOP
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
 
 HEAL: Final = 386
-_EFFECTS: Final = {STOP: "stop", MOVE: "move", ATTACK: "attack"}
+_EFFECTS: Final[dict[int, str]] = {STOP: "stop", MOVE: "move", ATTACK: "attack"}
 
 
 def give_orders(world: World, fighters: Fighters, actions: NDArray[np.int64], move_amount: float) -> None:
@@ -73,10 +72,9 @@ def _order(world: World, tag: int, ability: int, target: int, point: Point | Non
     """Give a unit one order."""
     c = columns.columns_of(world)
     slot = tags.slot_of(c, tag)
-    own = forms(world.catalog, c.type[slot], ability)[0] if slot != NOBODY else None
-    if own is None or own.effect != _EFFECTS.get(ability):
+    if slot == NOBODY or not _has(world, c.type[slot], ability):
         carry_out(world, judge(world, PLAYER, UnitCommand(ability, (tag,), target, point)))
-    elif casting.ordinary_refusal(world, slot, own) is not ActionResult.SUCCESS:
+    elif c.build_progress[slot] < 1.0:
         return
     elif ability == STOP:
         commands.stop(world, [slot])
@@ -84,6 +82,12 @@ def _order(world: World, tag: int, ability: int, target: int, point: Point | Non
         commands.move(world, [slot], point)
     elif _may_attack(c, target):
         commands.attack_unit(world, [slot], target)
+
+
+def _has(world: World, row: int, ability: int) -> bool:
+    """Return whether a type has an ordinary order itself on its card."""
+    effect = _EFFECTS.get(ability)
+    return effect is not None and world.catalog.ordinary[row].get(effect) == ability
 
 
 def _may_attack(c: Columns, tag: int) -> bool:
