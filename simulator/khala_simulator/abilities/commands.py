@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat import lifecycle, targets
+from khala_simulator.combat import lifecycle, tags, targets
 from khala_simulator.combat.traits import refresh
 from khala_simulator.economy import harvesting
 from khala_simulator.native import columns, memory
-from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import (
     ATTACK,

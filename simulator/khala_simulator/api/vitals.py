@@ -6,11 +6,11 @@ A table of vitals has a row for each number, see `vital_rows`, and a column for 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from khala_simulator.api.vital_rows import COOLDOWN, ENERGY, LIFE, LIFE_MAX, SHIELDS, SHIELDS_MAX, X, Y
+from khala_simulator.combat import tags
 from khala_simulator.native import columns, memory
-from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:

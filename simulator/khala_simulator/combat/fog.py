@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.native import columns, memory
-from khala_simulator.world.players import NEUTRAL
 from khala_simulator.world.columns import INDEX_SHIFT
+from khala_simulator.world.players import NEUTRAL
 from khala_simulator.world.snapshots import TAG_BASE, RememberedUnit
 
 if TYPE_CHECKING:

@@ -1,10 +1,10 @@
 cimport cython
 from libc.stdint cimport int64_t
 
+from khala_simulator.combat cimport tags
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.smac.fighters cimport Fighters
-from khala_simulator.world cimport tags
 from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t HEAL

@@ -13,10 +13,10 @@ from khala_simulator.abilities import commands
 from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import PLAYER
+from khala_simulator.combat import tags
 from khala_simulator.native import columns, memory
 from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP
 from khala_simulator.smac.rules import STOP as STOP_ACTION
-from khala_simulator.world import tags
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import ATTACK, MOVE, STOP
 from khala_simulator.world.world import NO_TAG

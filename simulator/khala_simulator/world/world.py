@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import which
+from khala_simulator.numeric.arrays import some, which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
-from khala_simulator.world import shots, stock
+from khala_simulator.world import shots
 from khala_simulator.world.active_buffs import ActiveBuffs
-from khala_simulator.world.fields import WorldFields
 from khala_simulator.world.columns import INDEX_SHIFT, NOBODY, SLOT_BITS, Bools, Floats, Ints, UnitColumns
 from khala_simulator.world.creep import Creep
+from khala_simulator.world.fields import WorldFields
 from khala_simulator.world.ground import BuiltGround
 from khala_simulator.world.orders import ATTACK, Order, OrderKind
 from khala_simulator.world.players import NEUTRAL, GameResult, PlayerSetup, WorldPlayer
@@ -178,7 +178,12 @@ class World(UnitColumns, WorldFields):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        stock.forget(self, slot)
+        self.in_reach[self.target == slot] = False
+        for column in (
+            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
+            self.occupant,
+        ):  # fmt: skip
+            column[column == slot] = NOBODY
         self.buffs.forget(slot)
         for job in self.jobs.pop(slot, ()):
             self.players[job.owner].underway.remove(job.makes)
@@ -357,10 +362,14 @@ class World(UnitColumns, WorldFields):
 
     def population_changed(self) -> None:
         """Note that a unit came, went or changed its type."""
-        stock.look_over(self)
+        self.live = which(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.census = self.tally = None
         self.scan_now = self.orders_changed = True
+        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
+        self.regenerating = _any(shields), _any(life), _any(energy)
+        self.mortal = _any(self.expires)
+        self.hiding = some(self.cloaked | self.burrowed)
 
     def note_traits(self, slot: int) -> None:
         """Note a unit's changed traits for the systems that skip worlds without such units."""
@@ -399,6 +408,11 @@ class World(UnitColumns, WorldFields):
 def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
     """Return the cells of a footprint as an array (k, 2)."""
     return np.array(cells, dtype=np.int64)
+
+
+def _any(column: Floats | Ints) -> bool:
+    """Return whether any number is not zero; four times as fast as ``any``."""
+    return bool(np.count_nonzero(column))
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:
