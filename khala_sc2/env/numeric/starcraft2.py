@@ -171,11 +171,12 @@ class StarCraft2Env(SmacNames):
         if self._battle is None or self._ended:
             raise ValueError(_OVER)
         scene = self._scene
+        battle = self._battle
         scene.take(actions)
-        give_orders(self.battle.world, scene.fighters, scene.last, self.options.move_amount)
-        self.battle.advance(self.options.step_mul)
+        give_orders(battle.world, scene.fighters, scene.last, self.options.move_amount)
+        battle.advance(self.options.step_mul)
         self._steps += 1
-        self.battle.see(scene.fighters)
+        battle.see(scene.fighters)
         scene.look()
         return self._outcome()
 

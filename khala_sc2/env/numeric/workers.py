@@ -177,7 +177,6 @@ def _work(spec: BatchSpec, memory: Any, count: int, rows: slice, channel: Channe
     """Play some rows as the pipe says, until it closes."""
     try:
         batch = Batch(spec, {name: array[rows] for name, array in _view(spec, memory, count).items()})
-        gc.freeze()  # tables that live as long as the process
         while True:
             word = channel.recv_bytes()
             if word == END:
@@ -186,6 +185,8 @@ def _work(spec: BatchSpec, memory: Any, count: int, rows: slice, channel: Channe
                 batch.step()
             else:
                 batch.begin(pickle.loads(word))  # noqa: S301  # from the process that started this one
+                gc.collect()
+                gc.freeze()  # tables and games, which live as long as the process
             channel.send_bytes(DONE)
     except (EOFError, OSError, KeyboardInterrupt):
         return

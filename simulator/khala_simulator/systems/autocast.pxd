@@ -6,7 +6,8 @@ from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t SCAN_PERIOD
+cdef int64_t PLAYER_BITS
 
-@cython.locals(loop=int64_t, slot=int64_t)
+@cython.locals(loop=int64_t, slot=int64_t, lacking=dict)
 cpdef look_out(WorldFields world)
-cdef _use_first_wanted(WorldFields world, int64_t slot, int64_t owner)
+cdef _use_first_wanted(WorldFields world, int64_t slot, int64_t owner, dict lacking)
