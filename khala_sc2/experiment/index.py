@@ -122,10 +122,11 @@ def _match() -> TypeAdapter[PlayedMatch]:
 
 def results_in(index: sqlite3.Connection) -> list[dict[str, Any]]:
     """Return the rows; raise `ValueError` or `LookupError` if one is not as we write it."""
-    matches = played_in(index)
     kinds = _annotations()
     columns = ", ".join(f'"{name}"' for name in kinds)
-    found = index.execute(f"select match, {columns} from results order by rowid")  # noqa: S608  # our own names
+    # Results first: of a match that ends meanwhile, the match is known then, and its results are not.
+    found = index.execute(f"select match, {columns} from results order by rowid").fetchall()  # noqa: S608  # our own names
+    matches = played_in(index)
     return [_join(matches[key], _check_types(dict(zip(kinds, row, strict=True)), kinds)) for key, *row in found]
 
 

@@ -112,6 +112,28 @@ DAMAGES: dict[str, Callable[[Path], None]] = {
 OFTEN = {"torn", "a page of random bytes", "a directory", "a word for a number"}
 
 
+def test_results_can_be_read_while_the_experiment_goes_on(directory: Path, tmp_path: Path) -> None:
+    store = Store(directory)
+    first, second = store.matches().values()
+    found = store.read(directory / second.recording, attempts=1)
+    assert found is not None
+    path = tmp_path / INDEX
+    rows.create(path).close()
+    statements: list[str] = []
+
+    def finish_a_match(statement: str) -> None:
+        statements.append(statement)
+        if len(statements) == 2:
+            with contextlib.closing(rows.connect(path)) as runner:
+                rows.add(runner, *found)
+
+    with contextlib.closing(rows.connect(path)) as reader:
+        rows.add(reader, first, found[1])
+        reader.set_trace_callback(finish_a_match)
+        assert {row["match"] for row in rows.results_in(reader)} == {first.key}
+        assert {row["match"] for row in rows.results_in(reader)} == {first.key, second.key}
+
+
 @pytest.mark.parametrize(
     "name", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in DAMAGES]
 )
