@@ -36,7 +36,6 @@ class UnitState(NamedTuple):
     orders: int = 0
     gathers: bool = True
     """Whether it has no orders except to gather."""
-
     disarmed: bool = False
     """Whether its weapon is off: it holds up a unit with its beam, or a spell disarms it."""
 
