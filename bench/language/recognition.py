@@ -26,7 +26,7 @@ from bench.command_line import make_parser
 from bench.paths import TESTS
 from bench.tables import print_table
 from khala_bridge.act import Actor
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.observe import Observer
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig
@@ -199,7 +199,7 @@ def _snapshot() -> Snapshot:
     raw.player.upgrade_ids.append(BLINK)
     for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         size.x = size.y = 64
-    return read_snapshot(response, read_info(info), dead=frozenset({DEAD}))
+    return read_snapshot(response, read_info(info, facts_of("multi")), dead=frozenset({DEAD}))
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from bench.tables import print_table
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import general
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.observe import Observer
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig
@@ -86,7 +86,7 @@ def snapshot() -> Snapshot:
     for size in (info.start_raw.map_size, info.start_raw.playable_area.p1):
         size.x = size.y = 128
     abilities = {unit.tag: every_form(own[i]) for i, unit in enumerate(units[: len(own)])}
-    return read_snapshot(response, read_info(info), abilities=abilities)
+    return read_snapshot(response, read_info(info, facts_of("multi")), abilities=abilities)
 
 
 def every_form(unit_type: str) -> frozenset[int]:

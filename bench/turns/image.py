@@ -22,6 +22,7 @@ from bench.command_line import make_parser
 from bench.tables import print_table
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import CAMERA_WIDTH
+from khala_bridge.knowledge import facts_of
 from khala_bridge.names import unit_name
 from khala_bridge.observe import Observer
 from khala_bridge.observe.image.album import Album
@@ -48,7 +49,7 @@ def play(map_name: str) -> list[Snapshot]:
     """Play a game in which all units attack the enemies, and return a snapshot per decision."""
     client = Client()
     seen = client.play(map_name, interface(), seed=1)
-    info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info)
+    info = read_info(client.ask(game_info=sc_pb.RequestGameInfo()).game_info, facts_of("multi"))
     snapshots = []
     for _ in range(DECISIONS):
         units = seen.observation.raw_data.units

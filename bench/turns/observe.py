@@ -25,7 +25,7 @@ from bench.figures import Figure
 from bench.tables import print_table
 from khala_bridge.act import Actor
 from khala_bridge.catalogue.functions import general
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.observe import Observer
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
@@ -89,7 +89,7 @@ def army(units: dict[str, int], alliance: int, first: int, hurt: float) -> list[
 
 def snapshot(own: dict[str, int], foes: dict[str, int], loop: int) -> Snapshot:
     response, info = messages(own, foes, loop)
-    return read_snapshot(response, read_info(info))
+    return read_snapshot(response, read_info(info, facts_of("multi")))
 
 
 def messages(
@@ -133,7 +133,7 @@ def crowd(places: int, loop: int) -> Snapshot:
     for index, unit in enumerate(response.observation.raw_data.units):
         place = index % places
         unit.pos.x, unit.pos.y = 24 + 64 * (place % 2) + index % 10, 24 + 64 * (place // 2) + index // 10
-    made = read_snapshot(response, read_info(info))
+    made = read_snapshot(response, read_info(info, facts_of("multi")))
     able = {unit.tag: frozenset(knowledge()[unit.name].ability_ids) for unit in made.own}
     generals = {tag: numbers | frozenset(map(general, numbers)) for tag, numbers in able.items()}
     return dataclasses.replace(made, abilities=generals)

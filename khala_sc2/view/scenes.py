@@ -10,7 +10,7 @@ import contextlib
 from functools import cache
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import WORKERS, is_armed, knowledge
+from khala_bridge.knowledge import WORKERS, knowledge
 from khala_protocol.codec import decode_as
 from khala_protocol.errors import PeerError
 from khala_protocol.keys import Topic
@@ -225,7 +225,7 @@ def _kind(name: str) -> int:
         return 0
     if facts.structure:
         return int(UnitFlag.STRUCTURE)
-    return int(UnitFlag.WORKER if facts.worker else UnitFlag.ARMY if is_armed(name) else 0)
+    return int(UnitFlag.WORKER if facts.worker else UnitFlag.ARMY if facts.weapons else 0)
 
 
 @cache

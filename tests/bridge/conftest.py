@@ -10,7 +10,7 @@ import pytest
 from s2clientprotocol import common_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.task.config import TaskConfig
 from khala_bridge.task.maps import known_maps
@@ -19,6 +19,8 @@ from khala_protocol.configfile import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+
+    from khala_bridge.knowledge import DataSet
 
     Change = Callable[[sc_pb.ResponseObservation, sc_pb.ResponseGameInfo], None]
 
@@ -64,9 +66,13 @@ def make_snapshot(
     player: dict[str, int] | None = None,
     errors: Iterable[sc_pb.ActionError] = (),
     change: Change | None = None,
+    data: DataSet = "multi",
     **fields: Any,
 ) -> Snapshot:
-    """Return a snapshot: these units on a map of this size; `change` may edit the messages before they are read."""
+    """Return a snapshot: these units on a map of this size that depends on these data.
+
+    `change` may edit the messages before they are read.
+    """
     response = sc_pb.ResponseObservation()
     observation = response.observation
     observation.game_loop = loop
@@ -86,7 +92,7 @@ def make_snapshot(
     response.action_errors.extend(errors)
     if change is not None:
         change(response, info)
-    return read_snapshot(response, read_info(info), **fields)
+    return read_snapshot(response, read_info(info, facts_of(data)), **fields)
 
 
 def make_plain(response: sc_pb.ResponseObservation, info: sc_pb.ResponseGameInfo) -> None:

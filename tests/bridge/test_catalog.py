@@ -12,7 +12,7 @@ from khala_bridge import auto
 from khala_bridge.catalogue.action import Action
 from khala_bridge.catalogue.catalogue import GROUPS, catalogue, catalogue_sha256, chosen, example, read, read_curated
 from khala_bridge.errors import CatalogueError
-from khala_bridge.knowledge import abilities, ability_of, knowledge
+from khala_bridge.knowledge import abilities, facts_of, knowledge
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -216,6 +216,6 @@ def test_what_a_written_action_produces_is_what_the_game_makes_of_it() -> None:
 
 def test_how_far_a_jump_reaches_is_what_the_game_says() -> None:
     jump = read_curated()["Ability_Blink_Screen"]
-    facts = ability_of(jump.pysc2.ability_id, "Stalker") if jump.pysc2 else None
+    facts = facts_of("multi").ability_of(jump.pysc2.ability_id, "Stalker") if jump.pysc2 else None
     assert facts
     assert f"at most {facts.figures['distance']:g} away" in jump.about

@@ -19,6 +19,7 @@ from khala_bridge.errors import GameError, GameHangs, GameMissing
 from khala_bridge.game import pysc2_game
 from khala_bridge.game.game import GameConfig, GameIdentity, GamePatience, GameThread, Sides, StepResult, find_sc2
 from khala_bridge.game.pysc2_game import PySC2Game
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import EpisodeInfo
 from khala_bridge.state.grid import NO_GRID
 from khala_bridge.task.maps import known_maps
@@ -214,7 +215,7 @@ def play(plans: list[list[PlanStep]], last_loop: int) -> tuple[StubEnv, tuple[St
     game = object.__new__(PySC2Game)
     env = StubEnv(last_loop)
     game._env, game._ended, game._asks = env, False, False
-    game._maps = (EpisodeInfo(), EpisodeInfo())
+    game._maps = (EpisodeInfo(facts_of("multi")), EpisodeInfo(facts_of("multi")))
     game._creep = [NO_GRID, NO_GRID]
     game._battle = None
     return env, game.act([plan(steps) for steps in plans])

@@ -6,7 +6,7 @@ import pytest
 
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.compat import units, upgrades
-from khala_bridge.knowledge import abilities, ability_of, is_armed, knowledge, stand_ins
+from khala_bridge.knowledge import abilities, facts_of, knowledge
 from khala_bridge.knowledge import upgrades as known_upgrades
 
 RACES = (units.Neutral, units.Protoss, units.Terran, units.Zerg)
@@ -49,7 +49,7 @@ def test_general_abilities_are_those_of_pysc2() -> None:
 def test_a_general_ability_is_for_each_type_the_special_one_that_it_has(
     ability: int, unit_type: str, name: str | None
 ) -> None:
-    found = ability_of(ability, unit_type)
+    found = facts_of("multi").ability_of(ability, unit_type)
     assert (found.name if found else None) == name
 
 
@@ -63,7 +63,7 @@ def test_a_general_ability_is_for_each_type_the_special_one_that_it_has(
     ],
 )
 def test_a_requirement_is_met_by_what_counts_as_the_structure(name: str, types: set[str]) -> None:
-    assert stand_ins(name) == types
+    assert facts_of("multi").stand_ins(name) == types
 
 
 @pytest.mark.parametrize(
@@ -84,9 +84,9 @@ def test_numbers_are_those_of_4_10(name: str, field: str, value: float) -> None:
 
 
 def test_a_type_without_a_weapon_is_unarmed_and_an_unknown_one_is_not() -> None:
-    assert not is_armed("Observer")
-    assert is_armed("Zealot")
-    assert is_armed("Something of a later version")
+    assert not facts_of("multi").is_armed("Observer")
+    assert facts_of("multi").is_armed("Zealot")
+    assert facts_of("multi").is_armed("Something of a later version")
 
 
 def test_damage_per_second_counts_hits_and_period() -> None:

@@ -94,7 +94,7 @@ def test_no_two_types_counter_each_other() -> None:
 def test_who_counters_another_type_can_hit_it(version: str) -> None:
     known = knowledge(version)
     pairs = {(name, other) for name, kind in known.items() for other in kind.counters}
-    missing = {(a, b) for a, b in pairs if not known[a].hits(known[b]) and a not in CASTERS_AND_THE_LIKE}
+    missing = {(a, b) for a, b in pairs if not known[a].hits(known[b].planes) and a not in CASTERS_AND_THE_LIKE}
     assert missing == BY_THEIR_ABILITIES
 
 

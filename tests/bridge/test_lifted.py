@@ -51,3 +51,44 @@ def test_what_is_lifted_is_hit_in_the_air(
     observation = Observer(config).observe(snapshot([unit(0x100040001, attacker, 10, 10), queen]))
     joint = Actor(config).joint(observation, {"A": parse("<Attack_Unit(0x100180001)>")})
     assert [rejection.reason for rejection in joint.rejections["A"]] == refused
+
+
+BEAM, SCRAMBLED = 173, 277
+HOLDER, OTHER, QUEEN = 0x100040001, 0x100080001, 0x100180001
+
+
+@pytest.mark.parametrize(
+    ("order", "on", "buffs", "able"),
+    [
+        (BEAM, GRAVITON_BEAM, (), (OTHER,)),  # it holds the Queen up
+        (BEAM, None, (), ()),  # it goes there; neither can hit what is on the ground
+        (None, GRAVITON_BEAM, (), (HOLDER, OTHER)),  # somebody else holds her up
+        (None, GRAVITON_BEAM, (SCRAMBLED,), (OTHER,)),
+    ],
+)
+def test_a_unit_whose_weapon_is_off_attacks_nothing(
+    order: int | None,
+    on: int | None,
+    buffs: tuple[int, ...],
+    able: tuple[int, ...],
+    task: Callable[..., TaskConfig],
+    unit: Callable[..., raw_pb2.Unit],
+    snapshot: Callable[..., Snapshot],
+) -> None:
+    agent = AgentConfig.model_validate(
+        {
+            "name": "A",
+            "role": "",
+            "teams": [{"name": "T", "unit_types": ["Phoenix"]}],
+            "actions": {"Phoenix": ["Attack_Unit"]},
+        }
+    )
+    holder = unit(HOLDER, "Phoenix", 10, 10, is_flying=True, buff_ids=buffs)
+    if order is not None:
+        holder.orders.add(ability_id=order, target_unit_tag=QUEEN)
+    queen = unit(QUEEN, "Queen", 12, 10, alliance="enemy", buff_ids=() if on is None else (on,))
+    config = task("2s3z", agents=(agent,))
+    seen = Observer(config).observe(snapshot([holder, unit(OTHER, "Phoenix", 11, 10, is_flying=True), queen]))
+    joint = Actor(config).joint(seen, {"A": parse(f"<Attack_Unit({hex(QUEEN)})>")})
+    assert tuple(tag for command in joint.commands for tag in command.units) == able
+    assert [rejection.reason for rejection in joint.rejections["A"]] == ([] if able else ["invalid_target"])

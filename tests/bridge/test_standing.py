@@ -9,6 +9,7 @@ import pytest
 from khala_bridge.act import Actor
 from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.until import read_until
+from khala_bridge.knowledge import facts_of
 from khala_bridge.observe import Observer
 from khala_bridge.task.config import AgentConfig
 from khala_protocol.speech import parse
@@ -189,12 +190,12 @@ def test_a_team_has_only_so_many_and_the_same_order_again_changes_its_end(table:
     ],
 )
 def test_an_end_is_understood_in_many_forms(words: str, text: str) -> None:
-    assert read_until(words).text == text
+    assert read_until(words, facts_of("multi")).text == text
 
 
 def test_an_end_that_is_none_names_the_forms() -> None:
     with pytest.raises(CallRejected, match="until attacked or until minerals 400"):
-        read_until("the cows come home")
+        read_until("the cows come home", facts_of("multi"))
 
 
 @pytest.mark.parametrize(("pylons", "orders", "reached"), [(1, 0, False), (2, 0, True), (1, 1, True)])
@@ -206,4 +207,4 @@ def test_a_structure_counts_from_when_a_worker_goes_to_build_it(
         order = probe.orders.add(ability_id=BUILD_PYLON)
         order.target_world_space_pos.x, order.target_world_space_pos.y = 20, 20
     own = [unit(0x100 + place, "Pylon", 10 + 3 * place, 10) for place in range(pylons)]
-    assert read_until("2 Pylons").is_reached(snapshot([probe, *own]), attacked=False) is reached
+    assert read_until("2 Pylons", facts_of("multi")).is_reached(snapshot([probe, *own]), attacked=False) is reached

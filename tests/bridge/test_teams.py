@@ -9,6 +9,7 @@ import pytest
 from s2clientprotocol import raw_pb2
 
 from khala_bridge.compat import units as pysc2_units
+from khala_bridge.knowledge import facts_of
 from khala_bridge.knowledge.forms import FORMS, form_of, forms_of
 from khala_bridge.state import PlayerState, Unit, read_unit
 from khala_bridge.state.teams import TeamRoster
@@ -33,7 +34,7 @@ def team(name: str, *types: str, kind: str = "group") -> dict[str, Any]:
 
 
 def _read(units: Iterable[raw_pb2.Unit]) -> list[Unit]:
-    return [read for read in map(read_unit, units) if read is not None]
+    return [read for unit in units if (read := read_unit(unit, facts_of("multi"))) is not None]
 
 
 def grouped(agents: Iterable[AgentConfig], units: Iterable[raw_pb2.Unit], **player: int) -> dict[str, list[int]]:

@@ -10,7 +10,7 @@ import pytest
 from khala_bridge.act import Actor, JointAction
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions, general
-from khala_bridge.knowledge import ability_of
+from khala_bridge.knowledge import facts_of
 from khala_bridge.observe import Observer
 from khala_bridge.rules import of_team, use_of, why_not
 from khala_bridge.state.means import ledger_of, side_of
@@ -266,7 +266,7 @@ def test_of_several_that_have_too_little_energy_the_best_is_spoken_of(
 
 
 def test_each_unit_pays_for_itself_as_long_as_the_accounts_last(play: Callable[..., JointAction]) -> None:
-    facts = ability_of(functions()["Train_Baneling_quick"].ability_id, "Zergling")
+    facts = facts_of("multi").ability_of(functions()["Train_Baneling_quick"].ability_id, "Zergling")
     assert facts is not None
     enough_for_two = {**RICH, "minerals": int(2 * facts.minerals), "vespene": int(2 * facts.vespene)}
     scene = Scene("Zergling", ("Train_Baneling_quick",), player=enough_for_two)

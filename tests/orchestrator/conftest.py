@@ -16,7 +16,7 @@ from s2clientprotocol import sc2api_pb2 as sc_pb
 from khala_bridge.act.raw_executor import RawExecutor
 from khala_bridge.errors import GameError
 from khala_bridge.game.game import GameIdentity, GameThread, Sides, StepResult
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.state import read_info, read_snapshot
 from khala_orchestrator.config import MatchConfig, change, load_task
 from khala_orchestrator.host import host
@@ -178,7 +178,9 @@ def make_snapshot(
     layers.width = 24
     layers.resolution.x = layers.resolution.y = 128
     layers.minimap_resolution.x = layers.minimap_resolution.y = 64
-    return read_snapshot(response, read_info(info), dead=frozenset(dead), outcome=outcome, ended=outcome is not None)
+    return read_snapshot(
+        response, read_info(info, facts_of("multi")), dead=frozenset(dead), outcome=outcome, ended=outcome is not None
+    )
 
 
 @dataclass

@@ -7,6 +7,7 @@ import pytest
 from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_orchestrator.match.tally import Tally, valid_together
 from khala_protocol.messages import AgentReport, Rejection, Report, Usage
@@ -28,7 +29,9 @@ def snapshot(
     details = response.observation.score.score_details
     details.killed_minerals.army, details.lost_minerals.army = killed * 0.75, lost * 0.75
     details.killed_vespene.army, details.lost_vespene.army = killed * 0.25, lost * 0.25
-    return read_snapshot(response, read_info(sc_pb.ResponseGameInfo()), dead=frozenset(dead or ()), outcome=outcome)
+    return read_snapshot(
+        response, read_info(sc_pb.ResponseGameInfo(), facts_of("multi")), dead=frozenset(dead or ()), outcome=outcome
+    )
 
 
 def report(step: int, status: AgentStatus = "ok", latency_s: float | None = 1.0, rejected: int = 0) -> Report:

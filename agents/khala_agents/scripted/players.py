@@ -90,11 +90,10 @@ PLAYERS: dict[PlayerName, Callable[[str, random.Random], str]] = {
 
 
 def in_reach(team: TextTeam) -> list[TextUnit]:
-    """Return the enemies that are about as near as the nearest one."""
-    if not team.enemies:
-        return []
-    nearest = min(unit.distance for unit in team.enemies)
-    return [unit for unit in team.enemies if unit.distance <= nearest + REACH or math.isinf(nearest)]
+    """Return the enemies that are about as near as the nearest one, of those that the team can attack."""
+    enemies = [unit for unit in team.enemies if team.reaches(unit)]
+    nearest = min((unit.distance for unit in enemies), default=math.inf)
+    return [unit for unit in enemies if unit.distance <= nearest + REACH or math.isinf(nearest)]
 
 
 def _common_target(teams: Iterable[TextTeam]) -> TextUnit | None:

@@ -203,6 +203,11 @@ class TextTeam:
         """Return whether an action of this name is valid now."""
         return any(action.name == name for action in self.actions)
 
+    def reaches(self, enemy: TextUnit) -> bool:
+        """Return whether the team can attack an enemy, by the targets that the text lists if not all will do."""
+        tags = self.will.get("Attack_Unit", ANY).tags
+        return not tags or enemy.tag in tags
+
 
 @dataclass(slots=True)
 class Situation:

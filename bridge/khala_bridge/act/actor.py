@@ -222,7 +222,7 @@ class Actor:
         """
         words = self._words[saw.agent.name]
         meant = recognise(item.call, words, Addressees(saw, words))
-        until = read_until(item.until)
+        until = read_until(item.until, observation.snapshot.facts)
         if isinstance(meant, Rejection):
             raise CallRejected(meant.reason, meant.message)
         for said in meant:

@@ -80,7 +80,7 @@ def _casts(commands: Sequence[Command], before: Snapshot, refused: Container[obj
         if (said.team.agent, said.team.name, said.call.start) in refused:
             continue
         ability = command.function.ability_id
-        facts = facts_for(ability, before.units[command.units[0]].name, upgrades)
+        facts = facts_for(before.facts, ability, before.units[command.units[0]].name, upgrades)
         if facts and facts.does not in NO_CASTS and (facts.energy or facts.cooldown_s):
             yield _Cast(said.team.agent, said.text, ability, facts, command.units)
 

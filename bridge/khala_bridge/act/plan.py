@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from khala_bridge.act.recognise import CallRejected, reject
-from khala_bridge.knowledge import abilities
 from khala_bridge.names import order_name
 from khala_bridge.state import Snapshot
 
@@ -85,14 +84,14 @@ def refused_by_game(commands: Sequence[Command], after: Snapshot) -> tuple[GameR
         suspects = [i for i, command in enumerate(commands) if error.unit_tag in command.units]
         ordered = {i: order_name(commands[i].function.ability_id) for i in suspects}
         same = [i for i in suspects if ordered[i] == order_name(error.ability_id)]
-        for index in (same or ([] if _by_itself(error.ability_id) else suspects))[-1:]:
+        for index in (same or ([] if _by_itself(after, error.ability_id) else suspects))[-1:]:
             found.setdefault(index, refuse(commands[index], words(error.result)))
     return tuple(refusal for _, refusal in sorted(found.items()) if refusal is not None)
 
 
-def _by_itself(ability_id: int) -> bool:
+def _by_itself(after: Snapshot, ability_id: int) -> bool:
     """Return True if units use an ability without an order."""
-    facts = abilities().get(ability_id)
+    facts = after.facts.abilities.get(ability_id)
     return facts is not None and facts.autocast is not None
 
 

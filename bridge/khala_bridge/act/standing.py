@@ -219,7 +219,7 @@ def _has_to_queue(command: Command, tag: int, snapshot: Snapshot) -> bool:
     unit = snapshot.units[tag]
     if not (unit.is_structure and unit.orders):
         return False
-    facts = facts_for(command.function.ability_id, unit.name, snapshot.upgrades)
+    facts = facts_for(snapshot.facts, command.function.ability_id, unit.name, snapshot.upgrades)
     return facts is None or bool(facts.produces or facts.researches)
 
 

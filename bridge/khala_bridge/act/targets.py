@@ -50,6 +50,7 @@ class Targets:
     def __init__(self, observation: SideObservation) -> None:
         self._observation = observation
         self._units = observation.snapshot.units
+        self._facts = observation.snapshot.facts
 
     def end_of(self, tag: int) -> str | None:
         """Return the end of a unit in words, `died 1.8 s ago`; None if it is not known to be dead."""
@@ -96,7 +97,7 @@ class Targets:
         own = tag in said.team.tags
         if not (anywhere or own or _shows(said.team.camera, unit) or said.team.seen(tag)):
             raise self._out_of_sight(said, unit)
-        if said.action.aim == "unit" and (reason := unfit(said.action, aim_of(unit))):
+        if said.action.aim == "unit" and (reason := unfit(self._facts, said.action, aim_of(unit))):
             what = f"{hex(tag)} is {_WHOSE[unit.alliance]} {unit.name}"
             is_friend = said.action.target == "enemy" and unit.alliance in (Alliance.OWN, Alliance.ALLY)
             kind: RejectionReason = "friendly_target" if is_friend else "invalid_target"
@@ -111,7 +112,7 @@ class Targets:
                 needs sight.
         """
         point = self._screen_point(said) if said.action.target_kind == "screen" else self._minimap_point(said)
-        if needs_sight(said.action) and not self._is_seen(point):
+        if needs_sight(self._facts, said.action) and not self._is_seen(point):
             where = f"[{said.point[0]:g}, {said.point[1]:g}]" if said.point else "The place"
             raise CallRejected(
                 "invalid_target", f"{where} is out of your sight; {said.action.name} needs a place in sight."

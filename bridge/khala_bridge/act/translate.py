@@ -151,7 +151,9 @@ class Translator:
         return [*found, Command(said, order.function, later, order.target, queued=True)] if later else found
 
     def _leaves_orders_alone(self, function: Function, tag: int) -> bool:
-        return function.kind == "autocast" or is_instant(function.ability_id, self._side.units[tag].type)
+        return function.kind == "autocast" or is_instant(
+            self._snapshot.facts, function.ability_id, self._side.units[tag].type
+        )
 
     def _commands(self, said: Recognised, orders: Iterable[RuleOrder]) -> list[Command]:
         return [command for order in orders for command in self.commands(order, said)]
@@ -193,7 +195,7 @@ class Translator:
         for order in orders:
             self.ledger.take(*order.units)
             for tag in order.units:
-                if is_free(order.function.ability_id, self._side.units[tag].type):
+                if is_free(self._snapshot.facts, order.function.ability_id, self._side.units[tag].type):
                     continue
                 facts = self._facts(order.function, tag)
                 assert facts is not None, "what is known to cost something is known"
@@ -204,7 +206,7 @@ class Translator:
                     self.ledger.energy[tag] += int(facts.energy)
 
     def _facts(self, function: Function, tag: int) -> AbilityFacts | None:
-        return facts_for(function.ability_id, self._side.units[tag].type, self._side.upgrades)
+        return facts_for(self._snapshot.facts, function.ability_id, self._side.units[tag].type, self._side.upgrades)
 
     def _by_rule(self, said: Recognised, rule: str) -> list[RuleOrder]:
         """Return the orders that a rule makes of a call; the rule takes the price from the ledger itself."""
@@ -265,7 +267,7 @@ class Translator:
             raise self._cannot(said, [of_team(nearest(reasons))])
         if said.action.subject == "two_units" and reasons:
             raise self._cannot(said, list(map(of_team, reasons)))
-        if all(is_free(function.ability_id, self._side.units[tag].type) for tag in able):
+        if all(is_free(self._snapshot.facts, function.ability_id, self._side.units[tag].type) for tag in able):
             return able
         facts = [self._facts(function, tag) for tag in able]
         if facts[0] is not None and facts[0].does in MAKERS:
@@ -289,8 +291,8 @@ class Translator:
         aiming = tuple(tag for tag in able if tag != unit.tag)
         if is_attack(function):
             aim = aim_of(unit)
-            aiming = tuple(tag for tag in aiming if reaches(self._snapshot.units[tag].name, aim))
-            where = "in the air" if aim.aloft else "on the ground"
+            aiming = tuple(tag for tag in aiming if reaches(self._snapshot.facts, self._snapshot.units[tag].name, aim))
+            where = "on the ground" if "ground" in aim.planes else "in the air"
             what = f"{hex(unit.tag)} is a {unit.name} {where}"
             if not aiming:
                 raise CallRejected("invalid_target", f"{what}, and no weapon of team {said.team.name} reaches that.")

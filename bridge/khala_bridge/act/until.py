@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from khala_bridge.act.rejected import CallRejected
 from khala_bridge.act.vocabulary import squash
-from khala_bridge.knowledge import abilities, knowledge, stand_ins, upgrades
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.state import Snapshot, Unit
 
 Kind: TypeAlias = Literal["never", "count", "upgrade", "time", "attacked", "minerals", "vespene"]
@@ -64,8 +64,8 @@ class Until:
                 return attacked and self.kind == "attacked"
 
 
-def read_until(words: str) -> Until:
-    """Return the condition that some words say.
+def read_until(words: str, facts: MapFacts) -> Until:
+    """Return the condition that some words say; `facts` has the names of units and upgrades.
 
     Raises:
         CallRejected: they say none; the text names the forms.
@@ -76,7 +76,7 @@ def read_until(words: str) -> Until:
         return Until("attacked", "attacked")
     if clock := _TIME.fullmatch(words):
         return Until(f"{int(clock[1])}:{clock[2]}", "time", 60 * int(clock[1]) + int(clock[2]))
-    if upgrade := _match_name(words, upgrades()):
+    if upgrade := _match_name(words, facts.upgrades):
         return Until(upgrade, "upgrade", name=upgrade)
     if amount := _AMOUNT.fullmatch(words):
         number = int(amount["a"] or amount["b"])
@@ -85,7 +85,7 @@ def read_until(words: str) -> Until:
         if plain in ("minerals", "vespene", "gas"):
             kind: Literal["minerals", "vespene"] = "minerals" if plain == "minerals" else "vespene"
             return Until(f"{kind} {number}", kind, number)
-        if name := _match_name(what, knowledge()):
+        if name := _match_name(what, facts.units):
             return Until(f"{number} {name}", "count", number, name)
     raise CallRejected("wrong_arguments", f"'{words}' is no end of a standing order: {_FORMS}.")
 
@@ -99,16 +99,16 @@ def _match_name(words: str, known: Iterable[str]) -> str | None:
 
 def _number_of(name: str, snapshot: Snapshot) -> int:
     """Return how many units of a type the side has, with those in production and those that are about to be built."""
-    kinds = {name, *stand_ins(name)}
+    kinds = snapshot.facts.stand_ins(name)
     there = sum(unit.name in kinds for unit in snapshot.own)
-    facts = knowledge()[name]
+    facts = snapshot.facts.units[name]
     if facts.structure:
         return there + sum(structure in kinds for structure, _ in land_of(snapshot).plans)
     if facts.worker:  # some are inside a gas structure, where nobody sees them
         there = max(there, snapshot.player.food_workers)
-    return there + sum(_coming(name, unit) for unit in snapshot.own)
+    return there + sum(_coming(name, unit, snapshot.facts) for unit in snapshot.own)
 
 
-def _coming(name: str, unit: Unit) -> int:
-    found = (abilities().get(order.ability_id) for order in unit.orders)
+def _coming(name: str, unit: Unit, of_map: MapFacts) -> int:
+    found = (of_map.abilities.get(order.ability_id) for order in unit.orders)
     return sum(facts.count for facts in found if facts and facts.does in ("train", "morph") and facts.produces == name)

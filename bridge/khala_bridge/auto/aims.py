@@ -11,15 +11,14 @@ import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.catalogue.functions import functions
-from khala_bridge.knowledge import abilities, knowledge
-from khala_bridge.names import buff_name, unit_name
+from khala_bridge.names import unit_name
 from khala_bridge.state import Alliance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from khala_bridge.catalogue.action import Action
-    from khala_bridge.knowledge import AbilityFacts, UnitFacts
+    from khala_bridge.knowledge import AbilityFacts, MapFacts, UnitFacts
     from khala_bridge.state import Unit
 
 
@@ -29,8 +28,8 @@ class Aim(NamedTuple):
     unit_type: int
     alliance: Alliance
     flying: bool
-    aloft: bool
-    """Whether it is hit in the air: it flies, or a Phoenix holds it up with its beam."""
+    planes: frozenset[str]
+    """Where weapons hit it, `Unit.planes`; everywhere if its type is unknown."""
     burrowed: bool
     unfinished: bool
     has_energy: bool
@@ -44,13 +43,16 @@ class Aim(NamedTuple):
         return unit_name(self.unit_type)
 
 
+_EVERYWHERE = frozenset({"ground", "air"})
+
+
 def aim_of(unit: Unit) -> Aim:
     """Return a unit as a target."""
     return Aim(
         unit.unit_type,
         unit.alliance,
         unit.is_flying,
-        unit.is_flying or (bool(unit.buff_ids) and any(buff_name(buff) == "GravitonBeam" for buff in unit.buff_ids)),
+        _EVERYWHERE if unit.facts is None else unit.planes,
         unit.is_burrowed,
         unit.build_progress < 1.0,
         unit.energy > 0,
@@ -103,45 +105,41 @@ _WANTS: dict[str, tuple[str, Callable[[Aim, UnitFacts], bool]]] = {
 """By kind of ability: what the game wants of a target that no filter says."""
 
 
-def unfit(action: Action, aim: Aim) -> str | None:
+def unfit(facts: MapFacts, action: Action, aim: Aim) -> str | None:
     """Return what the target of an action must be and this one is not: `an enemy unit`; None if it fits."""
-    return _unfit(action.target, action.function, aim)
+    return _unfit(facts, action.target, action.function, aim)
 
 
 @functools.lru_cache(8192)
-def _unfit(target: str | None, function: str | None, aim: Aim) -> str | None:
+def _unfit(of_map: MapFacts, target: str | None, function: str | None, aim: Aim) -> str | None:
     enemy = aim.alliance == Alliance.ENEMY
     if target == "enemy" and not enemy:
         return "an enemy unit"
     if target == "own" and (enemy or aim.alliance == Alliance.NEUTRAL):
         return "an own unit"
-    facts = _facts(function)
+    facts = _facts(of_map, function)
     if facts is None:
         return None
-    known = knowledge().get(aim.type)
+    known = of_map.units.get(aim.type)
     for word in facts.must:
         if word in _NEEDED and _is(word, aim, known) is False:
             return _NEEDED[word]
     for word in facts.must_not:
         if word in _BARRED and _is(word, aim, known):
             return _BARRED[word]
-    return _lacking(facts, aim, known)
+    return _lacking(of_map, facts, aim, known)
 
 
-@functools.lru_cache(8192)
-def reaches(unit_type: str, aim: Aim) -> bool:
+def reaches(facts: MapFacts, unit_type: str, aim: Aim) -> bool:
     """Return True if units of a type have a weapon against a target, or if its weapons are unknown."""
-    mine, other = knowledge().get(unit_type), knowledge().get(aim.type)
-    if mine is None or other is None or not mine.weapons:
-        return True
-    planes = {*other.planes, "air"} - {"ground"} if aim.aloft else {*other.planes, "ground"}
-    return any(weapon.targets == "any" or weapon.targets in planes for weapon in mine.weapons)
+    mine = facts.units.get(unit_type)
+    return mine is None or not mine.weapons or mine.hits(aim.planes)
 
 
-def needs_sight(action: Action) -> bool:
+def needs_sight(facts: MapFacts, action: Action) -> bool:
     """Return True if the place that an action is aimed at must be in sight."""
-    facts = _facts(action.function)
-    return facts is not None and facts.target != "unit" and "visible" in facts.must
+    found = _facts(facts, action.function)
+    return found is not None and found.target != "unit" and "visible" in found.must
 
 
 def _is(word: str, aim: Aim, known: UnitFacts | None) -> bool | None:
@@ -153,9 +151,9 @@ def _is(word: str, aim: Aim, known: UnitFacts | None) -> bool | None:
     return known.structure if word == "structure" else word in (_ATTRIBUTES & {a.casefold() for a in known.attributes})
 
 
-def _lacking(facts: AbilityFacts, aim: Aim, known: UnitFacts | None) -> str | None:
+def _lacking(of_map: MapFacts, facts: AbilityFacts, aim: Aim, known: UnitFacts | None) -> str | None:
     """Return what the game wants of a target beyond the filters of an ability, or of the cases of a general one."""
-    for does in (facts.does, *(abilities()[case].does for case in facts.special)):
+    for does in (facts.does, *(of_map.abilities[case].does for case in facts.special)):
         if does in _WANTS:
             needed, fits = _WANTS[does]
             return None if known is None or fits(aim, known) else needed
@@ -163,5 +161,5 @@ def _lacking(facts: AbilityFacts, aim: Aim, known: UnitFacts | None) -> str | No
 
 
 @functools.cache
-def _facts(function: str | None) -> AbilityFacts | None:
-    return None if function is None else abilities().get(functions()[function].ability_id)
+def _facts(of_map: MapFacts, function: str | None) -> AbilityFacts | None:
+    return None if function is None else of_map.abilities.get(functions()[function].ability_id)

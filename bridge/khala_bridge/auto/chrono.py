@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 from khala_bridge.auto.cast import caster
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
-from khala_bridge.knowledge import abilities, knowledge
 from khala_bridge.rules import price_of
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.side import ability, finished, is_structure, name, place
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from khala_bridge.auto.rule import RuleRequest
-    from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.knowledge import AbilityFacts, MapFacts
     from khala_bridge.state import Unit
 
 BOOSTED: Final = 281
@@ -61,7 +60,7 @@ def chrono_unit(ask: RuleRequest) -> list[RuleOrder]:
         NotAvailable: it is no finished structure that makes anything, or no Nexus can.
     """
     unit = None if ask.tag is None else ask.snapshot.units.get(ask.tag)
-    if unit is None or unit.build_progress < 1 or not makes_something(name(unit)):
+    if unit is None or unit.build_progress < 1 or not makes_something(ask.snapshot.facts, name(unit)):
         what = hex(ask.tag or 0) if unit is None else f"{name(unit)} {hex(unit.tag)}"
         raise NotAvailable(
             "invalid_target", f"The {what} is no finished structure that trains, researches or warps in; name one."
@@ -75,7 +74,7 @@ def training_workers(ask: RuleRequest) -> list[Unit]:
     Raises:
         NotAvailable: there is none.
     """
-    found = [unit for unit, facts in _at_work(ask) if _is_worker(facts)]
+    found = [unit for unit, facts in _at_work(ask) if _is_worker(ask, facts)]
     return _without_boost(ask, found, "no Nexus trains Probes that is not boosted yet; train Probes first.")
 
 
@@ -85,7 +84,7 @@ def training_army(ask: RuleRequest) -> list[Unit]:
     Raises:
         NotAvailable: there is none that is not boosted yet.
     """
-    training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(facts)]
+    training = [unit for unit, facts in _at_work(ask) if facts.does == "train" and not _is_worker(ask, facts)]
     why = "no structure trains an army unit that is not boosted yet; train one first."
     return _without_boost(ask, [*training, *_recharging(ask)], why)
 
@@ -110,17 +109,17 @@ def working(ask: RuleRequest) -> list[Unit]:
 
 def boostable(ask: RuleRequest) -> list[Unit]:
     """Return the finished structures that the game takes as targets; it may be none."""
-    return [unit for unit in finished(ask.snapshot.own) if makes_something(name(unit))]
+    return [unit for unit in finished(ask.snapshot.own) if makes_something(ask.snapshot.facts, name(unit))]
 
 
 @functools.cache
-def makes_something(unit_type: str) -> bool:
+def makes_something(facts: MapFacts, unit_type: str) -> bool:
     """Return True if units of a type are structures that train, research or warp in."""
-    known = knowledge().get(unit_type)
+    known = facts.units.get(unit_type)
     if known is None or not known.structure:
         return False
-    facts = (abilities()[number] for number in known.ability_ids if number in abilities())
-    return any(fact.does in MAKING or fact.researches is not None for fact in facts)
+    can = (facts.abilities[number] for number in known.ability_ids if number in facts.abilities)
+    return any(ability.does in MAKING or ability.researches is not None for ability in can)
 
 
 def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
@@ -134,20 +133,20 @@ def _at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
 
 def _find_at_work(ask: RuleRequest) -> list[tuple[Unit, AbilityFacts]]:
     busy = [unit for unit in finished(ask.snapshot.own) if unit.orders and is_structure(unit)]
-    found = [(unit, abilities().get(unit.orders[0].ability_id)) for unit in busy]
+    found = [(unit, ask.snapshot.facts.abilities.get(unit.orders[0].ability_id)) for unit in busy]
     known = [(unit, facts) for unit, facts in found if facts is not None]
     return sorted(known, key=lambda work: (work[0].orders[0].progress, work[0].tag))
 
 
-def _is_worker(facts: AbilityFacts) -> bool:
-    made = knowledge().get(facts.produces or "")
+def _is_worker(ask: RuleRequest, facts: AbilityFacts) -> bool:
+    made = ask.snapshot.facts.units.get(facts.produces or "")
     return made is not None and made.worker
 
 
 def _recharging(ask: RuleRequest) -> list[Unit]:
     """Return the WarpGates that cannot warp in a Zealot now, though the player could pay for one."""
     known = ask.snapshot.abilities
-    zealot = abilities()[ability(WARP)]
+    zealot = ask.snapshot.facts.abilities[ability(WARP)]
     if known is None or ask.ledger.short_of(price_of(zealot)):
         return []
     gates = [unit for unit in finished(ask.snapshot.own) if name(unit) == "WarpGate" and unit.is_powered]

@@ -74,7 +74,7 @@ def _with_power(ask: RuleRequest) -> list[Unit]:
 
 def _castable(ask: RuleRequest) -> list[Unit]:
     known = ask.snapshot.units.values()
-    return [unit for unit in known if not unit.is_enemy and unfit(ask.action, aim_of(unit)) is None]
+    return [unit for unit in known if not unit.is_enemy and unfit(ask.snapshot.facts, ask.action, aim_of(unit)) is None]
 
 
 def _to_boost(ask: RuleRequest) -> list[Unit]:

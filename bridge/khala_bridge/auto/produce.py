@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.auto.rule import NotAvailable, RuleOrder, not_available
-from khala_bridge.knowledge import abilities, stand_ins
 from khala_bridge.rules import AT_ONCE
 from khala_bridge.state.ground import Land, footprint_of, land_of
 from khala_bridge.state.ground.footprints import ADDON
@@ -69,8 +68,7 @@ def producers(ask: RuleRequest) -> list[UnitState]:
     Raises:
         NotAvailable: there is none.
     """
-    facts = abilities().get(ask.function.ability_id)
-    if facts is None or facts.does != "build_addon":
+    if ask.ability is None or ask.ability.does != "build_addon":
         return ask.able()
     land = land_of(ask.snapshot)
     try:
@@ -103,7 +101,7 @@ def _has_room(ask: RuleRequest, land: Land, unit: UnitState) -> bool:
 def _rank(ask: RuleRequest, unit: UnitState) -> tuple[int, int, int]:
     """Return a rank: the lower, the sooner this producer finishes a new order."""
     load = unit.orders + ask.ledger.queued[unit.tag]
-    return load // (2 if unit.addon in stand_ins("Reactor") else 1), load, unit.tag
+    return load // (2 if unit.addon in ask.snapshot.facts.stand_ins("Reactor") else 1), load, unit.tag
 
 
 def _note(ask: RuleRequest, unit: UnitState, facts: AbilityFacts | None) -> None:

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from khala_bridge.knowledge import abilities
 from khala_bridge.rules import asked_by, brief, facts_for, nearest, nobody, of_side, price_of, why_not
 from khala_bridge.state.means import side_of
 
@@ -47,7 +46,12 @@ class RuleRequest:
     def facts(self, unit_type: str) -> AbilityFacts | None:
         """Return the facts of the action's ability, by the type of its user where that makes a difference."""
         number = self.function.ability_id
-        return facts_for(number, unit_type, self.side.upgrades) or abilities().get(number)
+        return facts_for(self.snapshot.facts, number, unit_type, self.side.upgrades) or self.ability
+
+    @property
+    def ability(self) -> AbilityFacts | None:
+        """The facts of the action's ability, whoever uses it."""
+        return self.snapshot.facts.abilities.get(self.function.ability_id)
 
     @property
     def side(self) -> SideState:
@@ -87,8 +91,7 @@ class RuleRequest:
         return known is None or ability in known.get(tag, ())
 
     def _users(self) -> tuple[str, ...]:
-        facts = abilities().get(self.function.ability_id)
-        return facts.users if facts else ()
+        return self.ability.users if self.ability else ()
 
 
 @dataclass(frozen=True, slots=True)

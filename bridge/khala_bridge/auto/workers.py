@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final
 from khala_bridge.auto.builders import GAS_STRUCTURES
 from khala_bridge.auto.rule import RuleOrder
 from khala_bridge.catalogue.functions import functions
-from khala_bridge.knowledge import abilities
 from khala_bridge.rules import price_of, use_of, why_not
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.means import side_of
@@ -98,7 +97,7 @@ def _train(snapshot: Snapshot, ledger: Ledger, taken: frozenset[int] | set[int])
         function = functions()[TRAINED[name(unit)]]
         free = not (unit.orders or ledger.queued[unit.tag] or unit.tag in taken)
         if left > 0 and free and _can(function.name, unit.tag, snapshot, ledger):
-            ledger.pay(price_of(abilities()[function.ability_id]))
+            ledger.pay(price_of(snapshot.facts.abilities[function.ability_id]))
             ledger.queued[unit.tag] += 1
             orders.append(RuleOrder(function, (unit.tag,)))
             left -= 1

@@ -23,6 +23,7 @@ from khala_bridge.game.battle import Battle
 from khala_bridge.game.game import GameConfig, GameIdentity, StepResult, check_install
 from khala_bridge.game.meeting import env_of
 from khala_bridge.game.processes import explain_errors
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_bridge.state.grid import NO_GRID
@@ -103,7 +104,8 @@ class PySC2Game:
                 self._env._random_seed = self._config.seed + self._episode  # noqa: SLF001
             steps = self._env.reset()
             self._episode += 1
-            self._maps = tuple(map(read_info, self._env.game_info))
+            facts = facts_of(self._config.map.data)
+            self._maps = tuple(read_info(info, facts) for info in self._env.game_info)
             self._creep = [NO_GRID] * len(self._maps)
             self._battle = None
             snapshots = self._snapshots(steps)

@@ -27,8 +27,8 @@ def improve(name: str, researched: frozenset[str], version: str = VERSION) -> Un
     kind = knowledge(version).get(name)
     if kind is None or not researched:
         return kind
-    body = _sum(name, researched)
-    arms = _sum(_FIGHTERS.get(name, name), researched)
+    body = _sum(name, researched, version)
+    arms = _sum(_FIGHTERS.get(name, name), researched, version)
     return kind.model_copy(
         update={
             **{field: getattr(kind, field) + body.get(field, 0) for field in _PLAIN},
@@ -38,10 +38,11 @@ def improve(name: str, researched: frozenset[str], version: str = VERSION) -> Un
     )
 
 
-def _sum(name: str, researched: frozenset[str]) -> dict[str, float]:
+def _sum(name: str, researched: frozenset[str], version: str) -> dict[str, float]:
     """Return what the upgrades add to a type together, by field."""
     total: dict[str, float] = {}
-    for known in (upgrades()[upgrade] for upgrade in researched if upgrade in upgrades()):
+    better = upgrades(version)
+    for known in (better[upgrade] for upgrade in researched if upgrade in better):
         for field, more in known.changes.get(name, {}).items():
             total[field] = total.get(field, 0) + more
     return total

@@ -21,7 +21,7 @@ from khala_protocol.messages import Frozen
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, UnitFacts, UpgradeFacts
+    from khala_bridge.knowledge.model import AbilityFacts, BuffFacts, Race, UnitFacts, UpgradeFacts
 
 RACES: Final = ("protoss", "terran", "zerg")
 WORKERS: Final = frozenset({"Probe", "SCV", "Drone", "MULE"})
@@ -48,42 +48,24 @@ def buffs(version: str = VERSION) -> dict[str, BuffFacts]:
     return buff_facts(version)
 
 
-def ability_of(number: int, unit_type: str, version: str = VERSION) -> AbilityFacts | None:
-    """Return the facts of an ability, special or general, for units of one type; None if they do not have it.
-
-    `ability_of(EFFECT_STIM, "Marine")` returns the Marine's Stim, and so does the special ability's own number.
-    """
-    facts = abilities(version).get(number)
-    if facts is None:
-        return None
-    cases = [abilities(version)[special] for special in facts.special] or [facts]
-    return next((case for case in cases if unit_type in case.users), None)
-
-
-@functools.cache
-def stand_ins(name: str, version: str = VERSION) -> frozenset[str]:
-    """Return the types that meet a requirement of this structure: itself, and its stand-ins (a Hive for a Lair)."""
-    return frozenset({name, *(kind.name for kind in unit_facts(version).values() if name in kind.counts_as)})
+def race_of(name: str) -> Race | None:
+    """Return the race of a unit type, on every map; None if the name is of an upgrade, or of nothing known."""
+    known = unit_facts(VERSION).get(name)
+    return known.race if known else None
 
 
 @functools.cache
 def is_structure(unit_type: str) -> bool:
-    """Return True if a type is a structure; unknown types are not."""
+    """Return True if a type is a structure, on every map; unknown types are not."""
     known = unit_facts(VERSION).get(unit_type)
     return known is not None and known.structure
 
 
 @functools.cache
 def is_worker(unit_type: str) -> bool:
-    """Return True if a type of unit gathers; unknown types do not."""
+    """Return True if a type of unit gathers, on every map; unknown types do not."""
     known = unit_facts(VERSION).get(unit_type)
     return known is not None and known.worker
-
-
-def is_armed(unit_type: str) -> bool:
-    """Return True if a type has a weapon or is unknown."""
-    known = unit_facts(VERSION).get(unit_type)
-    return known is None or bool(known.weapons)
 
 
 # --- words ----------------------------------------------------------------------------------------------------

@@ -6,11 +6,14 @@ PySC2's. Above: `khala_bridge.knowledge.load`, which makes the records from the 
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from pydantic import Field
 
 from khala_protocol.messages import Frozen
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 Race: TypeAlias = Literal["protoss", "terran", "zerg", "neutral"]
 Target: TypeAlias = Literal["none", "point", "unit", "point_or_unit", "point_or_none"]
@@ -127,9 +130,9 @@ class UnitFacts(Frozen):
         """Minerals and vespene that it costs."""
         return self.minerals + self.vespene
 
-    def hits(self, other: UnitFacts) -> bool:
-        """Return True if any of its weapons can hit the other type."""
-        return any(weapon.targets == "any" or weapon.targets in other.planes for weapon in self.weapons)
+    def hits(self, planes: Collection[str]) -> bool:
+        """Return True if any of its weapons can hit a unit on one of these planes, `ground` and `air`."""
+        return any(weapon.targets == "any" or weapon.targets in planes for weapon in self.weapons)
 
 
 class AbilityFacts(Frozen):

@@ -135,12 +135,12 @@ class Asker(NamedTuple):
     def _fits(self, action: Action, aim: Aim, doers: Sequence[UnitState]) -> bool:
         function = action.pysc2
         if action.aim == "place" or function is None:
-            return action.target != "enemy" or unfit(action, aim) is None
-        if unfit(action, aim) is not None:
+            return action.target != "enemy" or unfit(self.side.facts, action, aim) is None
+        if unfit(self.side.facts, action, aim) is not None:
             return False
         if not is_attack(function):
             return True
-        able = [reaches(name, aim) for name in dict.fromkeys(unit.type for unit in doers)]
+        able = [reaches(self.side.facts, name, aim) for name in dict.fromkeys(unit.type for unit in doers)]
         return all(able) if action.actor_count else any(able)
 
     # --- places -----------------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ class Asker(NamedTuple):
             tumors = [place(self.snapshot.units[unit.tag]) for unit in doers if unit.type in TUMORS]
             spots = tumor_places(tumors, self.snapshot, camera, self.around.world, MOST_POINTS)
             return spots or Lack("no free creep on the screen within reach")
-        if action.rule is None and needs_sight(action):
+        if action.rule is None and needs_sight(self.side.facts, action):
             seen = seen_points(self.snapshot, camera, self.around.world, MOST_POINTS)
             return Lack("nothing in sight on the screen") if seen == [] else seen
         return None

@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import is_armed, is_structure, is_worker, knowledge
+from khala_bridge.knowledge import is_structure, is_worker, race_of
 from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import PASSING
 from khala_bridge.state.ground import land_of
@@ -70,8 +70,7 @@ def toll(chronicle: Chronicle, log: Sequence[Entry], since_loop: int) -> Toll:
 @functools.cache
 def is_of_army(name: str) -> bool:
     """Return True if units of a type are an army: they move, and do not gather; also casters and transports."""
-    known = knowledge().get(name)
-    if known is None or known.structure or known.worker:
+    if race_of(name) is None or is_structure(name) or is_worker(name):
         return False
     return name not in PASSING | LIVES_OF_ITS_OWN
 
@@ -81,8 +80,12 @@ def _fights(unit: Unit) -> bool:
 
 
 def _value(unit: Unit) -> float:
-    known = knowledge().get(unit.name)
-    return known.value if known else 0.0
+    return unit.facts.value if unit.facts else 0.0
+
+
+def _is_armed(unit: Unit) -> bool:
+    """Return True if a unit has a weapon, or its type is unknown."""
+    return unit.facts is None or bool(unit.facts.weapons)
 
 
 def _as_seen(unit: Unit) -> _Seen:
@@ -149,7 +152,7 @@ def _order(scene: SideScene, unit: Unit) -> str:
 
 def _scouting(scene: SideScene, unit: Unit) -> tuple[float, float] | None:
     """Return where an own unit goes that scouts: a worker that walks far from home, or an unarmed unit."""
-    if is_structure(unit.name) or not unit.orders or (_fights(unit) and is_armed(unit.name)):
+    if is_structure(unit.name) or not unit.orders or (_fights(unit) and _is_armed(unit)):
         return None
     first = scene.bodies[unit.tag].view.orders[0]
     goal = unit.orders[0].target_world_space_pos
@@ -157,7 +160,7 @@ def _scouting(scene: SideScene, unit: Unit) -> tuple[float, float] | None:
         return None
     halls = [hall.pos for hall in land_of(scene.snapshot).own_halls]
     far = all(math.dist(goal, hall) > FAR for hall in halls)
-    return goal if far and (is_worker(unit.name) or not is_armed(unit.name)) else None
+    return goal if far and (is_worker(unit.name) or not _is_armed(unit)) else None
 
 
 # --- enemies --------------------------------------------------------------------------------------------------
@@ -180,4 +183,4 @@ def _enemies(scene: SideScene, places: Places, chronicle: Chronicle) -> list[Arm
 
 def _is_threat(known: Sighting) -> bool:
     name = known.unit.name
-    return is_armed(name) and not is_worker(name) and not is_structure(name)
+    return _is_armed(known.unit) and not is_worker(name) and not is_structure(name)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from khala_bridge.knowledge import is_armed
 from khala_bridge.state import Alliance
 from khala_protocol.messages import LOOPS_PER_S, OrderView, UnitDetails, UnitView
 
@@ -68,7 +67,8 @@ def body(unit: Unit, world: MapFrame) -> Body:
 def _own(unit: Unit, world: MapFrame) -> dict[str, object]:
     """Return the fields that only the player's own units have."""
     orders = tuple([_order(order, world) for order in unit.orders])
-    cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed(unit.name) else None
+    is_armed = unit.facts is None or bool(unit.facts.weapons)
+    cooldown_s = round(unit.weapon_cooldown / LOOPS_PER_S, 2) if is_armed else None
     return {"orders": orders, "order": orders[0].name if orders else None, "weapon_cooldown_s": cooldown_s}
 
 

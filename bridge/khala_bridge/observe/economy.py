@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import abilities, is_worker, knowledge
+from khala_bridge.knowledge import is_worker
 from khala_bridge.observe.landmarks import GAS_STRUCTURES
 from khala_bridge.state.ground import land_of
 from khala_protocol.messages import LOOPS_PER_S, Economy
@@ -15,6 +15,7 @@ from khala_protocol.messages import LOOPS_PER_S, Economy
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.observe.chronicle import Chronicle
     from khala_bridge.observe.scene import SideScene
     from khala_bridge.state import Unit
@@ -28,7 +29,7 @@ def economy(scene: SideScene, chronicle: Chronicle) -> Economy:
     halls = [unit for unit in land_of(scene.snapshot).own_halls if unit.build_progress >= 1]
     gas = [unit for unit in own if unit.name.removesuffix("Rich") in GAS_STRUCTURES and unit.build_progress >= 1]
     minerals, vespene = scene.snapshot.score.income
-    coming = _supply_coming(own)
+    coming = _supply_coming(own, scene.snapshot.facts)
     return Economy(
         income=(round(minerals), round(vespene)),
         spending=_spending(chronicle),
@@ -62,21 +63,21 @@ def _full_in_s(chronicle: Chronicle, left: float) -> float | None:
     return round(max(0.0, left) * loops / LOOPS_PER_S / used)
 
 
-def _supply_coming(own: Iterable[Unit]) -> float:
+def _supply_coming(own: Iterable[Unit], facts: MapFacts) -> float:
     """Return the supply of what is under construction, and of what hatches or is trained."""
-    building = sum(_provides(unit.name) for unit in own if unit.build_progress < 1)
+    building = sum(_provides(facts, unit.name) for unit in own if unit.build_progress < 1)
     busy = (unit for unit in own if unit.orders and not is_worker(unit.name))
-    return building + sum(_provides(_product(unit.orders[0].ability_id)) for unit in busy)
+    return building + sum(_provides(facts, _product(facts, unit.orders[0].ability_id)) for unit in busy)
 
 
-def _provides(name: str) -> float:
-    known = knowledge().get(name)
+def _provides(facts: MapFacts, name: str) -> float:
+    known = facts.units.get(name)
     return known.provides if known else 0.0
 
 
-def _product(ability: int) -> str:
-    facts = abilities().get(ability)
-    return facts.produces or "" if facts and facts.does == "train" else ""
+def _product(facts: MapFacts, ability: int) -> str:
+    known = facts.abilities.get(ability)
+    return known.produces or "" if known and known.does == "train" else ""
 
 
 def _casters(own: Iterable[Unit]) -> dict[str, tuple[int, ...]]:

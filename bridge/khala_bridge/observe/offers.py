@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.auto import lack
 from khala_bridge.catalogue.catalogue import catalogue
-from khala_bridge.knowledge import knowledge
 from khala_bridge.observe.arguments import Around, Asker, Lack
 from khala_bridge.rules import asked_by, brief, cases, distinct, facts_for, nearest, nobody, price_of, why_no_one
 from khala_bridge.state.means import ledger_of, side_of
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.catalogue.action import Action
     from khala_bridge.frames import MapFrame
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.observe.body import Body
     from khala_bridge.rules import Unavailable, UnitState, Use
     from khala_bridge.state import Snapshot
@@ -111,14 +111,15 @@ class Possible:
 
     def _offer(self, action: Action, unit_type: str) -> ActionCost | None:
         """Return the cost of an action for a type of unit that can do it; None if it is free."""
-        if not _is_paid(action.name, unit_type) or action.pysc2 is None:
+        of_map = self._side.facts
+        if not _is_paid(of_map, action.name, unit_type) or action.pysc2 is None:
             return None
-        facts = facts_for(action.pysc2.ability_id, unit_type, self._side.upgrades)
+        facts = facts_for(of_map, action.pysc2.ability_id, unit_type, self._side.upgrades)
         assert facts is not None, f"{action.name} is paid"
         cost = price_of(facts)
         made = facts.produces
         times = self._ledger.times(cost)
-        known = knowledge().get(made) if made else None
+        known = of_map.units.get(made) if made else None
         return ActionCost(
             action=action.name,
             minerals=round(cost.minerals),
@@ -182,10 +183,10 @@ def _uses(names: tuple[str, ...]) -> tuple[tuple[str, Use | None], ...]:
 
 
 @functools.cache
-def _is_paid(action: str, unit_type: str) -> bool:
+def _is_paid(of_map: MapFacts, action: str, unit_type: str) -> bool:
     """Return True if an action costs anything."""
     function = catalogue()[action].pysc2
-    return function is not None and any(any(price_of(facts)) for facts in cases(function.ability_id, unit_type))
+    return function is not None and any(any(price_of(case)) for case in cases(of_map, function.ability_id, unit_type))
 
 
 @functools.lru_cache(1024)

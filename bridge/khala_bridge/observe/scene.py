@@ -223,7 +223,7 @@ class SideScene:
         unit = self.snapshot.units[body.tag]
         ready = tuple([name for name, skill in skills.items() if skill.ready])
         missing = {name: skill.ability for name, skill in skills.items() if not skill.ready}
-        waits = {name: self._timers.ready_in_s(unit, ability) for name, ability in missing.items()}
+        waits = {name: self._timers.ready_in_s(self.snapshot.facts, unit, ability) for name, ability in missing.items()}
         unready = {name: wait_s for name, wait_s in waits.items() if wait_s is not None or name in of_team}
         if not ready and not unready:
             return view
@@ -237,7 +237,7 @@ class SideScene:
     @functools.cached_property
     def _effects(self) -> list[_Effect]:
         """The effects on the ground and the barriers that belong to nobody, by name."""
-        left_s = self._timers.effect_left_s
+        left_s = functools.partial(self._timers.effect_left_s, self.snapshot.facts)
         found: list[_Effect] = []
         for effect in self.snapshot.effects:
             name = effect_name(effect.effect_id)

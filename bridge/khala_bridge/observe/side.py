@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import abilities, is_structure, knowledge
+from khala_bridge.knowledge import is_structure
 from khala_bridge.observe.body import to_tenth
 from khala_bridge.observe.chronicle import COUNTED_ANYWAY, PASSING
 from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeCount, WarpGates
@@ -19,6 +19,7 @@ from khala_protocol.messages import Alert, Counts, Production, TeamReport, TypeC
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.observe.body import Body
     from khala_bridge.observe.changes import Changes
     from khala_bridge.observe.chronicle import Chronicle
@@ -39,7 +40,7 @@ def counts(scene: SideScene, chronicle: Chronicle) -> Counts:
     by_type: dict[str, list[UnitView]] = {}
     for view in own:
         by_type.setdefault(view.type, []).append(view)
-    counted = [_type_count(name, by_type[name]) for name in sorted(by_type)]
+    counted = [_type_count(name, by_type[name], scene.snapshot.facts) for name in sorted(by_type)]
     return Counts(
         units=tuple(count for count in counted if not is_structure(count.type)),
         structures=tuple(count for count in counted if is_structure(count.type)),
@@ -49,20 +50,20 @@ def counts(scene: SideScene, chronicle: Chronicle) -> Counts:
     )
 
 
-def _type_count(name: str, views: Sequence[UnitView]) -> TypeCount:
+def _type_count(name: str, views: Sequence[UnitView], facts: MapFacts) -> TypeCount:
     ready = [view for view in views if view.build_progress >= 1]
     under_way = sorted((view.build_progress for view in views if view.build_progress < 1), reverse=True)
-    idle = sum(not view.orders for view in ready) if works(name) else None
+    idle = sum(not view.orders for view in ready) if works(name, facts) else None
     return TypeCount(type=name, ready=len(ready), idle=idle, under_way=tuple(under_way))
 
 
-def works(name: str) -> bool:
+def works(name: str, facts: MapFacts) -> bool:
     """Return True if units of a type should be busy: workers, and structures that produce or research."""
-    known = knowledge().get(name)
+    known = facts.units.get(name)
     if known is None:
         return False
-    facts = (abilities()[number] for number in known.ability_ids if number in abilities())
-    return known.worker or (known.structure and any(fact.does in ("train", "research") for fact in facts))
+    can = (facts.abilities[number].does for number in known.ability_ids if number in facts.abilities)
+    return known.worker or (known.structure and any(does in ("train", "research") for does in can))
 
 
 def _production(own: Iterable[UnitView]) -> Iterator[Production]:
@@ -137,7 +138,7 @@ def warp_gates(scene: SideScene) -> WarpGates | None:
     if not gates:
         return None
     able = scene.snapshot.abilities
-    warps = {number for number, facts in abilities().items() if facts.does == "warp_in"}
+    warps = {number for number, facts in scene.snapshot.facts.abilities.items() if facts.does == "warp_in"}
     ready = None if able is None else sum(not warps.isdisjoint(able.get(gate.tag, ())) for gate in gates)
     return WarpGates(count=len(gates), ready=ready)
 

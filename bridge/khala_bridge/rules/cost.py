@@ -5,12 +5,10 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import abilities, ability_of
-
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.knowledge import AbilityFacts, MapFacts
 
 
 class Cost(NamedTuple):
@@ -39,31 +37,31 @@ def price_of(facts: AbilityFacts) -> Cost:
 
 
 @functools.cache
-def cases(ability: int, unit_type: str) -> tuple[AbilityFacts, ...]:
+def cases(facts: MapFacts, ability: int, unit_type: str) -> tuple[AbilityFacts, ...]:
     """Return the cases of an ability for a type of unit: one, the levels of a research in order, or none."""
-    facts = ability_of(ability, unit_type)
-    if facts is None:
+    found = facts.ability_of(ability, unit_type)
+    if found is None:
         return ()
-    special = [abilities()[number] for number in sorted(abilities()[ability].special)]
-    return tuple(level for level in special if level.researches and unit_type in level.users) or (facts,)
+    special = [facts.abilities[number] for number in sorted(facts.abilities[ability].special)]
+    return tuple(level for level in special if level.researches and unit_type in level.users) or (found,)
 
 
 @functools.cache
-def is_free(ability: int, unit_type: str) -> bool:
+def is_free(facts: MapFacts, ability: int, unit_type: str) -> bool:
     """Return True if the use of an ability takes nothing: no minerals, vespene, supply or energy, and no research."""
-    return not any(any(price_of(case)) or case.energy or case.researches for case in cases(ability, unit_type))
+    return not any(any(price_of(case)) or case.energy or case.researches for case in cases(facts, ability, unit_type))
 
 
 @functools.cache
-def is_instant(ability: int, unit_type: str) -> bool:
+def is_instant(facts: MapFacts, ability: int, unit_type: str) -> bool:
     """Return True if an ability happens at once, and the orders of its user stay as they are."""
-    found = cases(ability, unit_type)
+    found = cases(facts, ability, unit_type)
     return bool(found) and all(case.instant for case in found)
 
 
-def facts_for(ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:
+def facts_for(facts: MapFacts, ability: int, unit_type: str, upgrades: Collection[str]) -> AbilityFacts | None:
     """Return the facts of an ability for a type of unit; of several levels of research, the next one."""
-    found = cases(ability, unit_type)
+    found = cases(facts, ability, unit_type)
     if len(found) <= 1:
         return found[0] if found else None
-    return next((facts for facts in found if facts.researches not in upgrades), found[-1])
+    return next((case for case in found if case.researches not in upgrades), found[-1])

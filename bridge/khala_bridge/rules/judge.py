@@ -10,7 +10,8 @@ the state and the facts of the ability:
 | was not asked         | a weapon or an upgrade is missing   | everything but the cooldown and "the game"        |
 
 Even after a yes, price, energy and research are judged, since earlier calls of the turn spend resources and begin
-research. The host picks one of many units, and looks at the orders of each. Range is not a reason: units walk.
+research. A unit whose weapon is off may attack, by the game's answer, and yet the game refuses each target. The host
+picks one of many units, and looks at the orders of each. Range is not a reason: units walk.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from khala_bridge.knowledge import abilities, ability_of, is_armed, is_structure, knowledge, stand_ins, upgrades
 from khala_bridge.rules.cost import facts_for, is_free, price_of
 from khala_bridge.rules.unavailable import Unavailable, rank
 from khala_bridge.rules.weapons import can_shoot, is_attack
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from khala_bridge.catalogue.action import Action
     from khala_bridge.catalogue.functions import Function
-    from khala_bridge.knowledge import AbilityFacts
+    from khala_bridge.knowledge import AbilityFacts, MapFacts
     from khala_bridge.rules.ledger import Ledger
     from khala_bridge.rules.values import SideState, UnitState
 
@@ -87,13 +87,15 @@ def why_not(use: Use, unit: UnitState, side: SideState, ledger: Ledger) -> Unava
     """Return why a unit cannot do something now; None if it can."""
     able = unit.able
     says_yes = None if able is None or use.switch else use.ability in able
-    if use.attack and _needs_weapon(use, unit, says_yes=says_yes):
+    if use.attack and _needs_weapon(use, unit, side.facts, says_yes=says_yes):
         return Unavailable("weapon", unit.type, unit.tag)
-    if says_yes and not use.by_host and is_free(use.ability, unit.type):
+    if use.attack and use.at_unit and unit.disarmed:
+        return Unavailable("disarmed", unit.type, unit.tag)
+    if says_yes and not use.by_host and is_free(side.facts, use.ability, unit.type):
         return None
-    facts = facts_for(use.ability, unit.type, side.upgrades)
+    facts = facts_for(side.facts, use.ability, unit.type, side.upgrades)
     if facts is None and use.by_host and says_yes:
-        facts = abilities().get(use.ability)
+        facts = side.facts.abilities.get(use.ability)
     if facts is None:
         return Unavailable("ability", unit.type, unit.tag) if says_yes is False or use.by_host else None
     case = _Case(use, facts, unit, side, ledger)
@@ -125,14 +127,15 @@ def nearest(reasons: Sequence[Unavailable]) -> Unavailable:
     return reasons[0] if len(reasons) == 1 else max(reasons, key=rank)
 
 
-def sure(function: Function | None, unit_type: str, researched: Collection[str]) -> Unavailable | None:
+def sure(facts: MapFacts, function: Function | None, unit_type: str, researched: Collection[str]) -> Unavailable | None:
     """Return why units of a type cannot do something in any state; None if the game must be asked."""
     if function is None:
         return None
-    if is_attack(function) and not is_armed(unit_type):
+    if is_attack(function) and not facts.is_armed(unit_type):
         return Unavailable("weapon", unit_type)
-    facts = ability_of(function.ability_id, unit_type)
-    missing = tuple(need for need in sorted(facts.requires) if _lacks(need, researched)) if facts else ()
+    ability = facts.ability_of(function.ability_id, unit_type)
+    needed = sorted(ability.requires) if ability else ()
+    missing = tuple(need for need in needed if _lacks(facts, need, researched))
     return Unavailable("requirement", unit_type, names=missing) if missing else None
 
 
@@ -151,14 +154,14 @@ def _reasons(says_yes: bool | None, *, by_host: bool) -> tuple[Reason, ...]:  # 
     return _unfinished, _research, _requirement, _addon, _energy, _price, _queue, _power, *last
 
 
-def _needs_weapon(use: Use, unit: UnitState, *, says_yes: bool | None) -> bool:
+def _needs_weapon(use: Use, unit: UnitState, facts: MapFacts, *, says_yes: bool | None) -> bool:
     if says_yes:
-        return use.at_unit and not can_shoot(unit.type, unit.able or frozenset())
-    return not is_armed(unit.type)
+        return use.at_unit and not can_shoot(facts, unit.type, unit.able or frozenset())
+    return not facts.is_armed(unit.type)
 
 
-def _lacks(need: str, researched: Collection[str]) -> bool:
-    return need in upgrades() and need not in researched
+def _lacks(facts: MapFacts, need: str, researched: Collection[str]) -> bool:
+    return need in facts.upgrades and need not in researched
 
 
 # --- the reasons --------------------------------------------------------------------------------------------------
@@ -184,28 +187,25 @@ def _research(case: _Case) -> Unavailable | None:
 
 def _requirement(case: _Case) -> Unavailable | None:
     """Return a reason if a structure or an upgrade is missing."""
-    missing = tuple(sorted((need for need in case.facts.requires if not case.side.has(need)), key=_is_upgrade))
+    types = case.side.facts.units
+    missing = [need for need in case.facts.requires if not case.side.has(need)]
+    missing.sort(key=lambda need: need not in types)  # structures before the upgrades that they research
     if not missing:
         return None
-    begun = tuple(need for need in missing if need in knowledge() and case.side.builds(need))
-    return Unavailable("requirement", case.unit.type, case.unit.tag, names=missing, begun=begun)
-
-
-def _is_upgrade(need: str) -> bool:
-    """Return True for an upgrade; as a sort key, it puts structures before the upgrades that they research."""
-    return need not in knowledge()
+    begun = tuple(need for need in missing if need in types and case.side.builds(need))
+    return Unavailable("requirement", case.unit.type, case.unit.tag, names=tuple(missing), begun=begun)
 
 
 def _upgrade(case: _Case) -> Unavailable | None:
     """Return a reason if an upgrade is missing; missing structures are uncertain if the game was not asked."""
-    missing = tuple(need for need in case.facts.requires if _lacks(need, case.side.upgrades))
+    missing = tuple(need for need in case.facts.requires if _lacks(case.side.facts, need, case.side.upgrades))
     return Unavailable("requirement", case.unit.type, case.unit.tag, names=missing) if missing else None
 
 
 def _addon(case: _Case) -> Unavailable | None:
     """Return a reason if an add-on is missing."""
     addon, unit = case.facts.addon, case.unit
-    if not addon or unit.addon in stand_ins(addon):
+    if not addon or unit.addon in case.side.facts.stand_ins(addon):
         return None
     return Unavailable("addon", unit.type, unit.tag, names=(addon,))
 
@@ -226,7 +226,7 @@ def _price(case: _Case) -> Unavailable | None:
 def _taken(case: _Case) -> Unavailable | None:
     """Return a reason if an earlier call of the turn uses it; structures can do several things."""
     unit, does = case.unit, case.facts.does
-    goes_on = does == "build" or (does != "warp_in" and is_structure(unit.type))
+    goes_on = does == "build" or (does != "warp_in" and case.side.facts.is_structure(unit.type))
     if goes_on or unit.tag not in case.ledger.busy:
         return None
     return Unavailable("taken", unit.type, unit.tag)
@@ -243,9 +243,9 @@ def _occupied(case: _Case) -> Unavailable | None:
 def _queue(case: _Case) -> Unavailable | None:
     """Return a reason if its production queue is full."""
     unit, ledger = case.unit, case.ledger
-    if case.facts.does not in QUEUED or not is_structure(unit.type):
+    if case.facts.does not in QUEUED or not case.side.facts.is_structure(unit.type):
         return None
-    places = REACTOR_QUEUE if unit.addon in stand_ins("Reactor") else QUEUE
+    places = REACTOR_QUEUE if unit.addon in case.side.facts.stand_ins("Reactor") else QUEUE
     full = unit.orders + ledger.queued[unit.tag] >= places or unit.tag in ledger.changing
     return Unavailable("queue", unit.type, unit.tag) if full else None
 
@@ -259,7 +259,7 @@ def _attached(case: _Case) -> Unavailable | None:
 def _work(case: _Case) -> Unavailable | None:
     """Return a reason if it has orders, and this one must be done at once."""
     unit, ledger = case.unit, case.ledger
-    if case.facts.does not in AT_ONCE or not is_structure(unit.type):
+    if case.facts.does not in AT_ONCE or not case.side.facts.is_structure(unit.type):
         return None
     idle = not unit.orders and not ledger.queued[unit.tag] and unit.tag not in ledger.changing
     return None if idle else Unavailable("at_work", unit.type, unit.tag)

@@ -11,6 +11,7 @@ Kind: TypeAlias = Literal[
     "nobody",
     "ability",
     "weapon",
+    "disarmed",
     "unfinished",
     "researched",
     "researching",

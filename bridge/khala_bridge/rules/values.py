@@ -9,10 +9,10 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import knowledge, stand_ins
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from khala_bridge.knowledge import MapFacts
 
 FINISHED = 1.0
 """Build progress of a finished unit."""
@@ -36,6 +36,8 @@ class UnitState(NamedTuple):
     orders: int = 0
     gathers: bool = True
     """Whether it has no orders except to gather."""
+    disarmed: bool = False
+    """Whether its weapon is off: it holds up a unit with its beam, or a spell disarms it."""
 
     @property
     def is_finished(self) -> bool:
@@ -55,6 +57,8 @@ def distinct(units: Iterable[UnitState]) -> list[UnitState]:
 class SideState:
     """The units and upgrades of a player; the accounts are in `Ledger`."""
 
+    facts: MapFacts
+    """Those of the data that the map depends on; everything that is judged of the side is judged by them."""
     units: dict[int, UnitState]
     """Own units by their tags, in ascending order."""
     upgrades: frozenset[str]
@@ -86,10 +90,10 @@ class SideState:
 
     def has(self, requirement: str) -> bool:
         """Return True if there is a structure or an upgrade, or what may stand in for it."""
-        if requirement in knowledge():
-            return not self.standing.isdisjoint(stand_ins(requirement))
+        if requirement in self.facts.units:
+            return not self.standing.isdisjoint(self.facts.stand_ins(requirement))
         return requirement in self.upgrades
 
     def builds(self, structure: str) -> bool:
         """Return True if a structure, or what may stand in for it, is finished or under construction."""
-        return not self.by_type.keys().isdisjoint(stand_ins(structure))
+        return not self.by_type.keys().isdisjoint(self.facts.stand_ins(structure))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Final
 
-from khala_bridge.knowledge import abilities, is_armed
-
 if TYPE_CHECKING:
     from khala_bridge.catalogue.functions import Function
+    from khala_bridge.knowledge import MapFacts
 
 ATTACK: Final = 3674
 """The general ability to attack."""
@@ -21,15 +20,15 @@ def is_attack(function: Function) -> bool:
     return ATTACK in (function.ability_id, function.general_id) and function.stem != "Scan_Move"
 
 
-def can_shoot(unit_type: str, able: frozenset[int]) -> bool:
+def can_shoot(facts: MapFacts, unit_type: str, able: frozenset[int]) -> bool:
     """Return True if a unit that can attack, by the game's answer, has a weapon now.
 
     A unit without one scans on the same order. Bunkers, and Oracles with their beam, shoot though their type has no
     weapon.
     """
-    return is_armed(unit_type) or not able.isdisjoint(_shots())
+    return facts.is_armed(unit_type) or not able.isdisjoint(_shots(facts))
 
 
 @functools.cache
-def _shots() -> frozenset[int]:
-    return frozenset(abilities()[ATTACK].special) - {SCAN_MOVE}
+def _shots(facts: MapFacts) -> frozenset[int]:
+    return frozenset(facts.abilities[ATTACK].special) - {SCAN_MOVE}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import race_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -38,28 +38,27 @@ def of_side(why: Unavailable) -> str:
 
 
 def _lack(why: Unavailable, name: str) -> str:
-    if name not in knowledge():
+    if race_of(name) is None:
         return f"{name} is not researched"
     return f"{name} is not finished" if name in why.begun else f"no {name}"
 
 
 def _needed_first(why: Unavailable) -> str:
     """Return the missing structures, or else the upgrades: these cannot be researched without the structures."""
-    if structures := [name for name in why.names if name in knowledge()]:
+    if structures := [name for name in why.names if race_of(name)]:
         return f"a finished {' and a '.join(structures)} is needed first"
     return f"{' and '.join(why.names)} {'is' if len(why.names) == 1 else 'are'} not researched"
 
 
 def _requirement(name: str) -> str:
-    return f"a finished {name}" if name in knowledge() else f"the upgrade {name}"
+    return f"a finished {name}" if race_of(name) else f"the upgrade {name}"
 
 
 def _price_of_side(why: Unavailable) -> str:
     first = why.missing[0]
     if first.account != "supply":
         return f"it costs {_too_dear(first)}."
-    known = knowledge().get(why.who)
-    more = SUPPLY_FROM.get(known.race if known else "", "more supply")
+    more = SUPPLY_FROM.get(race_of(why.who) or "", "more supply")
     return f"it needs {first.needs:g} supply and {first.has:g} is free; get {more} first."
 
 
@@ -88,6 +87,7 @@ _BRIEF: Final[Form] = {
     "nobody": lambda why: f"no {why.who}" if why.who else "nobody can now",
     "ability": lambda why: f"{why.who} cannot",
     "weapon": lambda why: f"{why.who} has no weapon",
+    "disarmed": lambda why: f"the weapon of {why.who} is off",
     "unfinished": lambda why: f"{why.who} is not finished",
     "researched": lambda _: "researched already",
     "researching": lambda _: "being researched",
@@ -108,6 +108,7 @@ _OF_TEAM: Final[Form] = {
     "nobody": lambda why: f"there is no {why.who}",
     "ability": lambda why: f"{why.who} has no such ability",
     "weapon": lambda why: f"{why.who} has no weapon",
+    "disarmed": lambda why: f"the weapon of {why.who} is off while it holds up a unit or a spell disarms it",
     "unfinished": lambda why: f"{why.who} is still under construction ({why.has:.0%})",
     "researched": lambda why: f"{why.names[0]} is researched already",
     "researching": lambda why: f"{why.names[0]} is being researched already",
@@ -128,6 +129,7 @@ _OF_SIDE: Final[Form] = {
     "nobody": lambda why: f"you have no {why.who}; {HOW_TO_GET.get(why.who, 'build one first')}.",
     "ability": lambda why: f"{why.who} has no such ability.",
     "weapon": lambda why: f"{why.who} has no weapon.",
+    "disarmed": lambda why: f"the weapon of your {why.who} is off while it holds up a unit or a spell disarms it.",
     "unfinished": lambda why: f"your {why.who} is not finished yet, it is at {why.has:.0%}.",
     "researched": lambda _: "it is researched already.",
     "researching": lambda _: "it is being researched already.",

@@ -1,4 +1,4 @@
-"""The constants of an episode: the map, and the sizes of the game's own pictures.
+"""The constants of an episode: the map and its data, and the sizes of the game's own pictures.
 
 `khala_bridge.state.read` reads them once an episode. `khala_bridge.state.ground` works out from them where structures
 can stand and units can walk.
@@ -12,6 +12,7 @@ from khala_bridge.frames import MapFrame, WorldPoint
 from khala_bridge.state.grid import NO_GRID, Grid
 
 if TYPE_CHECKING:
+    from khala_bridge.knowledge import MapFacts
     from khala_protocol.messages import Frames
 
 
@@ -29,8 +30,10 @@ class PictureSizes(NamedTuple):
 
 
 class EpisodeInfo(NamedTuple):
-    """The map of an episode, and the pictures that the game draws of it."""
+    """The map of an episode, its data, and the pictures that the game draws of it."""
 
+    facts: MapFacts
+    """Those of the data that the map depends on."""
     size: tuple[int, int] = (0, 0)
     """Width and height of the map in cells, which are world units."""
     playable: tuple[int, int, int, int] = (0, 0, 0, 0)

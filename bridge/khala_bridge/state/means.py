@@ -11,7 +11,6 @@ import functools
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.functions import functions, general
-from khala_bridge.knowledge import knowledge
 from khala_bridge.rules import Ledger, SideState, UnitState
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.ground.land import built_by
@@ -31,6 +30,7 @@ def side_of(snapshot: Snapshot) -> SideState:
             return side
     own = snapshot.own
     side = SideState(
+        snapshot.facts,
         {unit.tag: _unit(snapshot, unit) for unit in own},
         frozenset(snapshot.upgrades),
         frozenset(order.ability_id for unit in own for order in unit.orders),
@@ -53,7 +53,7 @@ def ledger_of(snapshot: Snapshot) -> Ledger:
 
 def _unit(snapshot: Snapshot, unit: Unit) -> UnitState:
     name, orders = unit.name, unit.orders
-    known = knowledge().get(name)
+    known = unit.facts
     addon = snapshot.units.get(unit.add_on_tag) if unit.add_on_tag else None
     return UnitState(
         unit.tag,
@@ -66,7 +66,21 @@ def _unit(snapshot: Snapshot, unit: Unit) -> UnitState:
         known is None or not known.needs_power or unit.is_powered,
         len(orders),
         not orders or _gathers(orders[0].ability_id),
+        _is_disarmed(snapshot, unit),
     )
+
+
+def _is_disarmed(snapshot: Snapshot, unit: Unit) -> bool:
+    """Return True if a buff disarms a unit, or if it holds up another one with its beam, which no buff of it shows."""
+    facts = snapshot.facts
+    if any(buff in facts.buffs and "disarmed" in facts.buffs[buff].flags for buff in unit.buffs):
+        return True
+    if not unit.orders:
+        return False
+    order = unit.orders[0]
+    held = snapshot.units.get(order.target_unit_tag)
+    ability = facts.abilities.get(order.ability_id) if held is not None and "GravitonBeam" in held.buffs else None
+    return ability is not None and ability.does == "graviton_beam"
 
 
 @functools.lru_cache(4096)
@@ -79,8 +93,9 @@ def _plan_costs(snapshot: Snapshot) -> tuple[float, float]:
     """Return the minerals and vespene for structures that workers are on their way to build."""
     if not any(_builds(ability) for ability in side_of(snapshot).ordered):
         return 0.0, 0.0
-    plans = [knowledge()[structure] for structure, _ in land_of(snapshot).plans]
-    drones = sum(knowledge()["Drone"].minerals for kind in plans if kind.race == "zerg")
+    units = snapshot.facts.units
+    plans = [units[structure] for structure, _ in land_of(snapshot).plans]
+    drones = sum(units["Drone"].minerals for kind in plans if kind.race == "zerg")
     return sum(kind.minerals for kind in plans) - drones, sum(kind.vespene for kind in plans)
 
 

@@ -1,6 +1,6 @@
 """The reader: messages of the SC2 API in, values out.
 
-    info = read_info(controller.game_info())                      once an episode
+    info = read_info(controller.game_info(), facts_of(data))      once an episode
     snapshot = read_snapshot(controller.observe(), info)                   once a step
 
 Every attribute of a message is read once: 100 units take a third of a millisecond. Placeholders (structures that are
@@ -19,7 +19,6 @@ from s2clientprotocol import common_pb2, error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.frames import WorldPoint
-from khala_bridge.knowledge import knowledge
 from khala_bridge.names import unit_name, upgrade_name
 from khala_bridge.state.episode import EpisodeInfo, PictureSizes
 from khala_bridge.state.fog import known_creep
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
     from s2clientprotocol import score_pb2
 
-    from khala_bridge.knowledge import UnitFacts
+    from khala_bridge.knowledge import MapFacts, UnitFacts
     from khala_protocol.messages import Outcome
 
 _OUTCOMES: dict[int, Outcome] = {sc_pb.Victory: "win", sc_pb.Defeat: "loss", sc_pb.Tie: "draw"}
@@ -43,11 +42,12 @@ _OWN, _REMEMBERED = Alliance.OWN, Display.REMEMBERED  # an attribute of an enume
 _CLOAKED = frozenset({raw_pb2.Cloaked, raw_pb2.CloakedDetected, raw_pb2.CloakedAllied})
 
 
-def read_info(info: sc_pb.ResponseGameInfo) -> EpisodeInfo:
-    """Return the map of an episode, and its picture sizes."""
+def read_info(info: sc_pb.ResponseGameInfo, facts: MapFacts) -> EpisodeInfo:
+    """Return the map of an episode, with the facts of the data that it depends on, and its picture sizes."""
     raw, layers, render = info.start_raw, info.options.feature_layer, info.options.render
     area = raw.playable_area
     return EpisodeInfo(
+        facts,
         size=(raw.map_size.x, raw.map_size.y),
         playable=(area.p0.x, area.p0.y, area.p1.x, area.p1.y),
         enemy_race=_enemy_race(info),
@@ -100,7 +100,7 @@ def read_snapshot(
     """
     observation = response.observation
     raw = observation.raw_data
-    known = _units(raw.units)
+    known = _units(raw.units, info.facts)
     units = {tag: unit for tag, unit in known.items() if unit.display_type is not _REMEMBERED}
     player = _player(observation.player_common)
     camera = raw.player.camera
@@ -134,9 +134,9 @@ def read_snapshot(
 # --- units ------------------------------------------------------------------------------------------------------
 
 
-def _units(messages: Iterable[raw_pb2.Unit]) -> dict[int, Unit]:
+def _units(messages: Iterable[raw_pb2.Unit], facts: MapFacts) -> dict[int, Unit]:
     """Return the units by tag, in ascending order; the last one of those with the same tag."""
-    found = [unit for unit in map(read_unit, messages) if unit is not None]
+    found = [unit for message in messages if (unit := read_unit(message, facts)) is not None]
     found.sort(key=_tag)
     return {unit.tag: unit for unit in found}
 
@@ -152,9 +152,9 @@ class _Type(NamedTuple):
 
 
 @functools.lru_cache(4096)
-def _type(unit_type: int) -> _Type:
+def _type(unit_type: int, facts: MapFacts) -> _Type:
     name = unit_name(unit_type)
-    return _Type(name, knowledge().get(name))
+    return _Type(name, facts.units.get(name))
 
 
 def _fields(first: str, last: str) -> Callable[[raw_pb2.Unit], tuple[Any, ...]]:
@@ -167,17 +167,17 @@ _of_all = _fields("tag", "vespene_contents")
 _of_own = _fields("is_powered", "buff_duration_remain")
 
 
-def read_unit(unit: raw_pb2.Unit) -> Unit | None:
-    """Return the value of one unit; None for a placeholder."""
+def read_unit(unit: raw_pb2.Unit, facts: MapFacts) -> Unit | None:
+    """Return the value of one unit on a map with these facts; None for a placeholder."""
     display = _DISPLAYS[unit.display_type]
     if display is None:
         return None
     pos, buffs = unit.pos, unit.buff_ids
-    name, facts = _type(unit.unit_type)
+    name, known = _type(unit.unit_type, facts)
     alliance = _ALLIANCES[unit.alliance]
     place = WorldPoint(pos.x, pos.y)
     is_cloaked = unit.cloak in _CLOAKED
-    first = (name, facts, alliance, display, place, is_cloaked, tuple(buffs) if buffs else ())
+    first = (name, known, alliance, display, place, is_cloaked, tuple(buffs) if buffs else ())
     return Unit._make(first + _of_all(unit) + (_only_own(unit) if alliance is _OWN else _NOTHING_OWN))
 
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.functions import functions, general
 from khala_bridge.frames import WorldPoint
-from khala_bridge.knowledge import knowledge
-from khala_bridge.names import buff_name, unit_name
+from khala_bridge.names import buff_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,12 +28,7 @@ UNBORN = frozenset({"Larva", "Cocoon", "BanelingCocoon", "BroodLordCocoon", "Rav
 
 def kind(unit: Unit) -> UnitFacts | None:
     """Return the facts about the type of a unit."""
-    return _kind(unit.unit_type)
-
-
-@functools.lru_cache(2048)
-def _kind(unit_type: int) -> UnitFacts | None:
-    return knowledge().get(unit_name(unit_type))
+    return unit.facts
 
 
 def name(unit: Unit) -> str:
@@ -94,19 +88,11 @@ def enemies_in_reach(snapshot: Snapshot, of: Iterable[Unit]) -> list[Unit]:
     A Zealot cannot hit an Overlord: flyers over an army on the ground are not targets. Neither are Larvae and eggs.
     """
     enemies = [u for u in snapshot.units.values() if u.is_enemy and name(u) not in UNBORN]
-    ours = tuple(sorted({unit.unit_type for unit in of}))
-    return [unit for unit in enemies if _hit(ours, unit.unit_type, flying=unit.is_flying)]
-
-
-@functools.lru_cache(4096)
-def _hit(ours: tuple[int, ...], other: int, *, flying: bool) -> bool:
-    """Return True if a unit of any of some types can hit one of another type; unknown types can hit, and be hit."""
-    known = [kind for kind in map(_kind, ours) if kind is not None]
-    target = _kind(other)
-    if target is None or len(known) < len(ours) or not any(kind.weapons for kind in known):
-        return True
-    planes = target.planes or (("air",) if flying else ("ground",))
-    return any(weapon.targets in ("any", *planes) for kind in known for weapon in kind.weapons)
+    ours = {unit.name: unit.facts for unit in of}
+    known = [facts for facts in ours.values() if facts is not None]
+    if len(known) < len(ours) or not any(facts.weapons for facts in known):
+        return enemies
+    return [unit for unit in enemies if unit.facts is None or any(facts.hits(unit.planes) for facts in known)]
 
 
 def is_armed(unit: Unit) -> bool:

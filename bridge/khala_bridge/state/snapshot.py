@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from khala_bridge.frames import WorldPoint
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.state.episode import EpisodeInfo
     from khala_bridge.state.grid import Grid
     from khala_bridge.state.pictures import GamePictures
@@ -135,3 +136,8 @@ class Snapshot:
     """The player's result; None while it plays, and after an end without one."""
     forfeit: Forfeit | None = None
     """Why the opponent lost other than by being beaten; None if it was beaten, or not at all."""
+
+    @property
+    def facts(self) -> MapFacts:
+        """The facts about types, abilities and upgrades that hold on the map."""
+        return self.info.facts

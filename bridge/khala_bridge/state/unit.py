@@ -64,7 +64,7 @@ class Unit(NamedTuple):
     name: str
     """Name of its type as PySC2 has it, `Stalker`."""
     facts: UnitFacts | None
-    """The facts about its type; None for a type that `khala_bridge.knowledge` does not have."""
+    """The facts about its type on this map; None for a type that `khala_bridge.knowledge` does not have."""
     alliance: Alliance
     display_type: Display
     pos: WorldPoint

@@ -437,7 +437,7 @@ class TaskConfig(Frozen):
 
     @property
     def map_data(self) -> DataSet:
-        """The data that the map depends on, see `khala_bridge.knowledge.version_of`."""
+        """The data that the map depends on, see `khala_bridge.knowledge.facts_of`."""
         return (self.own_map or known_maps()[self.map]).data
 
     @property

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_bridge.catalogue.catalogue import catalogue
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, is_worker
 from khala_bridge.rules import sure
 from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 from khala_protocol.messages import Clock
@@ -61,7 +61,7 @@ def _base(spec: MapSpec) -> tuple[TeamConfig, ...]:
 
 def _has_workers(spec: MapSpec) -> bool:
     """Return True if there is an economy, so that missing structures and upgrades can be built and researched."""
-    return any(knowledge()[unit].worker for unit in spec.units)
+    return any(map(is_worker, spec.units))
 
 
 def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
@@ -70,5 +70,5 @@ def _usable(action: Action, unit: str, spec: MapSpec) -> bool:
         action.group in GROUPS
         and action.subject != "side"
         and action.fits(unit)
-        and (_has_workers(spec) or sure(action.pysc2, unit, spec.upgrades) is None)
+        and (_has_workers(spec) or sure(facts_of(spec.data), action.pysc2, unit, spec.upgrades) is None)
     )

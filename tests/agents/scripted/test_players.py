@@ -49,6 +49,12 @@ def test_an_observation_is_read_as_it_stands() -> None:
     assert situation.correspondents == ["Scout", "Commander"]
 
 
+def test_the_enemies_in_reach_are_those_that_will_do() -> None:
+    told = "    What will do for team Zealot-1:\n        Attack_Unit: tag 0x1001c0001\n"
+    zealots, *_ = read(OBSERVATION.replace("Valid actions\n", f"Valid actions\n{told}", 1)).teams.values()
+    assert [unit.tag for unit in in_reach(zealots)] == ["0x1001c0001"]
+
+
 @pytest.mark.parametrize("text", ["", "\n\n", "What is 2 + 2?", "Team \n    Your units:\n        nothing"])
 def test_a_text_that_is_no_observation_is_an_empty_situation(text: str) -> None:
     assert read(text) == Situation()

@@ -37,6 +37,7 @@ def page(
     more: str = "",
     minimap: str = "[30, 32]",
     hit: str = "",
+    will: str = "",
 ) -> str:
     """Return an observation of one team, T."""
     lists = {"Your units": own, "Allied units": tuple(allies), "Enemy units": tuple(enemies)}
@@ -46,9 +47,10 @@ def page(
     if hit:
         blocks.append(f"    Since the last observation:\n        own Stalker was hit: {hit}\n")
     valid = ", ".join(f"<{action}>" for action in actions)
+    will_do = f"    What will do for team T:\n        Attack_Unit: tag {will}\n" if will else ""
     return (
         f"Game\n    Time: 0:20\n\nTeam T\n    Minimap position: {minimap}\n{''.join(blocks)}\n"
-        f"Valid actions\n    Team T: {valid}\n\nTask\n    Win.\n    Team T: {task}\n\n{more}"
+        f"Valid actions\n    Team T: {valid}\n{will_do}\nTask\n    Win.\n    Team T: {task}\n\n{more}"
         "Answer\n    At most 3 actions per team.\n"
     )
 
@@ -94,6 +96,13 @@ def test_it_shoots_at_what_its_weapons_can_hit() -> None:
     zealots = [line(1, "Zealot", 12, 12, "shield 50/50")]
     flyer, walker = line(0x11, "Mutalisk", 13, 12, far=1.0, health="1/120"), line(0x12, "Roach", 15, 12, far=3.0)
     assert calls(page(*zealots, enemies=[flyer, walker])) == ["Attack_Unit 0x12"]
+
+
+@pytest.mark.parametrize(("will", "shot"), [("", "Attack_Unit 0x11"), ("0x12", "Attack_Unit 0x12")])
+def test_it_shoots_at_what_the_text_says_will_do(will: str, shot: str) -> None:
+    tempest = line(1, "Tempest", 12, 12, health="300/300")
+    walker, flyer = line(0x11, "Hydralisk", 15, 12, far=3.0, health="1/80"), line(0x12, "Corruptor", 16, 12, far=4.0)
+    assert calls(page(tempest, enemies=[walker, flyer], will=will)) == [shot]
 
 
 BLINK = (*BASIC, "Select_Unit_Blink_Screen(tag, screen)")

@@ -12,7 +12,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.catalogue.functions import functions
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.names import unit_name
 from khala_bridge.state import Snapshot, Unit, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
@@ -48,7 +48,7 @@ class Game:
             )
         )
         self.client.ask(join_game=sc.RequestJoinGame(race=RACES[race], options=interface(screen=0)))
-        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info)
+        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info, facts_of("multi"))
         self.see()
 
     def see(self) -> Snapshot:

@@ -12,6 +12,7 @@ from khala_bridge.auto import RULES, NotAvailable, RuleRequest
 from khala_bridge.auto.workers import automatic
 from khala_bridge.catalogue.catalogue import catalogue
 from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_bridge.state.means import ledger_of
@@ -35,7 +36,7 @@ def scene(name: str) -> Snapshot:
         client.ask(create_game=alone)
     client.ask(join_game=sc.RequestJoinGame(race=common_pb2.Protoss, options=interface(screen=0)))
     response = client.step(40)
-    info = read_info(client.ask(game_info=sc.RequestGameInfo()).game_info)
+    info = read_info(client.ask(game_info=sc.RequestGameInfo()).game_info, facts_of("multi"))
     answer = client.ask(query=question(read_snapshot(response, info))).query
     return read_snapshot(response, info, abilities=available(answer))
 

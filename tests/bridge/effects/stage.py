@@ -14,7 +14,7 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc
 
 from khala_bridge.compat import features, point
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.state import read_info, read_snapshot
 from khala_bridge.state.abilities import available, question
 from khala_simulator.combat import lifecycle
@@ -88,7 +88,7 @@ class Stage:
             prepare(self.world, self.world.slot_of(self.caster))
         self.client.step(1)
         self._kept = self._keep()
-        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info)
+        self.info = read_info(self.client.ask(game_info=sc.RequestGameInfo()).game_info, facts_of("multi"))
         self._eyes = _eyes() if layers else None
         self._idle: dict[int, Seen] = {}
         self._first = self.look()

@@ -7,6 +7,7 @@ from s2clientprotocol import raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.game.battle import Battle
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import Snapshot, read_info, read_snapshot
 
 MARINE, MEDIVAC = 48, 54
@@ -20,7 +21,7 @@ def snapshot(own: dict[int, int], enemy: dict[int, int]) -> Snapshot:
             response.observation.raw_data.units.add(
                 tag=tag, unit_type=kind, alliance=alliance, display_type=raw_pb2.Visible
             )
-    return read_snapshot(response, read_info(sc_pb.ResponseGameInfo()))
+    return read_snapshot(response, read_info(sc_pb.ResponseGameInfo(), facts_of("multi")))
 
 
 BATTLE = Battle(snapshot({1: MARINE, 2: MEDIVAC}, {11: MARINE, 12: MEDIVAC}))

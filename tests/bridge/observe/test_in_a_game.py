@@ -10,7 +10,7 @@ from s2clientprotocol import common_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_agents.scripted.reading import read
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.names import unit_name
 from khala_bridge.observe import Observer
 from khala_bridge.observe.text import SECTIONS_OF, tokens
@@ -63,7 +63,7 @@ def game(request: pytest.FixtureRequest) -> tuple[TaskConfig, list[SideObservati
     observer, observations = Observer(task), []
     for _ in range(2):
         response = client.observe()
-        blind = read_snapshot(response, read_info(info))
+        blind = read_snapshot(response, read_info(info, facts_of("multi")))
         answer = client.ask(query=question(blind)).query
         snapshot = read_snapshot(response, blind.info, abilities=available(answer))
         observations.append(observer.observe(snapshot))

@@ -9,11 +9,13 @@ import pytest
 
 from khala_bridge.catalogue.functions import functions
 from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import facts_of
 from khala_bridge.observe import Observer
 from khala_bridge.observe.timers import Timers
 from khala_bridge.state import Alliance, Effect, Snapshot
 from khala_bridge.task.config import TaskConfig
 
+FACTS = facts_of("multi")
 BLINK = functions()["Effect_Blink_screen"].ability_id
 PSI_STORM = 1
 LIBERATOR_ZONE = 9
@@ -50,10 +52,10 @@ def test_a_cooldown_runs_from_when_the_ability_was_last_ready(stalkers: Any) -> 
     timers = Timers()
     for now in (stalkers(0, 1), stalkers(112)):
         timers.note(now)
-    assert timers.ready_in_s(now.units[1], BLINK) == 2.1  # 7.14 s of the ability less 5
-    assert timers.ready_in_s(now.units[2], BLINK) is None
+    assert timers.ready_in_s(now.facts, now.units[1], BLINK) == 2.1  # 7.14 s of the ability less 5
+    assert timers.ready_in_s(now.facts, now.units[2], BLINK) is None
     timers.note(stalkers(224))
-    assert timers.ready_in_s(now.units[1], BLINK) is None
+    assert timers.ready_in_s(now.facts, now.units[1], BLINK) is None
 
 
 def test_no_time_is_told_while_something_else_holds_the_unit(stalkers: Any) -> None:
@@ -61,7 +63,7 @@ def test_no_time_is_told_while_something_else_holds_the_unit(stalkers: Any) -> N
     for now in (stalkers(0, 1), stalkers(11, buff_ids=(17,))):
         timers.note(now)
     assert now.units[1].buffs == ("FungalGrowth",)
-    assert timers.ready_in_s(now.units[1], BLINK) is None
+    assert timers.ready_in_s(now.facts, now.units[1], BLINK) is None
 
 
 def test_an_effect_that_stays_in_its_place_ends_in_time(snapshot: Any) -> None:
@@ -73,10 +75,10 @@ def test_an_effect_that_stays_in_its_place_ends_in_time(snapshot: Any) -> None:
     timers = Timers()
     timers.note(at(0))
     effect = PSI_STORM, (WorldPoint(3, 3),)
-    assert timers.effect_left_s(effect, "PsiStorm") == 2.9
+    assert timers.effect_left_s(FACTS, effect, "PsiStorm") == 2.9
     timers.note(at(45))
-    assert timers.effect_left_s(effect, "PsiStorm") == 0.9
-    assert timers.effect_left_s((LIBERATOR_ZONE, ()), "LiberatorDefenderZone") is None
+    assert timers.effect_left_s(FACTS, effect, "PsiStorm") == 0.9
+    assert timers.effect_left_s(FACTS, (LIBERATOR_ZONE, ()), "LiberatorDefenderZone") is None
 
 
 def test_pages_tell_how_long_skills_buffs_and_barriers_last(stalkers: Any, unit: Any) -> None:

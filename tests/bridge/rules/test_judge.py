@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.catalogue.catalogue import catalogue
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of, knowledge
 from khala_bridge.rules import Ledger, SideState, UnitState, use_of, why_not
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def reason(
     able = frozenset({function.ability_id}) if allowed else frozenset[int]()
     unit = UnitState(TAG, unit_type, able, **state)
     units = {TAG: unit} | {OTHER + n: UnitState(OTHER + n, name, frozenset()) for n, name in enumerate(others)}
-    side = SideState(units, frozenset(upgrades), frozenset())
+    side = SideState(facts_of("multi"), units, frozenset(upgrades), frozenset())
     why = why_not(use_of(function, by_host=True), unit, side, ledger or Ledger(**RICH))
     return None if why is None else why.kind
 

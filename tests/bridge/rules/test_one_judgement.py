@@ -278,6 +278,7 @@ MEANINGS = (
     ("missing", r"you have no (finished )?(?P<what>\w+)"),
     ("missing", r"a finished (?P<what>\w+)"),
     ("weapon", r"(?P<what>\w+) has no weapon"),
+    ("disarmed", r"weapon of (your )?(?P<what>\w+) is off"),
     ("power", r"has no power|has power"),
     ("queue", r"queue of .* is full"),
     ("at_work", r"is at work"),

@@ -16,6 +16,12 @@ ROWS = [
     (Unavailable("ability", "Zealot"), "Zealot cannot", "Zealot has no such ability", "Zealot has no such ability."),
     (Unavailable("weapon", "Observer"), "Observer has no weapon", "Observer has no weapon", "Observer has no weapon."),
     (
+        Unavailable("disarmed", "Phoenix"),
+        "the weapon of Phoenix is off",
+        "the weapon of Phoenix is off while it holds up a unit or a spell disarms it",
+        "the weapon of your Phoenix is off while it holds up a unit or a spell disarms it.",
+    ),
+    (
         Unavailable("unfinished", "Gateway", has=0.43),
         "Gateway is not finished",
         "Gateway is still under construction (43%)",

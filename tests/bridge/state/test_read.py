@@ -8,6 +8,7 @@ from s2clientprotocol import common_pb2, error_pb2, raw_pb2
 from s2clientprotocol import sc2api_pb2 as sc_pb
 
 from khala_bridge.frames import WorldPoint
+from khala_bridge.knowledge import facts_of
 from khala_bridge.state import (
     ActionError,
     Alliance,
@@ -47,7 +48,7 @@ MANY = {
 
 
 def of(message: raw_pb2.Unit) -> Unit:
-    found = read_unit(message)
+    found = read_unit(message, facts_of("multi"))
     assert found is not None
     return found
 
@@ -65,7 +66,7 @@ def full(**fields: Any) -> raw_pb2.Unit:
 def see(*units: raw_pb2.Unit, **fields: Any) -> Snapshot:
     response = sc_pb.ResponseObservation()
     response.observation.raw_data.units.extend(units)
-    return read_snapshot(response, EpisodeInfo(), **fields)
+    return read_snapshot(response, EpisodeInfo(facts_of("multi")), **fields)
 
 
 # --- a unit -----------------------------------------------------------------------------------------------------
@@ -160,7 +161,7 @@ def test_a_snapshot_has_the_account_of_the_player() -> None:
     for number, name in enumerate(names, 1):
         setattr(response.observation.player_common, name, number)
     response.observation.game_loop = 224
-    seen = read_snapshot(response, EpisodeInfo())
+    seen = read_snapshot(response, EpisodeInfo(facts_of("multi")))
     assert seen.player == PlayerState(*range(1, len(names) + 1))
     assert seen.game_loop == 224
 
@@ -175,7 +176,7 @@ def test_a_snapshot_has_upgrades_power_effects_and_warnings() -> None:
     effect.pos.add(x=3, y=4)
     effect.pos.add(x=5, y=6)
     response.observation.alerts.extend((sc_pb.MineralsExhausted, sc_pb.NuclearLaunchDetected))
-    seen = read_snapshot(response, EpisodeInfo())
+    seen = read_snapshot(response, EpisodeInfo(facts_of("multi")))
     assert seen.upgrades == ("WarpGateResearch", "Blink")
     assert seen.camera == WorldPoint(20, 30)
     assert seen.power_sources == (PowerSource(8, WorldPoint(1, 2), 6.5),)
@@ -192,7 +193,9 @@ def test_the_score_counts_minerals_and_vespene_of_every_kind() -> None:
         setattr(score.score_details.killed_minerals, kind, 10**number)
         setattr(score.score_details.killed_vespene, kind, 2 * 10**number)
         setattr(score.score_details.lost_minerals, kind, 4 * 10**number)
-    assert read_snapshot(response, EpisodeInfo()).score == PlayerScore(total=1234, killed=33333, lost=44444)
+    assert read_snapshot(response, EpisodeInfo(facts_of("multi"))).score == PlayerScore(
+        total=1234, killed=33333, lost=44444
+    )
 
 
 def test_who_died_and_what_was_refused_adds_up_until_an_agent_is_asked() -> None:
@@ -200,7 +203,7 @@ def test_who_died_and_what_was_refused_adds_up_until_an_agent_is_asked() -> None
     response.observation.raw_data.event.dead_units.extend((3, 4))
     response.action_errors.add(unit_tag=5, ability_id=23, result=error_pb2.CantTargetAirUnits)
     earlier = ActionError(1, 2, "NotEnoughMinerals")
-    seen = read_snapshot(response, EpisodeInfo(), dead=frozenset({1}), errors=(earlier,))
+    seen = read_snapshot(response, EpisodeInfo(facts_of("multi")), dead=frozenset({1}), errors=(earlier,))
     assert seen.dead == {1, 3, 4}
     assert seen.errors == (earlier, ActionError(5, 23, "CantTargetAirUnits"))
 
@@ -211,7 +214,7 @@ def test_the_result_is_that_of_the_player(result: str, outcome: str) -> None:
     response.observation.player_common.player_id = 2
     response.player_result.add(player_id=1, result=sc_pb.Undecided)
     response.player_result.add(player_id=2, result=sc_pb.Result.Value(result))
-    assert read_snapshot(response, EpisodeInfo(), ended=True).outcome == outcome
+    assert read_snapshot(response, EpisodeInfo(facts_of("multi")), ended=True).outcome == outcome
 
 
 def test_while_it_plays_there_is_no_result() -> None:
@@ -225,7 +228,7 @@ def test_grids_of_the_moment_keep_their_bytes() -> None:
     state = response.observation.raw_data.map_state
     state.creep.CopyFrom(common_pb2.ImageData(bits_per_pixel=1, size=size, data=b"\x80"))
     state.visibility.CopyFrom(common_pb2.ImageData(bits_per_pixel=8, size=size, data=b"\2" * 8))
-    seen = read_snapshot(response, EpisodeInfo())
+    seen = read_snapshot(response, EpisodeInfo(facts_of("multi")))
     assert seen.creep == Grid(8, 1, 1, b"\x80")
     assert seen.visibility == Grid(8, 1, 8, b"\2" * 8)
 
@@ -233,7 +236,7 @@ def test_grids_of_the_moment_keep_their_bytes() -> None:
 def test_a_snapshot_does_not_change_with_its_message() -> None:
     response = sc_pb.ResponseObservation()
     response.observation.raw_data.units.add(tag=1, health=10, alliance=raw_pb2.Self)
-    seen = read_snapshot(response, EpisodeInfo())
+    seen = read_snapshot(response, EpisodeInfo(facts_of("multi")))
     response.observation.raw_data.units[0].health = 5
     assert seen.units[1].health == 10
     assert dataclasses.replace(seen, abilities={1: frozenset({23})}).units is seen.units
@@ -252,7 +255,7 @@ def test_an_episode_has_its_map_and_the_sizes_of_pictures() -> None:
     options.feature_layer.width = 24
     options.feature_layer.resolution.x = options.feature_layer.resolution.y = 128
     options.feature_layer.minimap_resolution.x = options.feature_layer.minimap_resolution.y = 64
-    found = read_info(message)
+    found = read_info(message, facts_of("multi"))
     assert (found.size, found.playable) == ((96, 60), (0, 23, 96, 52))
     assert found.starts == (WorldPoint(20.5, 30.5),)
     assert (found.placement, found.pathing) == (Grid(8, 1, 1, b"\xff"), NO_GRID)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from khala_bridge.catalogue.functions import functions
-from khala_bridge.knowledge import abilities, ability_of
+from khala_bridge.knowledge import MapFacts, abilities
 from khala_simulator.tables.abilities import AIMS
 
 if TYPE_CHECKING:
@@ -173,9 +173,10 @@ def test_a_general_ability_has_the_users_of_its_special_ones_and_the_facts_in_wh
 
 
 def test_for_each_of_its_users_a_general_ability_is_one_of_the_special_ones(version: str) -> None:
+    facts = MapFacts(version)
     for known in abilities(version).values():
         for user in known.users if known.does == "general" else ():
-            case = ability_of(known.id, user, version)
+            case = facts.ability_of(known.id, user)
             assert case is not None
             assert case.id in known.special
             assert user in case.users

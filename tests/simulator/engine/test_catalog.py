@@ -61,6 +61,33 @@ def test_a_data_set_has_its_numbers_in_every_version(version: str, data: DataSet
     assert numbers(catalog, "Stalker_RL") == found[0]  # a map's own type
 
 
+# what a type can shoot at with the data of liberty, void and multi: g for ground, a for air; SOURCES.md of the tables
+REACH = {
+    "Tempest": (None, "a", "ga"),
+    "HighTemplar": ("", "", "g"),
+    "InfestorTerran": ("ga", "ga", "ga"),
+    "Queen": ("ga", "ga", "ga"),
+    "Cyclone": (None, "ga", "ga"),
+}
+
+
+@pytest.mark.parametrize("version", ["4.10", "5.0.13"])
+@pytest.mark.parametrize("name", REACH)
+def test_a_type_has_the_weapons_of_the_data_set(version: str, name: str) -> None:
+    for data, planes in zip(DATA_SETS, REACH[name], strict=True):
+        unit = load_catalog(version, data).unit(name)
+        reach = [plane for plane in ("ground", "air") if unit.weapon_against(plane) is not None]
+        assert planes in (None, "".join(plane[0] for plane in reach)), data
+
+
+def test_an_infested_terran_has_one_rifle_against_all_before_the_multiplayer_gave_it_spines() -> None:
+    def weapons(data: DataSet) -> dict[str, str]:
+        return {weapon.id: weapon.targets for weapon in load_catalog(data=data).unit("InfestorTerran").weapons}
+
+    assert weapons("liberty") == weapons("void") == {"InfestedGuassRifle": "any"}
+    assert weapons("multi") == {"InfestedGuassRifle": "ground", "InfestedAcidSpines": "air"}
+
+
 def test_a_catalog_is_loaded_once_for_a_version_and_data_set() -> None:
     assert load_catalog() is load_catalog("4.10", "multi") is load_catalog(75689)
     assert load_catalog(data="liberty") is load_catalog("4.10", "liberty")

@@ -37,10 +37,12 @@ CLINGING = 230.0
 
 
 def targets(team: TextTeam) -> list[TextUnit]:
-    """Return the enemies that some unit of the team has a weapon against."""
+    """Return the enemies that some unit of the team has a weapon against, on this map."""
     mine = [kind_of(unit) for unit in team.own]
     return [
-        enemy for enemy in team.enemies if enemy.type not in IGNORED and any(kind.hits(kind_of(enemy)) for kind in mine)
+        enemy
+        for enemy in team.enemies
+        if enemy.type not in IGNORED and team.reaches(enemy) and any(kind.hits(kind_of(enemy)) for kind in mine)
     ]
 
 

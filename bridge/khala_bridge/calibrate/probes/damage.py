@@ -36,7 +36,7 @@ def pair(lab: Lab) -> Samples:
         (attacker, target)
         for attacker in known(lab, armed_types())
         for target in known(lab, targets())
-        if fact(attacker).hits(fact(target))
+        if fact(attacker).hits(fact(target).planes)
     ]
     for pairs in stage(lab, wanted):
         firing = attack(lab, pairs)

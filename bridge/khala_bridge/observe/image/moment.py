@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import is_structure, race_of
 from khala_bridge.names import effect_name, unit_name
 from khala_bridge.observe.image.codes import code_of
 from khala_bridge.observe.image.painting import Painting, Veil, upright
@@ -178,14 +178,13 @@ def _kind(unit_type: int, side: Side, is_flying: bool, is_large: bool) -> tuple[
     """Return the name, letters and shape of a type of unit."""
     name = unit_name(unit_type)
     shape: Shape = "ground"
-    known = knowledge().get(name)
     if name == "ForceField":
         shape = "field"
     elif side == "neutral":
         shape = _thing(name)
     elif is_flying:
         shape = "air"
-    elif known.structure if known else is_large:
+    elif is_structure(name) if race_of(name) else is_large:
         shape = "structure"
     return name, code_of(name) if shape in {"ground", "air", "structure"} else "", shape
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from khala_bridge.catalogue.catalogue import catalogue
-from khala_bridge.knowledge import is_armed, knowledge
+from khala_bridge.knowledge import facts_of
 from khala_bridge.observe.observation import AgentObservation
 from khala_bridge.observe.text.page import Page, find_sections, render
 from khala_bridge.observe.text.words import plural
@@ -32,6 +32,7 @@ from khala_protocol.messages import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from khala_bridge.knowledge import MapFacts
     from khala_bridge.task.config import AgentConfig, TaskConfig, TeamConfig
 
 _FOES: dict[str, str] = {"protoss": "Zealot", "terran": "Marine", "zerg": "Zergling"}
@@ -101,8 +102,10 @@ def _first_contact(task: TaskConfig, agent: AgentConfig, text: str) -> tuple[str
     return (contacts[0].name, text) if contacts else None
 
 
-def _unit(name: str, tag: str, at: tuple[float, float], share: float = 1.0, distance: float | None = None) -> UnitView:
-    known = knowledge()[name]
+def _unit(
+    facts: MapFacts, name: str, tag: str, at: tuple[float, float], share: float = 1.0, distance: float | None = None
+) -> UnitView:
+    known = facts.units[name]
     return UnitView(
         tag=tag,
         type=name,
@@ -113,7 +116,7 @@ def _unit(name: str, tag: str, at: tuple[float, float], share: float = 1.0, dist
         health_max=known.health,
         shield=round(share * known.shield, 1),
         shield_max=known.shield,
-        weapon_cooldown_s=0.0 if distance is None and is_armed(name) else None,
+        weapon_cooldown_s=0.0 if distance is None and facts.is_armed(name) else None,
         distance=distance,
     )
 
@@ -129,14 +132,20 @@ def _fight(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     kind = team.unit_types[0]
     can = _action_names(agent.actions[kind])
     foe = _foe(task)
-    own = [_unit(kind, _OWN_TAGS[0], (12, 12))]
+    facts = facts_of(task.map_data)
+    own = [_unit(facts, kind, _OWN_TAGS[0], (12, 12))]
     if team.kind != "select":
-        own.append(_unit(kind, _OWN_TAGS[1], (13, 12.5), share=0.25))
-    foes = (_unit(foe, _FOE_TAGS[0], (17, 12), distance=4.6), _unit(foe, _FOE_TAGS[1], (18, 13), 0.4, distance=5.6))
+        own.append(_unit(facts, kind, _OWN_TAGS[1], (13, 12.5), share=0.25))
+    foes = (
+        _unit(facts, foe, _FOE_TAGS[0], (17, 12), distance=4.6),
+        _unit(facts, foe, _FOE_TAGS[1], (18, 13), 0.4, distance=5.6),
+    )
     view = View(
         time_s=95, teams=(TeamView(name=_team_name(team), minimap=(30.0, 22.0), units=tuple(own), enemies=foes),)
     )
-    reply = _fighting(kind, can if len(own) > 1 else can - {"Select_Unit_Move_Screen"}, foe)
+    if len(own) == 1:
+        can -= {"Select_Unit_Move_Screen"}
+    reply = _fighting(kind, can, foe, armed=facts.is_armed(kind))
     if reply is None:
         return None
     said = _first_contact(task, agent, f"2 {plural(foe)} near [30, 22] of the minimap.")
@@ -148,9 +157,9 @@ def _team_name(team: TeamConfig) -> str:
     return f"{team.name}-1" if team.kind == "select" else team.name
 
 
-def _fighting(kind: str, can: frozenset[str], foe: str) -> _Reply | None:
+def _fighting(kind: str, can: frozenset[str], foe: str, *, armed: bool) -> _Reply | None:
     back = "<Select_Unit_Move_Screen(0xe0002, [6, 12])>"
-    if "Attack_Unit" in can and is_armed(kind):
+    if "Attack_Unit" in can and armed:
         calls = [f"<Attack_Unit({_FOE_TAGS[1]})>", *([back] if "Select_Unit_Move_Screen" in can else [])]
         saved = f" My {kind} {_OWN_TAGS[1]} has a quarter of its life left and steps back." if len(calls) > 1 else ""
         return _Reply(
@@ -216,9 +225,10 @@ def _army(task: TaskConfig, agent: AgentConfig) -> _Made | None:
         Place(name="Base 1", what="base", minimap=(20, 20), holder="own", about=names.hall, unseen_s=0.0),
         Place(name="Base 2", what="base", minimap=(44, 46), about="the enemy began here"),
     )
-    worth = round(12 * knowledge()[kind].value)
+    types = facts_of(task.map_data).units
+    worth = round(12 * types[kind].value)
     part = ArmyPart(place="Base 1", minimap=(24, 24), units={kind: 12}, doing="idle", value=worth)
-    seen = ArmyPart(minimap=(36, 38), units={foe: 4}, value=round(4 * knowledge()[foe].value), unseen_s=20, away=31)
+    seen = ArmyPart(minimap=(36, 38), units={foe: 4}, value=round(4 * types[foe].value), unseen_s=20, away=31)
     resources = Resources(minerals=120, vespene=40, supply_used=47, supply_cap=54)
     view = View(time_s=300, resources=resources, places=places, army=Army(parts=(part,), enemies=(seen,), value=worth))
     analysis = (
@@ -255,10 +265,11 @@ def _site(task: TaskConfig, agent: AgentConfig) -> _Made | None:
     build = f"Build_{names.production}_Screen"
     if build not in can:
         return None
-    worker = _unit(names.worker, _OWN_TAGS[0], (12, 12))
-    hall = _unit(names.hall, _HALL_TAG, (5, 10)).but(alliance="ally")
+    facts = facts_of(task.map_data)
+    worker = _unit(facts, names.worker, _OWN_TAGS[0], (12, 12))
+    hall = _unit(facts, names.hall, _HALL_TAG, (5, 10)).but(alliance="ally")
     powered = race == "protoss"
-    pylon = _unit("Pylon", "0xe0022", (15, 9)).but(alliance="ally")
+    pylon = _unit(facts, "Pylon", "0xe0022", (15, 9)).but(alliance="ally")
     field = Landmark(
         what="power field", tag="0xe0022", type="Pylon", minimap=(33, 19), screen=(15, 9), about="radius 6.5"
     )

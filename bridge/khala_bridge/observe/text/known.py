@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, NamedTuple
 
-from khala_bridge.knowledge import advice, is_armed, is_structure, is_worker, knowledge, short, version_of
+from khala_bridge.knowledge import advice, facts_of, is_structure, is_worker, race_of, short
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, INDENT2
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @section("unit_knowledge")
 def unit_knowledge(page: Page) -> Iterable[str]:
     """Show what is known of every type in sight, and of the army that it leads: most of own types, least of allies."""
-    return _written(_types(page), frozenset(page.view.upgrades), version_of(page.task.map_data))
+    return _written(_types(page), frozenset(page.view.upgrades), facts_of(page.task.map_data).version)
 
 
 def own_types(names: Iterable[str], data_set: DataSet) -> tuple[str, ...]:
@@ -27,7 +27,7 @@ def own_types(names: Iterable[str], data_set: DataSet) -> tuple[str, ...]:
 
     Pages have the same lines, and those about counters; prompts do not repeat them. `data_set` are the data of the map.
     """
-    version = version_of(data_set)
+    version = facts_of(data_set).version
     told = ((*short(name, frozenset(), version=version), *advice(name, version=version)) for name in _known(names))
     return tuple(map("\n".join, told))
 
@@ -55,9 +55,10 @@ def _written(types: _Types, researched: frozenset[str], version: str) -> tuple[s
 def unit_knowledge_in_short(page: Page) -> Iterator[str]:
     """Show one line for each type."""
     types = _types(page)
+    version = facts_of(page.task.map_data).version
     if any(types):
         yield "Unit knowledge"
-    yield from (f"{INDENT}{short(name, frozenset())[0]}" for name in _all(types))
+    yield from (f"{INDENT}{short(name, frozenset(), version=version)[0]}" for name in _all(types))
 
 
 @shorter("unit_knowledge", rank=30, says="what is known of the types in sight")
@@ -81,6 +82,7 @@ def _types(page: Page) -> _Types:
     view = page.view
     mine = [unit.type for team in page.teams for unit in team.units]
     if view.counts and any(team.minimap is None for team in page.teams):  # it leads the army of the whole side
+        is_armed = facts_of(page.task.map_data).is_armed
         mine += [count.type for count in view.counts.units if is_armed(count.type) and not is_worker(count.type)]
     allies = [unit.type for team in page.teams for unit in team.allies]
     enemies = [unit.type for team in page.teams for unit in team.enemies]
@@ -91,7 +93,7 @@ def _types(page: Page) -> _Types:
 
 
 def _known(names: Iterable[str]) -> tuple[str, ...]:
-    return tuple(name for name in dict.fromkeys(names) if name in knowledge())
+    return tuple(name for name in dict.fromkeys(names) if race_of(name))
 
 
 def _all(types: _Types) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from khala_bridge.knowledge import knowledge
+from khala_bridge.knowledge import facts_of
 from khala_bridge.observe.text.page import section, shorter
 from khala_bridge.observe.text.words import INDENT, ago, count_words, minutes, n, point, under_heading
 
@@ -153,8 +153,9 @@ def _answers(page: Page) -> Iterator[str]:
     """Yield, for each armed type of the enemy, the own race's types that beat it."""
     counts = page.view.counts
     mine = _trainable(page)
+    types = facts_of(page.task.map_data).units
     for enemy in counts.enemies if counts else ():
-        known = knowledge().get(enemy.type)
+        known = types.get(enemy.type)
         if known is None or not known.weapons or known.worker or known.structure:
             continue
         good = [name for name in known.countered_by if name in mine][:MOST_COUNTERS]
