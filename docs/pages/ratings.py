@@ -47,7 +47,7 @@ def _tables(board: Leaderboard) -> Iterator[str]:
         columns = columns_of(board, column)
         header = ("player", "is", *columns, *detail_names(board, column))
         yield f"## {column.capitalize()}"
-        yield f"Of {basis_of(board, column)}:"
+        yield f"{basis_of(board, column)}."
         yield table(header, [_line(line, column, board) for line in board.standings(column)])
 
 

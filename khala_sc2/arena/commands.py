@@ -75,9 +75,8 @@ def show(paths: Sequence[Path], *, as_json: bool) -> None:
         return
     screen = stdout_console()
     for column in board.columns:
-        screen.print(
-            f"{column}: {basis_of(board, column)}", style="bold", soft_wrap=True, highlight=False, markup=False
-        )
+        screen.print(column, style="bold", highlight=False, markup=False)
+        screen.print(f"{basis_of(board, column)}.", soft_wrap=True, highlight=False, markup=False)
         screen.print(table_of(board, column))
         screen.print()
     for remark in remarks_of(board, pool.remarks):

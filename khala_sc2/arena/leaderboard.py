@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def basis_of(board: Leaderboard, column: str) -> str:
     """Return what the ratings of a column are of: its tasks, or the groups whose mean they are."""
-    return f"the mean of {', '.join(board.groups)}" if column == OVERALL else ", ".join(board.tasks[column])
+    return f"The mean of {', '.join(board.groups)}" if column == OVERALL else f"Tasks: {', '.join(board.tasks[column])}"
 
 
 def table_of(board: Leaderboard, column: str) -> Table:

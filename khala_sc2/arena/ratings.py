@@ -88,7 +88,7 @@ class Leaderboard:
     def standings(self, column: str) -> list[LeaderboardLine]:
         """Return the players who have a rating in a column, the best first."""
         rated = [line for line in self.players if column in line.ratings]
-        return sorted(rated, key=lambda line: (-line.ratings[column].value, line.player))
+        return sorted(rated, key=lambda line: (-round(line.ratings[column].value), line.player))
 
 
 def rate(pool: PlayerPool) -> Leaderboard:

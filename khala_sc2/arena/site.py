@@ -106,7 +106,7 @@ def _place(player: str, group: str) -> str:
 def _leaderboard(pool: PlayerPool, board: Leaderboard) -> Iterator[str]:
     yield f"<p>{len(pool.games)} games of {len(board.players)} players. Each rating is a link to its games.</p>"
     for column in board.columns:
-        yield f"<section>\n<h2>{_safe(column)}</h2>\n<p>{_safe(basis_of(board, column))}</p>"
+        yield f"<section>\n<h2>{_safe(column)}</h2>\n<p>{_safe(basis_of(board, column))}.</p>"
         yield from _table(board, column)
         yield "</section>"
     yield "<section>\n<h2>What these numbers say</h2>\n<ul>"
