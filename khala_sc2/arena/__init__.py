@@ -8,6 +8,7 @@ matches        a pairing → the matches that `khala_sc2.experiment.runner` play
 results        the file of what was played, which people can send to each other
 ratings        games → a rating for each player, for each group of tasks and overall
 bradley_terry  the fit, and its intervals
+misfit         whether games scatter as their ratings say
 leaderboard    its table, and words for people
 site           results → a directory of pages
 

@@ -164,7 +164,10 @@ class _Fit:
     def _maximum(
         self, design: Floats, offset: Floats, start: Floats | None = None, whole: Floats | None = None
     ) -> Floats:
-        """Return the parameters of the largest likelihood, by Newton's method.
+        """Return the parameters of the largest likelihood, by Newton's method with steps that never go down.
+
+        The prior is like half a win and half a loss more in each pair, times its leverage, and counts in the curvature
+        so: without that, steps of players with a single game are twice too long, and the search goes in circles.
 
         Args:
             design: of the free parameters.
@@ -174,18 +177,28 @@ class _Fit:
         """
         whole = design if whole is None else whole
         parameters = np.zeros(design.shape[1]) if start is None else start
+        reached = self._likelihood(design @ parameters + offset, whole)
         for _ in range(STEPS if parameters.size else 0):
-            chance = _logistic(design @ parameters + offset)
-            weights = self._games * chance * (1 - chance)
-            spread = np.linalg.inv(whole.T @ (weights[:, None] * whole))
-            leverage = weights * np.einsum("ij,jk,ik->i", whole, spread, whole)
-            score = design.T @ (self._points - self._games * chance + leverage * (0.5 - chance))
-            step = np.linalg.solve(design.T @ (weights[:, None] * design), score)
-            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), ACCURACY))
+            step = self._step(design, design @ parameters + offset, whole)
+            while (found := self._likelihood(design @ (parameters + step) + offset, whole)) < reached - ACCURACY:
+                step = step / 2
             parameters = parameters + step
+            reached = found
             if np.abs(step).max() < ACCURACY:
                 break
         return parameters
+
+    def _step(self, design: Floats, logits: Floats, whole: Floats) -> Floats:
+        """Return a step of Newton's method towards the largest likelihood."""
+        chance = _logistic(logits)
+        weights = self._games * chance * (1 - chance)
+        spread = np.linalg.inv(whole.T @ (weights[:, None] * whole))
+        leverage = weights * np.einsum("ij,jk,ik->i", whole, spread, whole)
+        score = design.T @ (self._points - self._games * chance + leverage * (0.5 - chance))
+        weights += leverage * chance * (1 - chance)
+        step = np.linalg.solve(design.T @ (weights[:, None] * design), score)
+        shorter: Floats = step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), ACCURACY))
+        return shorter
 
     def _likelihood(self, logits: Floats, design: Floats) -> float:
         chance = _logistic(logits)

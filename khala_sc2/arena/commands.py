@@ -20,9 +20,9 @@ from khala_protocol.configfile import load
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import make_private, write_private
 from khala_protocol.signals import cancelled_by_signal
-from khala_sc2.arena.leaderboard import remarks_of, table_of
+from khala_sc2.arena.leaderboard import basis_of, remarks_of, table_of
 from khala_sc2.arena.matches import count_meetings, plan_round, pool_of
-from khala_sc2.arena.ratings import distinct_games, rate, rate_games
+from khala_sc2.arena.ratings import rate, rate_by_group
 from khala_sc2.arena.results import RESULTS, pool_results, results_of, write_results
 from khala_sc2.arena.site import make_site
 from khala_sc2.arena.spec import Arena
@@ -71,10 +71,14 @@ def show(paths: Sequence[Path], *, as_json: bool) -> None:
     pool = pool_results(paths)
     board = rate(pool)
     if as_json:
-        typer.echo(json.dumps(asdict(board) | {"remarks": pool.remarks}))
+        typer.echo(json.dumps(asdict(board) | {"remarks": [*board.remarks, *pool.remarks]}))
         return
     screen = stdout_console()
-    screen.print(table_of(board))
+    for column in board.columns:
+        screen.print(column, style="bold", highlight=False, markup=False)
+        screen.print(f"{basis_of(board, column)}.", soft_wrap=True, highlight=False, markup=False)
+        screen.print(table_of(board, column))
+        screen.print()
     for remark in remarks_of(board, pool.remarks):
         screen.print(remark, soft_wrap=True, highlight=False)
 
@@ -134,8 +138,7 @@ def _batches(arena: Arena, store: Store, game: str) -> Iterator[tuple[str, list[
         met = count_meetings(match.cell for match in planned)
         keys = {match.key for match in planned}
         played = results_of(arena.name, arena.anchors, players, store).games
-        games = distinct_games(game for game in played if game.match in keys)
-        ratings = {name: rating.value for name, rating in rate_games(games, arena.anchors).items()}
+        ratings = rate_by_group((game for game in played if game.match in keys), arena.anchors)
         matches = plan_round(arena, number, met=met, ratings=ratings, game=game)
         planned += matches
         yield f"{arena.name}, round {number}", matches

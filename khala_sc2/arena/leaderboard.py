@@ -1,4 +1,4 @@
-"""A leaderboard for people: its table in a terminal, and the words that the table and the site share."""
+"""A leaderboard for people: its tables in a terminal, and the words that they share with the site and the docs."""
 
 from __future__ import annotations
 
@@ -6,40 +6,68 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from khala_sc2.arena.spec import OVERALL
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from khala_sc2.arena.ratings import Leaderboard, LeaderboardLine, Rating
+    from khala_sc2.arena.ratings import Leaderboard, Rating
 
 
-def table_of(board: Leaderboard) -> Table:
-    """Return the table for a terminal; columns of money and tokens are there if a model has played."""
+def basis_of(board: Leaderboard, column: str) -> str:
+    """Return what the ratings of a column are of: its tasks, or the groups whose mean they are."""
+    return f"The mean of {', '.join(board.groups)}" if column == OVERALL else f"Tasks: {', '.join(board.tasks[column])}"
+
+
+def table_of(board: Leaderboard, column: str) -> Table:
+    """Return the table of a column for a terminal; that of the means has the ratings of the groups, too."""
     table = Table(box=None, pad_edge=False)
-    costs = ("USD a game", "tokens a game") if has_costs(board) else ()
-    for column in ("player", *board.columns, "games", *costs, "clock"):
-        table.add_column(column, no_wrap=column in ("player", "clock"))
-    for line in board.standings:
-        ratings = [_rating_words(line.ratings.get(column)) for column in board.columns]
+    table.add_column("player", no_wrap=True)
+    for name in (*columns_of(board, column), *detail_names(board, column)):
+        table.add_column(name, min_width=max(map(len, name.split())))
+    for line in board.standings(column):
         name = f"{line.player}\nanchor" if line.is_anchor else line.player
-        table.add_row(name, *ratings, str(line.games), *(costs_of(line) if costs else ()), ", ".join(line.clocks))
+        words = [_rating_words(line.ratings[shown]) for shown in columns_of(board, column)]
+        table.add_row(name, *words, *details_of(board, column, line.ratings[column]))
     return table
 
 
-def _rating_words(rating: Rating | None) -> str:
-    if rating is None:
-        return ""
-    bounds = "fixed" if rating.low == rating.high else f"{rating.low:.0f} to {rating.high:.0f}"
-    return f"{rating.value:.0f}\n{bounds}"
+def columns_of(board: Leaderboard, column: str) -> tuple[str, ...]:
+    """Return the columns of ratings that the table of a column has."""
+    return board.columns if column == OVERALL else (column,)
 
 
-def has_costs(board: Leaderboard) -> bool:
-    """Return whether a model has played, so that games have cost tokens or money."""
-    return any(line.tokens or line.cost_usd for line in board.standings)
+def _rating_words(rating: Rating) -> str:
+    return f"{rating.value:.0f}\n{interval_of(rating)}"
 
 
-def costs_of(line: LeaderboardLine) -> tuple[str, str]:
-    """Return the money and the tokens of a player's game."""
-    return "" if line.cost_usd is None else f"{line.cost_usd:.4f}", f"{line.tokens:.0f}" if line.tokens else ""
+def interval_of(rating: Rating) -> str:
+    """Return the interval of a rating in words."""
+    return "fixed" if rating.is_fixed else f"{rating.low:.0f} to {rating.high:.0f}"
+
+
+def detail_names(board: Leaderboard, column: str) -> tuple[str, ...]:
+    """Return the columns of `details_of`."""
+    endings = () if column == OVERALL else ("won", "drawn", "lost")
+    costs = ("USD a game", "tokens a game") if _has_costs(board) else ()
+    return (*endings, *costs, "clock", "variant")
+
+
+def details_of(board: Leaderboard, column: str, rating: Rating) -> tuple[str, ...]:
+    """Return how the games of a rating ended, what one cost on average, and how they were played.
+
+    Money and tokens are there if a model has played; counts of wins only within a group, as a sum over groups would say
+    which of them was played most.
+    """
+    endings = () if column == OVERALL else (str(rating.won), str(rating.drawn), str(rating.lost))
+    money = "" if rating.cost_usd is None else f"{rating.cost_usd:.4f}"
+    costs = (money, f"{rating.tokens:.0f}" if rating.tokens else "") if _has_costs(board) else ()
+    return (*endings, *costs, ", ".join(rating.clocks), ", ".join(rating.variants))
+
+
+def _has_costs(board: Leaderboard) -> bool:
+    ratings = (rating for line in board.players for rating in line.ratings.values())
+    return any(rating.tokens or rating.cost_usd for rating in ratings)
 
 
 def remarks_of(board: Leaderboard, remarks: Sequence[str]) -> list[str]:
@@ -47,7 +75,13 @@ def remarks_of(board: Leaderboard, remarks: Sequence[str]) -> list[str]:
     lines = [
         "A player that is 400 points better wins ten games for each that it loses.",
         "The intervals of 95 % are about other seeds of the same tasks, not about other tasks.",
+        "An interval is about the difference to the anchors. To compare two other players, make one an anchor.",
     ]
-    if board.repeats:
-        lines.append(f"{board.repeats} games end like another seed of theirs in every measure, and are not counted.")
-    return lines + list(remarks)
+    if OVERALL in board.columns:
+        lines.append(
+            f"{OVERALL} is the mean of {', '.join(board.groups)}, each with the same weight; a player without a rating "
+            "in one of them has none."
+        )
+    elif len(board.groups) > 1:
+        lines.append(f"There is no {OVERALL} rating: no two players have one in each of {', '.join(board.groups)}.")
+    return [*lines, *board.remarks, *remarks]

@@ -83,7 +83,7 @@ def plan_round(
     number: int,
     *,
     met: Mapping[str, Mapping[frozenset[str], int]],
-    ratings: Mapping[str, float],
+    ratings: Mapping[str, Mapping[str, float]],
     game: str,
 ) -> list[PlannedMatch]:
     """Return the matches of a round.
@@ -92,7 +92,7 @@ def plan_round(
         arena: whose round it is.
         number: from 1; the seed of its matches.
         met: by task, how often two players have met in earlier rounds.
-        ratings: after earlier rounds, as far as they are known.
+        ratings: by group, after earlier rounds, as far as they are known.
         game: as the nodes find it.
 
     Raises:
@@ -101,7 +101,7 @@ def plan_round(
     return [
         match
         for task in tasks_of(arena)
-        for pair in _pairs_of_round(arena, task, met.get(task.name, {}), ratings)
+        for pair in _pairs_of_round(arena, task, met.get(task.name, {}), ratings.get(task.group, {}))
         for way in task.ways(pair)
         for match in plan_cell(arena.name, _cell(task, way), _settings(arena, task, way), [number], game=game)
     ]

@@ -16,7 +16,7 @@ from pydantic import Field, JsonValue, ValidationError
 
 from khala_protocol.errors import ConfigError
 from khala_protocol.files import MB, read_limited, write_private
-from khala_protocol.messages import Frozen
+from khala_protocol.messages import Frozen, Variant
 from khala_sc2.experiment.plan import FACTOR
 
 if TYPE_CHECKING:
@@ -61,11 +61,13 @@ class ArenaGame(Frozen):
     """The hash of what was played, as in experiments."""
     group: Short
     task: Short
+    variant: Variant = "files"
+    """Of the task: as its published files play it, or as its paper says."""
     seed: int
     first: GameSeat
     second: GameSeat
     outcome: Literal["win", "draw", "loss"]
-    """Of the first player."""
+    """Of the first player; a game that was cut at its limit of steps is a draw."""
     cause: Short
     clock: Short
     """Rule of the clock."""
@@ -143,9 +145,10 @@ def _game(key: str, sides: Sequence[Mapping[str, Any]], card: str, recording: st
     row = sides[0]
     other = sides[1] if len(sides) > 1 else None
     return ArenaGame(
-        match=key, group=row[f"{FACTOR}group"], task=row[f"{FACTOR}task"], seed=row["seed"],
+        match=key, group=row[f"{FACTOR}group"], task=row[f"{FACTOR}task"], variant=row["variant"], seed=row["seed"],
         first=_seat(row[f"{FACTOR}first"], row), second=_seat(row[f"{FACTOR}second"], other),
-        outcome=row["outcome"], cause=row["cause"], clock=row["clock"], steps=row["steps"], game_s=row["game_s"],
+        outcome="draw" if row["outcome"] == "cut" else row["outcome"], cause=row["cause"],
+        clock=row["clock"], steps=row["steps"], game_s=row["game_s"],
         killed=row["killed_value"] or 0.0, lost=row["lost_value"] or 0.0, card=card, recording=recording,
     )  # fmt: skip
 
@@ -189,8 +192,8 @@ def pool_results(paths: Sequence[Path]) -> PlayerPool:
         ConfigError: a file cannot be read, or two files mean different players or anchors by the same name.
     """
     pool = PlayerPool()
-    clocks: set[str] = set()
     codes: set[str] = set()
+    tasks: dict[str, set[str]] = {}
     for path in paths:
         results = read_results(path)
         directory = path if path.is_dir() else path.parent
@@ -201,15 +204,25 @@ def pool_results(paths: Sequence[Path]) -> PlayerPool:
             if game.match not in pool.places:
                 pool.places[game.match] = directory / game.recording
                 pool.games.append(game)
-                clocks.add(game.clock)
                 codes.add(str(results.cards.get(game.card, {}).get("code", "")))
+        for group, found in _tasks_by_group(results).items():
+            if tasks.setdefault(group, found) != found:
+                pool.remarks.append(
+                    f"{results.arena} has other tasks in {group} than a file before: players of one file who have not "
+                    "met those of the other are compared over unlike tasks there."
+                )
         if results.left_out:
             pool.remarks.append(f"{results.left_out} matches of {results.arena} crashed or are not valid: not counted.")
     if len(codes) > 1:
         pool.remarks.append(f"The games were played by {len(codes)} states of Khala's code: levels may differ.")
-    if len(clocks) > 1:
-        pool.remarks.append(f"The games have several clocks ({', '.join(sorted(clocks))}): see the column clock.")
     return pool
+
+
+def _tasks_by_group(results: ArenaResults) -> dict[str, set[str]]:
+    tasks: dict[str, set[str]] = defaultdict(set)
+    for game in results.games:
+        tasks[game.group].add(game.task)
+    return tasks
 
 
 def _add_players(pool: PlayerPool, results: ArenaResults, source: str) -> None:

@@ -1,7 +1,7 @@
-"""A static site of ratings: the leaderboard, for each of its cells the matches, and for each match its page.
+"""A static site of ratings: the leaderboard, for each of its ratings the matches, and for each match its page.
 
-    index.html                     the leaderboard
-    games/PLAYER.GROUP.html        the games of a cell
+    index.html                     a table of ratings for each group, and one of their means
+    games/PLAYER.GROUP.html        the games of a rating
     matches/KEY.html               a match, as `khala view --export` writes it
 
 Pages load nothing, run no script of their own, and need no server. Names may come from anyone's file.
@@ -19,7 +19,14 @@ from khala_orchestrator.past.transcript import StepSelection
 from khala_protocol.errors import KhalaError
 from khala_protocol.files import make_private, write_private
 from khala_protocol.visible import visible_line
-from khala_sc2.arena.leaderboard import costs_of, has_costs, remarks_of
+from khala_sc2.arena.leaderboard import (
+    basis_of,
+    columns_of,
+    detail_names,
+    details_of,
+    interval_of,
+    remarks_of,
+)
 from khala_sc2.arena.ratings import games_of, outcome_for, seat_of
 from khala_sc2.experiment.report.html import STYLE
 from khala_sc2.view.export import export
@@ -41,6 +48,7 @@ OURS = """
 body { max-width: 84rem; }
 a { color: inherit; text-decoration-color: var(--faint); text-underline-offset: .2em; }
 td small { color: var(--faint); }
+th:first-child, td:first-child { position: sticky; left: 0; background: var(--back); }
 td svg { display: block; }
 .whisker { stroke: var(--ink); stroke-width: 1.5; }
 .dot { fill: var(--ink); }
@@ -60,11 +68,11 @@ def make_site(pool: PlayerPool, board: Leaderboard, into: Path) -> int:
     shown = {game.match for game in pool.games if _write_match(pool, game, into)}
     title = ", ".join(dict.fromkeys(pool.arenas))
     write_private(into / INDEX, _page(f"Ratings: {title}", _leaderboard(pool, board)))
-    for line in board.standings:
-        for group in board.columns:
-            games = games_of(pool.games, line.player, group)
+    for line in board.players:
+        for column in line.ratings:
+            games = games_of(pool.games, line.player, column)
             content = _games(pool, line, games, shown)
-            write_private(into / _place(line.player, group), _page(f"{line.player}, {group}", content))
+            write_private(into / _place(line.player, column), _page(f"{line.player}, {column}", content))
     return len(shown)
 
 
@@ -96,45 +104,43 @@ def _place(player: str, group: str) -> str:
 
 
 def _leaderboard(pool: PlayerPool, board: Leaderboard) -> Iterator[str]:
-    yield f"<p>{len(pool.games)} games of {len(board.standings)} players. Each rating is a link to its games.</p>"
-    ratings = [rating for line in board.standings for rating in line.ratings.values()]
+    yield f"<p>{len(pool.games)} games of {len(board.players)} players. Each rating is a link to its games.</p>"
+    for column in board.columns:
+        yield f"<section>\n<h2>{_safe(column)}</h2>\n<p>{_safe(basis_of(board, column))}.</p>"
+        yield from _table(board, column)
+        yield "</section>"
+    yield "<section>\n<h2>What these numbers say</h2>\n<ul>"
+    yield from (f"<li>{_safe(remark)}</li>" for remark in remarks_of(board, pool.remarks))
+    yield "</ul>\n</section>"
+
+
+def _table(board: Leaderboard, column: str) -> Iterator[str]:
+    columns = columns_of(board, column)
+    standings = board.standings(column)
+    ratings = [line.ratings[shown] for line in standings for shown in columns]
     low = min((rating.low for rating in ratings), default=0.0)
     high = max((rating.high for rating in ratings), default=1.0)
-    costs = ("USD a game", "tokens a game") if has_costs(board) else ()
-    names = ["", "player", *board.columns, "won", "drawn", "lost", *costs, "clock"]
-    yield '<div class="scroll"><table><thead><tr>'
-    yield "".join(f"<th>{_safe(name)}</th>" for name in names)
+    yield '<div class="scroll"><table><thead><tr><th>player</th>'
+    yield from (f"<th>{_safe(name)}</th>" for name in columns)
+    yield from (f"<th>{name}</th>" for name in detail_names(board, column))
     yield "</tr></thead><tbody>"
-    for number, line in enumerate(board.standings, start=1):
-        yield f"<tr>{''.join(_cells(number, line, board, low, high))}</tr>"
+    for line in standings:
+        about = [line.about] if line.about != line.player else []
+        small = " · ".join([*about, *(["anchor"] if line.is_anchor else [])])
+        yield f"<tr><td>{_safe(line.player)}<br><small>{_safe(small)}</small></td>"
+        yield from (f"<td>{_rating(line.player, shown, line.ratings[shown], low, high)}</td>" for shown in columns)
+        yield from (f"<td>{_safe(words)}</td>" for words in details_of(board, column, line.ratings[column]))
+        yield "</tr>"
     yield "</tbody></table></div>"
-    yield from (f'<p class="note">{_safe(remark)}</p>' for remark in remarks_of(board, pool.remarks))
 
 
-def _cells(number: int, line: LeaderboardLine, board: Leaderboard, low: float, high: float) -> Iterator[str]:
-    yield f'<td class="number">{number}</td>'
-    anchor = " · anchor" if line.is_anchor else ""
-    yield f"<td>{_safe(line.player)}<br><small>{_safe(line.kind)}: {_safe(line.about)}{anchor}</small></td>"
-    for column in board.columns:
-        yield f"<td>{_rating(line.player, column, line.ratings.get(column), low, high)}</td>"
-    overall = line.ratings.get("overall")
-    counts = (overall.won, overall.drawn, overall.lost) if overall else ("", "", "")
-    yield from (f'<td class="number">{count}</td>' for count in counts)
-    if has_costs(board):
-        yield from (f'<td class="number">{_safe(cost)}</td>' for cost in costs_of(line))
-    yield f"<td>{_safe(', '.join(line.clocks))}</td>"
-
-
-def _rating(player: str, column: str, rating: Rating | None, low: float, high: float) -> str:
-    if rating is None:
-        return ""
-    bounds = "fixed" if rating.low == rating.high else f"{rating.low:.0f} to {rating.high:.0f}"
-    words = f"{rating.value:.0f} <small>{bounds}</small>"
+def _rating(player: str, column: str, rating: Rating, low: float, high: float) -> str:
+    words = f"{rating.value:.0f} <small>{interval_of(rating)}</small>"
     return f'<a href="{_place(player, column)}">{words}</a>{_whisker(rating, low, high)}'
 
 
 def _whisker(rating: Rating, low: float, high: float) -> str:
-    """Return a picture of a rating and its interval, on the scale of all of them."""
+    """Return a picture of a rating and its interval, on the scale of all ratings of its table."""
     span = max(high - low, 1.0)
     at, begin, end = (6 + (BAR_PX - 12) * (x - low) / span for x in (rating.value, rating.low, rating.high))
     return (
@@ -144,12 +150,13 @@ def _whisker(rating: Rating, low: float, high: float) -> str:
     )
 
 
-# --- the games of a cell -----------------------------------------------------------------------------
+# --- the games of a rating ---------------------------------------------------------------------------
 
 
 def _games(pool: PlayerPool, line: LeaderboardLine, games: Sequence[ArenaGame], shown: set[str]) -> Iterator[str]:
     yield f'<p><a href="../{INDEX}">All ratings</a>. {_safe(line.kind)}: {_safe(line.about)}.</p>'
-    names = ("outcome", "against", "task", "side", "seed", "ended by", "game time", "killed", "lost", "tokens", "match")
+    names = ("outcome", "against", "task", "side", "seed", "ended by", "game time", "killed", "lost", "tokens",
+             "clock", "variant", "match")  # fmt: skip
     yield '<div class="scroll"><table><thead><tr>'
     yield "".join(f"<th>{name}</th>" for name in names)
     yield "</tr></thead><tbody>"
@@ -172,7 +179,7 @@ def _game(pool: PlayerPool, player: str, game: ArenaGame, *, has_page: bool) -> 
         f'<td class="number">{game.seed}</td><td>{_safe(game.cause)}</td>'
         f'<td class="number">{game.game_s:.0f} s</td><td class="number">{killed:.0f}</td>'
         f'<td class="number">{lost:.0f}</td><td class="number">{seat.tokens if seat else 0}</td>'
-        f"<td>{match}</td>"
+        f"<td>{_safe(game.clock)}</td><td>{game.variant}</td><td>{match}</td>"
     )
 
 

@@ -30,7 +30,7 @@ from khala_protocol.messages import Frozen
 from khala_sc2.experiment.spec import ExperimentBudget, Settings
 
 OVERALL = "overall"
-"""Name of the column of all games."""
+"""Name of the column of the means over all groups."""
 
 
 def _check_name(value: str) -> str:
@@ -74,7 +74,7 @@ class Arena(Frozen):
     """Tasks by group: by name, or as a path. Each group gets ratings of its own."""
     anchors: dict[str, float] = Field(min_length=1)
     """Ratings of players that fix the scale: the mean of theirs is the mean of these, in every group. Two arenas with
-    the same anchors have the same scale."""
+    the same anchors have the same scale in groups of the same tasks. Take players who win and lose in every group."""
     fixed: Settings = Settings()
     """Settings of all matches, as in an experiment: `clock`, `rhythm`, `max_steps`, …"""
     pairing: Literal["round-robin", "swiss"] = "round-robin"
@@ -96,7 +96,7 @@ class Arena(Frozen):
         if strange := next((name for name in self.anchors if name not in names), None):
             raise ValueError(f"the anchor {strange} is no player; the players are {', '.join(names)}")
         if OVERALL in self.groups:
-            raise ValueError(f"the group {OVERALL} is that of all games: choose another name")
+            raise ValueError(f"the group {OVERALL} is the mean of all groups: choose another name")
         tasks = [task for group in self.groups.values() for task in group]
         if twice := next((task for task in tasks if tasks.count(task) > 1), None):
             raise ValueError(f"the task {twice} is there twice")

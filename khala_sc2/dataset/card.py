@@ -49,8 +49,8 @@ class Contents:
     rebuilt: int = 0
     """Rows whose prompt no model got."""
     unrewarded: int = 0
-    tasks: Counter[tuple[str, str]] = field(default_factory=Counter)
-    """Rows by task and map."""
+    tasks: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    """Rows by task, variant and map."""
     models: Counter[str] = field(default_factory=Counter)
     versions: set[str] = field(default_factory=set)
     seeds: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
@@ -69,7 +69,7 @@ class Contents:
         self.pictures += len(row.pictures)
         self.rebuilt += not row.prompt_recorded
         self.unrewarded += row.reward.reward is None
-        self.tasks[row.task, row.map_name] += 1
+        self.tasks[row.task, row.variant, row.map_name] += 1
         self.models[row.model] += 1
         self.versions.add(f"{row.game}, Khala {row.versions.get('khala', 'unknown')}")
         self.seeds[split].add(row.seed)
@@ -154,8 +154,8 @@ def _body(contents: Contents, recipe: Recipe, form: RowForm) -> Iterator[str]:
     )
     yield "## Contents\n"
     yield from _table(("split", "rows", "seeds"), _splits(contents, recipe))
-    tasks = [(name, place, count) for (name, place), count in contents.tasks.most_common()]
-    yield from _table(("task", "map", "rows"), tasks)
+    tasks = [(*played, count) for played, count in contents.tasks.most_common()]
+    yield from _table(("task", "variant", "map", "rows"), tasks)
     models = [(name or "none: a scripted player or a policy", count) for name, count in contents.models.most_common()]
     if not is_dynamics:
         yield from _table(("model", "rows"), models)
@@ -263,8 +263,8 @@ COLUMNS: Mapping[RowForm, str] = {
   `< image>` is in a text that had the same word. `weight` is 1 for the reply, and 0 for replies within the prompt: that
   of the worked example, and those of earlier steps.
 * `images`: the files of the pictures, in their order.
-* `task`, `seed`, `outcome` of the episode; `model` as its endpoint calls it, empty for a player without a model;
-  `status` is `fallback` where another policy decided for the model.
+* `task`, `variant` (what its published `files` or its `paper` says), `seed`, `outcome` of the episode; `model` as its
+  endpoint calls it, empty for a player without a model; `status` is `fallback` where another policy decided for it.
 """,
     RowForm.TRL: """\
 * `id`: run, side, agent, episode and step of the decision.
@@ -272,7 +272,8 @@ COLUMNS: Mapping[RowForm, str] = {
   them. With pictures, a `content` is a list of parts, and a part of type `image` stands for the next of `images`.
 """,
     RowForm.PARQUET: """\
-* `id`, `run`, `task`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which decision it is.
+* `id`, `run`, `task`, `variant`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which decision
+  it is. `variant` is `files` or `paper`: the task as its published files play it, or as its paper says.
 * `prompt`: the messages, with `role` and `content`; `images` were sent with the last one, each after its title of
   `image_titles`. `prompt_recorded` is false where no model got it.
 * `reply`: the words of the agent; `model` as its endpoint calls it; `status` is `fallback` where another policy
@@ -290,7 +291,8 @@ COLUMNS: Mapping[RowForm, str] = {
 }
 
 DYNAMICS_COLUMNS = """\
-* `id`, `run`, `task`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which observation it is.
+* `id`, `run`, `task`, `variant`, `map`, `game`, `seed`, `side`, `agent`, `episode`, `step`, `game_loop`: which
+  observation it is. `variant` is `files` or `paper`: the task as its published files play it, or as its paper says.
 * `prompt`: the request to a world model, with `role` and `content`: clock, observation, orders, time of the next one.
 * `observation`, `next_observation`: what the agent was shown, in the fog of war, at `game_loop` and at
   `next_game_loop` (22.4 loops are a second) or `next_step`. `view` and `next_view`: the same as data, in JSON.

@@ -214,7 +214,7 @@ class DynamicsParquet(Parquet):
         }
 
 
-_PLACE = ("id", "run", "task", "map", "game", "seed", "side", "agent", "episode", "step", "game_loop")
+_PLACE = ("id", "run", "task", "variant", "map", "game", "seed", "side", "agent", "episode", "step", "game_loop")
 _OF_EPISODE = ("reward", "outcome", "valid")
 _WRITERS: dict[RowForm, Callable[[Path, bool], Writer]] = {
     RowForm.PARQUET: Parquet,
@@ -253,7 +253,7 @@ def _columns(pa: Any) -> dict[str, Any]:
     whole = pa.int64()
     number = pa.float64()
     return {
-        "id": text, "run": text, "task": text, "map": text, "game": text, "seed": whole,
+        "id": text, "run": text, "task": text, "variant": text, "map": text, "game": text, "seed": whole,
         "side": text, "agent": text, "episode": whole, "step": whole, "game_loop": whole,
         "prompt": pa.list_(pa.struct({"role": text, "content": text})), "prompt_recorded": pa.bool_(),
         **_picture_column(pa), "image_titles": pa.list_(text),
@@ -271,8 +271,8 @@ def _columns(pa: Any) -> dict[str, Any]:
 
 def _plain(row: Row, *, images: bool) -> dict[str, Any]:
     same = (
-        "id", "run", "task", "game", "seed", "side", "agent", "episode", "step", "game_loop", "prompt_recorded",
-        "reply", "status", "model", "fate", "age_loops", "outcome", "valid",
+        "id", "run", "task", "variant", "game", "seed", "side", "agent", "episode", "step", "game_loop",
+        "prompt_recorded", "reply", "status", "model", "fate", "age_loops", "outcome", "valid",
     )  # fmt: skip
     return {name: getattr(row, name) for name in same} | {
         "map": row.map_name,

@@ -96,6 +96,7 @@ def sharegpt(row: Row, *, images: bool) -> dict[str, Any]:
         "id": row.id,
         "conversations": [*chat, {"from": "gpt", "value": _value_of(row.reply, images=images), "weight": 1}],
         "task": row.task,
+        "variant": row.variant,
         "seed": row.seed,
         "model": row.model,
         "status": row.status,

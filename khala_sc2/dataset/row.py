@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         Run,
         TokenTrace,
         Usage,
+        Variant,
         View,
     )
     from khala_sc2.dataset.rewards import Reward
@@ -74,6 +75,8 @@ class Row:
 
     run: str
     task: str
+    variant: Variant
+    """Of the task: what was played, as its published files or as its paper has it."""
     map_name: str
     game: str
     versions: Mapping[str, str]
@@ -126,6 +129,7 @@ class RowOrigin(TypedDict):
 
     run: str
     task: str
+    variant: Variant
     map_name: str
     game: str
     versions: Mapping[str, str]
@@ -144,6 +148,7 @@ def origin_of(run: Run, seen: Observation, result: Result | None) -> RowOrigin:
     return RowOrigin(
         run=run.run,
         task=run.task,
+        variant=run.variant,
         map_name=run.map_name,
         game=run.game,
         versions=run.versions,

@@ -57,6 +57,7 @@ FOREIGN = {
     "arenas/mine/results.json": "`khala arena run` writes it",
     "results.json": "`khala arena run` writes it",
     "first.json": "a maintainer keeps it, of `khala arena run first`",
+    "levels.json": "a maintainer keeps it, of `khala arena run levels`",
     "tokenizer.json": "the file of a tokenizer",
     "docs/gallery": "`python -m docs.gallery` writes it",
     "docs/gallery/NAME.html": "`python -m docs.gallery` writes it",

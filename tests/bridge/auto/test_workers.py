@@ -14,6 +14,7 @@ from khala_bridge.rules import Cost
 from khala_bridge.state.ground import land_of
 from khala_bridge.state.means import ledger_of
 from khala_bridge.task.config import AutoConfig
+from khala_orchestrator.config import all_tasks, change
 from khala_simulator.process.client import command
 
 if TYPE_CHECKING:
@@ -40,6 +41,15 @@ def idle(game: Game) -> list[int]:
 def target(game: Game, order: RuleOrder) -> str:
     assert isinstance(order.target, int)
     return unit_name(game.snapshot.units[order.target].unit_type)
+
+
+def test_shipped_full_games_train_workers_by_default_and_the_rhythm_of_the_paper_does_in_every_task() -> None:
+    tasks = list(all_tasks())
+    by_default = {task.name for task in tasks if task.auto.train_workers}
+    assert by_default == {task.name for task in tasks if task.name.startswith("simple64_")} != set()
+    assert all(task.auto.gather for task in tasks if task.name in by_default)
+    assert all(change(task, rhythm="paper").auto.train_workers for task in tasks)
+    assert AutoConfig() == AutoConfig(gather=False, train_workers=False, warpgates=False)
 
 
 def test_nothing_is_done_that_is_not_switched_on(make_game: Callable[..., Game]) -> None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 import yaml
 
 from khala_protocol.errors import ConfigError
 from khala_sc2.arena import commands
+from khala_sc2.arena.leaderboard import remarks_of
 from khala_sc2.arena.matches import plan_round, tasks_of
 from khala_sc2.arena.pairing import pair_swiss
-from khala_sc2.arena.ratings import distinct_games, rate
+from khala_sc2.arena.ratings import ELO, distinct_games, rate
 from khala_sc2.arena.results import RESULTS, ArenaGame, ArenaResults, PoolPlayer, pool_results, write_results
 from khala_sc2.arena.spec import Arena
 from khala_sc2.cli import main
@@ -22,6 +26,7 @@ from tests.khala.experiment.made import MadeEngine
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from khala_sc2.arena.ratings import Leaderboard
     from khala_sc2.playing.jobs import Job
 
 MODELS = [{"name": name, "model": name} for name in ("skilled", "focus-fire", "silent")]
@@ -60,7 +65,7 @@ def results(*games: ArenaGame, **fields: Any) -> ArenaResults:
         ({"anchors": {"nobody": 1}}, "the anchor nobody is no player; the players are skilled"),
         ({"players": [*MODELS, MODELS[0]]}, "there are two players skilled"),
         ({"players": [*MODELS, {"name": "x", "model": "m", "level": "easy"}]}, "x needs a model, a level or a guest"),
-        ({"groups": {"overall": ["duel_3m"]}}, "the group overall is that of all games"),
+        ({"groups": {"overall": ["duel_3m"]}}, "the group overall is the mean of all groups"),
         ({"groups": {"a": ["duel_3m"], "b": ["duel_3m"]}}, "the task duel_3m is there twice"),
         ({"fixed": {"model": "skilled"}}, "fixed has model, which players and groups say"),
     ],
@@ -157,7 +162,19 @@ def test_matches_that_are_not_valid_are_counted_apart(tmp_path: Path, engine: Ma
     assert ended.value.code == 3
     pool = pool_results([tmp_path / "a"])
     assert pool.remarks[0] == "6 matches of a crashed or are not valid: not counted."
-    assert "map-2s3z" not in {line.player for line in rate(pool).standings if line.ratings}
+    board = rate(pool)
+    assert "map-2s3z" not in {line.player for line in board.players if line.ratings}
+    assert board.remarks[-1] == "No valid games connect map-2s3z with an anchor: no rating."
+
+
+def test_a_game_that_was_cut_at_its_limit_of_steps_is_a_draw_and_games_name_the_variant(
+    tmp_path: Path, engine: MadeEngine
+) -> None:
+    engine.ends = lambda _job, _try: "cut"
+    games = play(tmp_path, groups={"battles": ["pvz_task3_level1"]}, rounds=1, fixed={"variant": "paper"})["games"]
+    assert {(found["outcome"], found["cause"], found["variant"]) for found in games} == {
+        ("draw", "step limit", "paper")
+    }
 
 
 # --- ratings -----------------------------------------------------------------------------------------
@@ -169,21 +186,122 @@ def test_games_of_deterministic_players_that_end_alike_with_each_seed_count_once
     assert distinct_games([*alike, *unlike]) == [alike[0], *unlike]
 
 
-def test_ratings_stand_by_group_and_overall_with_what_a_game_costs(tmp_path: Path) -> None:
-    paid = {"tokens": 300, "cost_usd": 0.5}
-    games = [game("a", "b", "loss", seed=seed, of_second=paid) for seed in range(6)]
-    games += [game("a", "c", "win", seed=seed, group="battles", task="2s3z") for seed in range(6)]
-    write_results(results(*games), tmp_path / RESULTS)
-    board = rate(pool_results([tmp_path]))
+BATTLES = {"group": "battles", "task": "2s3z"}
+
+
+def played(first: str, second: str, wins: int, losses: int, **fields: Any) -> list[ArenaGame]:
+    """Return games of two players, with a seed each."""
+    outcomes = ["win"] * wins + ["loss"] * losses
+    return [game(first, second, outcome, seed=seed, **fields) for seed, outcome in enumerate(outcomes)]
+
+
+def board_of(tmp_path: Path, *games: ArenaGame, **fields: Any) -> Leaderboard:
+    write_results(results(*games, **fields), tmp_path / RESULTS)
+    return rate(pool_results([tmp_path]))
+
+
+def test_a_rating_of_a_group_says_what_its_games_cost_and_how_they_were_played(tmp_path: Path) -> None:
+    games = [game("a", "b", "loss", seed=seed, of_second={"tokens": 300, "cost_usd": 0.5}) for seed in range(6)]
+    games += [game("a", "b", "win", seed=seed, variant="paper", clock="token", **BATTLES) for seed in range(6)]
+    board = board_of(tmp_path, *games)
+    assert [line.player for line in board.standings("duels")] == ["b", "a"]
+    assert [line.player for line in board.standings("battles")] == ["a", "b"]
+    anchor, other = board.players
+    assert (anchor.is_anchor, anchor.ratings["duels"].is_fixed, anchor.ratings["duels"].value) == (True, True, 1000.0)
+    duels, battles = (other.ratings[group] for group in ("duels", "battles"))
+    assert duels.value > 1000 > battles.value
+    assert (duels.won, duels.lost, duels.cost_usd, duels.tokens) == (6, 0, 0.5, 300)
+    assert (duels.clocks, duels.variants) == (("frozen",), ("files",))
+    assert (battles.clocks, battles.variants, battles.cost_usd) == (("token",), ("paper",), None)
+
+
+def test_overall_is_the_mean_over_groups_of_players_who_are_rated_in_all_of_them(tmp_path: Path) -> None:
+    duels = [*played("a", "b", 2, 6), *played("a", "c", 4, 4)]
+    battles = [*played("a", "b", 5, 2, **BATTLES), *played("a", "map-2s3z", 3, 3, **BATTLES)]
+    board = board_of(tmp_path, *duels, *battles)
     assert board.columns == ("overall", "duels", "battles")
-    best, anchor, worst = board.standings
-    assert [line.player for line in (best, anchor, worst)] == ["b", "a", "c"]
-    assert (anchor.is_anchor, anchor.ratings["overall"].low, anchor.ratings["overall"].high) == (True, 1000.0, 1000.0)
-    assert (best.cost_usd, best.tokens, best.clocks) == (0.5, 300, ("frozen",))
-    assert (worst.cost_usd, worst.tokens) == (None, 0)
-    assert best.ratings["duels"].value > 1000 > worst.ratings["battles"].value
-    assert "battles" not in best.ratings
-    assert (best.ratings["overall"].won, best.ratings["overall"].lost) == (6, 0)
+    assert [line.player for line in board.standings("overall")] == ["b", "a"]
+    overall, *groups = (
+        next(line for line in board.players if line.player == "b").ratings[name] for name in board.columns
+    )
+    assert overall.value == pytest.approx(sum(rating.value for rating in groups) / 2)
+    below, above = ([getattr(rating, bound) - rating.value for rating in groups] for bound in ("low", "high"))
+    assert overall.low == pytest.approx(overall.value - math.hypot(*below) / 2)
+    assert overall.high == pytest.approx(overall.value + math.hypot(*above) / 2)
+    assert (overall.won, overall.lost) == (6 + 2, 2 + 5)
+
+
+@pytest.mark.slow
+def test_nineteen_of_twenty_intervals_of_means_contain_the_true_mean(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    strengths = {"a": (0.0, 0.0, 0.0), "b": (0.5, 2.0, -1.0), "c": (1.0, 4.0, 0.0)}  # c wins nearly all of a group
+    held = []
+    for _ in range(100):
+        games = []
+        for number, (first, second) in itertools.product(range(3), itertools.combinations(strengths, 2)):
+            chance = 1 / (1 + math.exp(strengths[second][number] - strengths[first][number]))
+            wins = int(rng.binomial(8, chance))
+            games += played(first, second, wins, 8 - wins, group=str(number), task=str(number))
+        for line in board_of(tmp_path, *games).standings("overall"):
+            truth = 1000 + ELO * sum(strengths[line.player]) / 3
+            held += [] if line.is_anchor else [line.ratings["overall"].low <= truth <= line.ratings["overall"].high]
+    assert 0.92 <= sum(held) / len(held) <= 0.99
+
+
+def test_a_player_who_beats_a_level_is_not_rated_below_it_because_it_lost_elsewhere(tmp_path: Path) -> None:
+    """With one strength over all games, the level was rated above the player who had won all games against it."""
+    duels = [*played("a", "strong", 8, 0), *played("a", "weak", 0, 0)]
+    full = {"group": "full games", "task": "simple64_eceb"}
+    games = [*played("strong", "level", 3, 0, **full), *played("a", "level", 0, 3, **full)]
+    board = board_of(tmp_path, *duels, *games)
+    assert [line.player for line in board.standings("full games")] == ["strong", "level", "a"]
+    assert [line.player for line in board.standings("overall")] == ["strong", "a"]
+
+
+@pytest.mark.parametrize(
+    ("games", "columns", "remark"),
+    [
+        (played("a", "b", 3, 2), ("duels",), None),
+        ([*played("a", "b", 3, 2), *played("a", "c", 3, 2, **BATTLES)], ("duels", "battles"), "There is no overall"),
+        ([*played("a", "b", 3, 2), *played("x", "y", 3, 2, **BATTLES)], ("duels", "battles"), "No anchor has played"),
+    ],
+)
+def test_there_is_no_overall_rating_where_it_compares_nobody(
+    games: list[ArenaGame], columns: tuple[str, ...], remark: str | None, tmp_path: Path
+) -> None:
+    board = board_of(tmp_path, *games)
+    assert board.columns == columns
+    remarks = remarks_of(board, ())
+    assert any(remark in line for line in remarks) if remark else not any("overall" in line for line in remarks)
+
+
+@pytest.mark.parametrize(("field", "value"), [("clock", "token"), ("variant", "paper")])
+def test_games_of_several_clocks_or_variants_in_a_group_are_remarked_on_and_are_no_repeats(
+    field: str, value: str, tmp_path: Path
+) -> None:
+    alike = {"killed": 1.0, "steps": 9}
+    games = [game("a", "b", "win", seed=1, **alike), game("a", "b", "win", seed=2, **alike, **{field: value})]
+    assert distinct_games(games) == games
+    (remark,) = board_of(tmp_path, *games).remarks
+    assert f"The games of duels have several {field}s, " in remark
+
+
+def test_a_group_whose_tasks_differ_more_than_one_rating_can_say_is_remarked_on(tmp_path: Path) -> None:
+    """a wins everything on one task, and b on the other: as strong as each other, says the rating of the group."""
+    games = [*played("a", "b", 9, 0), *played("a", "b", 0, 9, task="duel_8m")]
+    (remark,) = board_of(tmp_path, *games).remarks
+    assert (
+        "The tasks of duels differ more than one rating for all of them can say: on duel_3m, a has 9 points" in remark
+    )
+    even = [*played("a", "b", 5, 4), *played("a", "b", 4, 5, task="duel_8m")]
+    assert board_of(tmp_path, *even).remarks == ()
+
+
+def test_groups_of_other_tasks_under_the_same_name_are_remarked_on(tmp_path: Path) -> None:
+    write_results(results(*played("a", "b", 3, 2)), tmp_path / "x.json")
+    write_results(results(*played("a", "c", 3, 2, task="duel_8m"), arena="other"), tmp_path / "y.json")
+    (remark,) = pool_results([tmp_path / "x.json", tmp_path / "y.json"]).remarks
+    assert remark.startswith("other has other tasks in duels than a file before")
 
 
 def test_the_anchors_of_two_arenas_make_their_ratings_comparable(tmp_path: Path) -> None:
@@ -191,10 +309,9 @@ def test_the_anchors_of_two_arenas_make_their_ratings_comparable(tmp_path: Path)
         (tmp_path / name).mkdir()
         games = [game("a", rival, "loss" if seed % 3 else "win", seed=seed) for seed in range(9)]
         write_results(results(*games, arena=name), tmp_path / name / RESULTS)
-    alone = [rate(pool_results([tmp_path / name])).standings[0].ratings["overall"] for name in ("one", "two")]
+    alone = [rate(pool_results([tmp_path / name])).standings("duels")[0].ratings["duels"] for name in ("one", "two")]
     both = {
-        line.player: line.ratings["overall"]
-        for line in rate(pool_results([tmp_path / "one", tmp_path / "two"])).standings
+        line.player: line.ratings["duels"] for line in rate(pool_results([tmp_path / "one", tmp_path / "two"])).players
     }
     assert alone[0].value == pytest.approx(alone[1].value)
     assert both["b"].value == pytest.approx(alone[0].value, abs=1)
@@ -234,7 +351,7 @@ def test_a_file_of_anyone_names_no_path_outside_of_its_directory(tmp_path: Path)
 # --- the site ----------------------------------------------------------------------------------------
 
 
-def test_every_cell_of_the_site_lists_its_games_and_names_cannot_break_out(tmp_path: Path) -> None:
+def test_every_rating_of_the_site_lists_its_games_and_names_cannot_break_out(tmp_path: Path) -> None:
     evil = "<script>alert(1)</script>"
     write_results(results(game("a", evil, "win"), game(evil, "a", "draw")), tmp_path / RESULTS)
     with pytest.raises(SystemExit) as ended:
@@ -243,7 +360,7 @@ def test_every_cell_of_the_site_lists_its_games_and_names_cannot_break_out(tmp_p
     index = (tmp_path / "site" / "index.html").read_text()
     assert "<script" not in index and "&lt;script&gt;alert(1)" in index
     links = {link.partition('"')[0] for link in index.split('href="')[1:]}
-    assert len(links) == 2 * 2
+    assert len(links) == 2
     for link in links:
         cell = (tmp_path / "site" / link).read_text()
         assert cell.count("<tr>") == 1 + 2 and "<script" not in cell

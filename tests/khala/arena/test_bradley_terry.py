@@ -83,6 +83,15 @@ def test_a_player_who_has_won_every_game_has_a_finite_strength_and_an_interval_t
     assert np.isfinite(found.high)
 
 
+def test_players_of_a_single_game_have_the_strength_of_one_win_and_a_half_and_half_a_loss() -> None:
+    """With steps that were too long the search went in circles here, and then the interval had no end."""
+    lost = [RatedGame("a", name, 1.0) for name in "bcdefghi"] + [RatedGame("z", name, 0.0) for name in "bc"]
+    found = fit_strengths(lost, ["a"])
+    for name in "defghi":
+        assert found[name].value == pytest.approx(-np.log(3), abs=1e-5)
+        assert found[name].low < found[name].value < found[name].high < 2.0
+
+
 def test_several_anchors_share_the_zero_and_each_has_an_interval() -> None:
     games = simulate([0.0, 1.0, 2.0], 20, np.random.default_rng(2))
     alone = fit_strengths(games, ["0"])

@@ -164,7 +164,7 @@ def test_a_hostile_name_changes_nothing_of_the_card(hostile: Recording, tmp_path
     _, front, words = (tmp_path / "out" / "parquet" / "README.md").read_text().split("---\n", 2)
     assert yaml.safe_load(front)["configs"][0]["config_name"] == "default"
     (line,) = [line for line in words.splitlines() if "quoted" in line]
-    assert line.count("|") == 4
+    assert line.count("|") == 5
     assert "<" not in line
     assert "\x1b" not in line
 
@@ -187,13 +187,30 @@ def test_the_card_says_what_is_in_it(data_set: Path, recording: Recording) -> No
     rows = rows_of(recording)
     for said in (
         f"| train | {len(rows)} | 3 |",
-        f"| 2s3z_pair | 2s3z | {len(rows)} |",
+        f"| 2s3z_pair | files | 2s3z | {len(rows)} |",
         f"| focus-fire | {sum(row.model == 'focus-fire' for row in rows)} |",
         "Khala simulator 0.1.0",
         "0.99 · `reward_to_go`",
         "The terms of commercial models may forbid to train",
     ):
         assert said in words
+
+
+def test_rows_and_the_card_name_the_variant_of_the_task(rewritten: Rewrite, tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+
+    def change(sample: Any) -> list[Any]:
+        return [sample.message.but(variant="paper")] if isinstance(sample.message, Run) else [sample.message]
+
+    papers = rewritten(change)
+    export([papers.path], tmp_path / "decisions", Recipe((RowForm.PARQUET, RowForm.SHAREGPT)))
+    export([papers.path], tmp_path / "dynamics", Recipe((RowForm.PARQUET,), horizon_s=1.0))
+    found = [chat["variant"] for chat in lines(tmp_path / "decisions" / "sharegpt" / "train.jsonl")]
+    for name in ("decisions", "dynamics"):
+        found += pq.read_table(tmp_path / name / "parquet" / "train.parquet")["variant"].to_pylist()
+    assert set(found) == {"paper"}
+    words = (tmp_path / "decisions" / "sharegpt" / "README.md").read_text()
+    assert f"| 2s3z_pair | paper | 2s3z | {len(rows_of(papers))} |" in words
 
 
 def test_each_filter_leaves_what_it_names(recording: Recording, tmp_path: Path) -> None:

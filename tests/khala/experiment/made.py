@@ -12,6 +12,7 @@ from khala_orchestrator.match.cards import run_card
 from khala_protocol.codec import encode
 from khala_protocol.keys import Topic, agent_key, run_key
 from khala_protocol.messages import AgentReport, Casualties, ModelCall, Report, Result, Usage
+from khala_protocol.messages.to_all import STEP_LIMIT
 from khala_protocol.recording import Recorder
 from khala_sc2.playing.jobs import Ended
 
@@ -27,7 +28,7 @@ GAME = GameIdentity("4.10", "B0", "Map.SC2Map", "0" * 64)
 
 
 def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bool = True, won: bool = True,
-           spent_out: bool = False, valid: bool = True, refused: bool = False) -> None:  # fmt: skip
+           spent_out: bool = False, valid: bool = True, refused: bool = False, cut: bool = False) -> None:  # fmt: skip
     """Write the recording of a match of one step; without a result, as a runner that was killed leaves it."""
     run, agent = config.run, config.task.agents[0].name
     usage = Usage(requests=1, prompt_tokens=900, completion_tokens=100, cost_usd=cost_usd)
@@ -40,10 +41,10 @@ def record(path: Path, config: MatchConfig, *, cost_usd: float = 0.0, result: bo
     report = Report(run=run, episode=0, step=0, game_loop=8, agents=(done,))
     value = Casualties(units=1, value=100.0)
     why = "the endpoint of blue/A will not answer it: there is no model 'x'" if refused else "A never decided"
-    cause = "model refused" if refused else "enemy defeated"
+    cause = STEP_LIMIT if cut else "model refused" if refused else "enemy defeated"
     ended = Result(
-        run=run, episode=0, outcome="win" if won else "loss", cause=cause, steps=1, game_loop=8, game_s=0.4,
-        wall_s=2.0, killed=value, lost=value, kd=1.0, valid=valid, invalid_because="" if valid else why,
+        run=run, episode=0, outcome="cut" if cut else "win" if won else "loss", cause=cause, steps=1, game_loop=8,
+        game_s=0.4, wall_s=2.0, killed=value, lost=value, kd=1.0, valid=valid, invalid_because="" if valid else why,
     )  # fmt: skip
     with Recorder(path) as recorder:
         recorder.write(run_key(run, Topic.RUN), encode(run_card(config, GAME)))
@@ -59,7 +60,8 @@ class MadeEngine:
 
     slots: int = 2
     ends: Callable[[Job, int], str] = lambda _job, _try: "done"
-    """From a job and the number of its try: `done`, `lost`, `invalid`, `spent`, or `nothing` for no recording."""
+    """From a job and the number of its try: `done`, `lost`, `invalid`, `refused`, `spent`, `cut`, or `nothing`, which
+    leaves no recording."""
     cost_usd: Callable[[Job], float] = lambda _: 0.0
     jobs: list[Job] = field(default_factory=list)
     most_at_once: int = 0
@@ -90,5 +92,5 @@ class MadeEngine:
         spent_out = how == "spent" or (left_usd is not None and cost < self.cost_usd(job))
         record(job.config.record, job.config, cost_usd=cost, result=how != "lost", spent_out=spent_out,
                won=job.config.seed % 2 == 0, valid=how not in {"invalid", "refused"},
-               refused=how == "refused")  # fmt: skip
+               refused=how == "refused", cut=how == "cut")  # fmt: skip
         return Ended(state="lost", words="killed") if how == "lost" else Ended(state="done")
