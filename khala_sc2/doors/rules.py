@@ -87,6 +87,8 @@ class Door:
     Attributes:
         command: that serves, such as `khala view`; refusals name it.
         is_near: whether it is for this machine alone.
+        is_published: whether it is in a container whose port is published to this machine: its peers have the address
+            of the container's gateway then.
         token: opens the door; "" if anybody may ask who passes the other rules.
         password: opens it as well; people choose it, so wrong tries are held up. "" for none.
         is_secure: whether the server speaks TLS.
@@ -98,6 +100,7 @@ class Door:
 
     command: str
     is_near: bool = True
+    is_published: bool = False
     token: str = ""
     password: str = ""
     is_secure: bool = False
@@ -122,7 +125,7 @@ class Door:
             return Refusal(400, "the request names two hosts: send one Host header")
         if not self.is_near:
             return None
-        if head.peer and not is_loopback(head.peer.partition("%")[0]):
+        if head.peer and not self.is_published and not is_loopback(head.peer.partition("%")[0]):
             return Refusal(403, f"`{self.command}` serves this machine alone: say otherwise when you start it")
         if not names or not is_loopback(host_of(names[0])):
             return Refusal(

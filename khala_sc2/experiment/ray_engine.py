@@ -35,6 +35,8 @@ with needs("ray", source="--on ray"):
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from khala_sc2.experiment.ray_node import Head
+
 MATCH_BYTES = MATCH_MB * 2**20
 REACH_S = 10.0
 MOST_WAITING = 64
@@ -83,13 +85,14 @@ class Ray:
     async def _begin(self) -> None:
         # Ray prints on stdout when a node is gone, and stdout is for the result
         self._stack.enter_context(contextlib.redirect_stdout(sys.stderr))
+        head: Head | None = None
         if self._head is not None:
-            await self._stack.enter_async_context(running_head(self._head))
+            head = await self._stack.enter_async_context(running_head(self._head))
             self._address = self._head
             self.slots = self.slots or MOST_WAITING
         if self._address not in (None, "auto"):
             await _check(self._address)
-        await self._connect_until(time.monotonic() + (START_S if self._head else 0.0))
+        await self._connect_until(time.monotonic() + (START_S if head else 0.0), head)
         self.slots = self.slots or _room_of_the_cluster()
         if not self.slots:
             ray.shutdown()
@@ -130,15 +133,16 @@ class Ray:
             _write(record, recording)
         return Ended.model_validate_json(ended)
 
-    async def _connect_until(self, end_s: float) -> None:
-        """Connect; a head that listens already may still need a minute until it has nodes."""
+    async def _connect_until(self, end_s: float, head: Head | None) -> None:
+        """Connect; a head that listens may still need a minute until it is a node, or die before."""
         while True:
             try:
                 return self._connect()
             except ConfigError:
-                if time.monotonic() > end_s:
+                if head is None or time.monotonic() > end_s:
                     raise
             await asyncio.sleep(RETRY_S)
+            await head.listen()
 
     def _connect(self) -> None:
         ended_by = signal.getsignal(signal.SIGTERM)

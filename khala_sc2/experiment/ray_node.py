@@ -17,6 +17,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from khala_orchestrator.console import stderr_console
 from khala_protocol.errors import ConfigError
 from khala_protocol.extras import not_installed
 from khala_sc2.experiment.engine import MATCH_MB, slots_of_this_machine
@@ -37,8 +38,40 @@ _PATIENT = {
 }
 
 
+class Head:
+    """The first node of a cluster, without room for matches."""
+
+    def __init__(self, address: str) -> None:
+        """Start it at `HOST:PORT`, as others reach it."""
+        self._address = address
+        self._host, self._port = split_address(address)
+        self._process = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        words = ("--head", f"--port={self._port}", "--include-dashboard=false", "--no-monitor")
+        return _start(*words, own=socket.gethostbyname(self._host), matches=0)
+
+    async def listen(self) -> None:
+        """Wait until it listens; start it again if it died: Ray ends a node whose helpers need more than 15 s.
+
+        Raises:
+            ConfigError: the address is none of this machine, or the port is taken.
+        """
+        if self._process.poll() is not None:
+            self._process = self._start()
+        while not await asyncio.to_thread(_is_open, self._host, self._port):
+            if self._process.poll() is not None:
+                raise ConfigError("Ray did not start: is the port taken, and the address this machine's?",
+                                  source=f"--head {self._address}")  # fmt: skip
+            await asyncio.sleep(RETRY_S)
+
+    def end(self) -> None:
+        """End it in order."""
+        _end(self._process)
+
+
 @contextlib.asynccontextmanager
-async def running_head(address: str) -> AsyncIterator[None]:
+async def running_head(address: str) -> AsyncIterator[Head]:
     """Begin a cluster without room for matches, and end it after the context.
 
     Args:
@@ -47,21 +80,15 @@ async def running_head(address: str) -> AsyncIterator[None]:
     Raises:
         ConfigError: it is no address of this machine, or Ray does not start there.
     """
-    host, port = split_address(address)
-    words = ("--head", f"--port={port}", "--include-dashboard=false")
-    process = _start(*words, own=socket.gethostbyname(host), matches=0)
+    head = Head(address)
     try:
         async with asyncio.timeout(START_S):
-            while not await asyncio.to_thread(_is_open, host, port):
-                if process.poll() is not None:
-                    raise ConfigError("Ray did not start: is the port taken, and the address this machine's?",
-                                      source=f"--head {address}")  # fmt: skip
-                await asyncio.sleep(RETRY_S)
-        yield
+            await head.listen()
+        yield head
     except TimeoutError:
         raise ConfigError(f"Ray did not start within {START_S:g} s", source=f"--head {address}") from None
     finally:
-        await asyncio.to_thread(_end, process)
+        await asyncio.to_thread(head.end)
 
 
 def join(address: str, jobs: int | None) -> None:
@@ -78,15 +105,20 @@ def join(address: str, jobs: int | None) -> None:
         raise not_installed("ray", "ray", source="khala experiment join")
     host, port = split_address(address)
     signal.signal(signal.SIGTERM, _interrupt)
+    matches = jobs or slots_of_this_machine()
+    screen = stderr_console()
+    screen.print(f"waiting for an experiment at {address}", soft_wrap=True)
     while not _is_open(host, port):
         time.sleep(RETRY_S)
     while _is_open(host, port):
+        screen.print(f"joining the experiment at {address}, to play {matches} at a time", soft_wrap=True)
         where = f"--address={socket.gethostbyname(host)}:{port}"
-        process = _start(where, own=_own_address(host, port), matches=jobs or slots_of_this_machine())
+        process = _start(where, own=_own_address(host, port), matches=matches)
         try:
             process.wait()
         finally:
             _end(process)
+    screen.print(f"the experiment at {address} is over", soft_wrap=True)
 
 
 def split_address(address: str) -> tuple[str, int]:
@@ -105,7 +137,7 @@ def _start(*words: str, own: str, matches: int) -> subprocess.Popen[bytes]:
     command = [
         sys.executable, "-m", "ray.scripts.scripts", "start", *words, "--block", f"--node-ip-address={own}",
         f"--num-cpus={matches}", f"--memory={max(matches, 1) * MATCH_MB * 2**20}",
-        f"--object-store-memory={OBJECTS_BYTES}", "--disable-usage-stats",
+        f"--object-store-memory={OBJECTS_BYTES}", "--disable-usage-stats", "--include-log-monitor=false",
     ]  # fmt: skip
     return subprocess.Popen(command, env=_PATIENT | os.environ, stdout=subprocess.DEVNULL)  # noqa: S603  # our own words
 

@@ -30,12 +30,18 @@ _DATA = re.compile(r"type\s*=\s*[\"']?application/json", re.IGNORECASE)
 
 
 def view_door(
-    *, password: str = "", is_near: bool = True, is_secure: bool = False, command: str = "khala view"
+    *,
+    password: str = "",
+    is_near: bool = True,
+    is_published: bool = False,
+    is_secure: bool = False,
+    command: str = "khala view",
 ) -> Door:
     """Return the rules of a view, with a new token; arguments are those of `Door`."""
     return Door(
         command=command,
         is_near=is_near,
+        is_published=is_published,
         token=secrets.token_urlsafe(24),
         password=password,
         is_secure=is_secure,

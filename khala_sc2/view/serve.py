@@ -109,7 +109,12 @@ def door_of(options: ViewOptions) -> Door:
             f"{options.host} can be reached by other machines, and recordings hold prompts and replies: "
             "give --password, or --https CERT KEY, or leave --host out and connect through `ssh -L`"
         )
-    return view_door(password=password, is_near=near, is_secure=options.https is not None)
+    return view_door(
+        password=password,
+        is_near=near,
+        is_published=bool(options.published),
+        is_secure=options.https is not None,
+    )
 
 
 def password_of(options: ViewOptions) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, get_type_hints
 
@@ -14,6 +15,7 @@ from khala_protocol.errors import ConfigError, RecordingError
 from khala_protocol.recording import Recording, summary
 from khala_protocol.recording.chunks import chunk_at
 from khala_protocol.recording.summary import Summary
+from khala_sc2.doors.rules import TOKEN, RequestHead
 from khala_sc2.view import library, serve
 from khala_sc2.view.cli import view
 from khala_sc2.view.library import found_in, lines, read_head, run_id
@@ -146,8 +148,12 @@ def test_only_this_machine_may_look_without_a_password(host: str, near: bool) ->
 
 def test_a_port_that_a_container_publishes_to_its_machine_alone_needs_no_password() -> None:
     look = ViewOptions(given=(), host="0.0.0.0", published="127.0.0.1:8000")  # nobody listens
-    assert door_of(look).is_near
-    assert not door_of(look).password
+    door = door_of(look)
+    assert not door.password
+    visit = RequestHead("GET", "/", f"{TOKEN}={door.token}", (("host", "127.0.0.1:8000"),), peer="10.89.0.1")
+    assert door.check(visit) is None, "it comes through the gateway of the container"
+    for refused in (replace(visit, query=""), replace(visit, headers=(("host", "example.org"),))):
+        assert door.check(refused) is not None
     for published in ("10.0.0.5:8000", "8000", "example.org:8000"):
         with pytest.raises(ConfigError, match="is no port of this machine alone: give 127"):
             door_of(ViewOptions(given=(), host="0.0.0.0", published=published))
