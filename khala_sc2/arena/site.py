@@ -171,7 +171,9 @@ def _game(pool: PlayerPool, player: str, game: ArenaGame, *, has_page: bool) -> 
     outcome = outcome_for(game, player)
     killed, lost = (game.killed, game.lost) if is_first else (game.lost, game.killed)
     seat = seat_of(game, player)
-    match = f'<a href="../{MATCHES}/{game.match}.html">{game.match}</a>' if has_page else game.match
+    match = f'<span title="{game.match}">{game.match[:8]}</span>'
+    if has_page:
+        match = f'<a href="../{MATCHES}/{game.match}.html">{match}</a>'
     about = pool.players[other].about
     return (
         f'<td class="{outcome}">{outcome}</td><td title="{_safe(about)}">{_safe(other)}</td><td>{_safe(game.task)}</td>'
