@@ -41,6 +41,8 @@ def read_key(variable: str, environ: Mapping[str, str] | None = None) -> SecretS
             value = Path(file).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
             raise ConfigError(f"the file {file!r} cannot be read", source=source) from None
+        if not value.strip():
+            raise ConfigError(f"the file {file!r} is empty: it should hold the key", source=source)
     value = value.strip()
     if not value:
         raise ConfigError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -47,6 +48,7 @@ BAD_KEYS = [
     ({"K": "two words"}, "K: the key has blanks, line breaks or other characters that no key has"),
     ({"K": "kéy"}, "K: the key has blanks, line breaks or other characters that no key has"),
     ({"K_FILE": "/nowhere/key"}, "K_FILE: the file '/nowhere/key' cannot be read"),
+    ({"K_FILE": os.devnull}, f"K_FILE: the file {os.devnull!r} is empty: it should hold the key"),
 ]
 
 
