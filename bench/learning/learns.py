@@ -25,6 +25,7 @@ import random
 import sys
 import time
 from collections import defaultdict
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, Final
@@ -146,7 +147,7 @@ class Course:
             self._teach(learner, crew, rows)
             self._practise(learner, crew)
         for name in REFERENCES:
-            self._test(name, lambda seeds, name=name: self._scripted(name, seeds))
+            self._test(name, partial(self._scripted, name))
 
     # examples ---------------------------------------------------------------------------------------------------------
 
@@ -312,4 +313,4 @@ def main() -> None:
     else:
         _print(results)
     if given.picture:
-        draw(results, journal.steps(), REFERENCES, given.picture)
+        draw(results, journal.steps(), journal.lines("practice"), REFERENCES, given.picture)
