@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import random
 import re
-from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, Self
 
 from khala_agents.scripted.players import PLAYERS, PlayerName
 from khala_sc2.dataset.prompts import Prompter, count_example, without_example
@@ -25,6 +24,9 @@ if TYPE_CHECKING:
 
 CALL: Final = re.compile(r"^\s*(<\w+\(.*\)>)\s*$", re.MULTILINE)
 
+ENEMY: Final = re.compile(r"tag (0x[0-9a-f]+) .*\| distance .*\| (health \d+/\d+)")
+"""A line of an enemy: that of an own unit has no distance."""
+
 
 class Asked(NamedTuple):
     """A question to a player."""
@@ -32,7 +34,7 @@ class Asked(NamedTuple):
     observation: str
     """As the host wrote it."""
     prompt: tuple[ChatMessage, ...]
-    """As a model gets it, without a worked example."""
+    """As a model gets it: without a worked example, and of the observation what `enemies_alone` leaves."""
 
 
 class Answer(NamedTuple):
@@ -71,6 +73,11 @@ class Scripted:
 def shortest(reply: str) -> str:
     """Return the calls of a reply, without analysis and headings: the host takes them for those of the only team."""
     return "\n".join(CALL.findall(reply))
+
+
+def enemies_alone(text: str) -> str:
+    """Return the enemies in sight by tag and health, which the choice of a target needs: a third of the tokens."""
+    return "\n".join(["Enemy units:", *(f"{tag} | {health}" for tag, health in ENEMY.findall(text))])
 
 
 class Answered(NamedTuple):
@@ -123,24 +130,46 @@ class _Board:
         self.question = self._ask(info["briefing"], info["observation"]) if info["asked"] else None
 
     def _ask(self, briefing: Briefing, observation: Observation) -> Asked:
-        prompt = self._prompter.messages(briefing, observation)
+        short = observation.model_copy(update={"text": enemies_alone(observation.text)})
+        prompt = self._prompter.messages(briefing, short)
         return Asked(observation.text, without_example(prompt, count_example(prompt, self._prompter.example)))
 
 
-def play(task: TaskConfig, player: Player, seeds: Sequence[int], at_once: int) -> Iterator[PlayedBattle]:
-    """Yield battles, each when it is over.
+class Boards:
+    """Environments of a task, which stay open from battle to battle.
 
     Args:
         task: with one agent.
-        player: of that agent.
-        seeds: of the battles.
-        at_once: battles that are played in lockstep.
+        count: of battles that are played in lockstep.
     """
-    waiting = list(reversed(seeds))
-    with ExitStack() as stack:
-        boards = [_Board(task) for _ in range(min(at_once, len(seeds)))]
+
+    def __init__(self, task: TaskConfig, count: int) -> None:
+        self._task = task
+        self._count = count
+        self._boards: list[_Board] = []
+
+    def __enter__(self) -> Self:
+        """Open nothing yet."""
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        """Close all environments."""
+        for board in self._boards:
+            board.env.close()
+        self._boards.clear()
+
+    def play(self, player: Player, seeds: Sequence[int]) -> Iterator[PlayedBattle]:
+        """Yield battles, each when it is over.
+
+        Args:
+            player: of the only agent.
+            seeds: of the battles.
+        """
+        waiting = list(reversed(seeds))
+        while len(self._boards) < min(self._count, len(seeds)):
+            self._boards.append(_Board(self._task))
+        boards = self._boards[: len(seeds)]
         for board in boards:
-            stack.callback(board.env.close)
             board.begin(waiting.pop())
         while boards:
             asking = [board for board in boards if board.question is not None]

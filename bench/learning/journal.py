@@ -5,14 +5,12 @@ A line is written when it is known, so a process that is killed loses the one th
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
 from collections import defaultdict
 from statistics import fmean, pstdev
 from typing import TYPE_CHECKING, Any
 
-from bench.learning.battles import Answer, Answered, PlayedBattle
+from bench.learning.battles import Answer, Answered
 from khala_protocol.messages import ChatMessage
 from khala_sc2.experiment.statistics import mean, wilson
 
@@ -66,17 +64,6 @@ def read_answered(line: dict[str, Any]) -> Answered:
     return Answered(prompt, Answer(line["answer"], tuple(line["tokens"])))
 
 
-def write_battle(battle: PlayedBattle) -> dict[str, Any]:
-    """Return a battle as a line."""
-    plain = {field.name: getattr(battle, field.name) for field in dataclasses.fields(battle)}
-    return plain | {"answered": list(map(write_answered, battle.answered))}
-
-
-def read_battle(line: dict[str, Any]) -> PlayedBattle:
-    """Return what `write_battle` wrote."""
-    return PlayedBattle(**line | {"answered": list(map(read_answered, line["answered"]))})
-
-
 def advantages(rewards: Sequence[float]) -> list[float]:
     """Return how much better each battle of a group was than their mean, in standard deviations; 0 if all are alike."""
     spread = pstdev(rewards)
@@ -84,11 +71,6 @@ def advantages(rewards: Sequence[float]) -> list[float]:
         return [0.0] * len(rewards)
     centre = fmean(rewards)
     return [(reward - centre) / spread for reward in rewards]
-
-
-def steps_of_tests(steps: int, parts: int) -> set[int]:
-    """Return the steps before which the model is tested: the first, the last, and those between."""
-    return {math.ceil(steps * part / parts) for part in range(parts + 1)}
 
 
 def summary(journal: Journal) -> list[dict[str, Any]]:

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from khala_sc2.experiment.statistics import wilson
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 
 def draw(
-    results: Sequence[dict[str, Any]], steps: Sequence[dict[str, Any]], references: Sequence[str], path: Path
+    results: Sequence[dict[str, Any]],
+    steps: Sequence[dict[str, Any]],
+    practice: Sequence[dict[str, Any]],
+    references: Sequence[str],
+    path: Path,
 ) -> None:
     """Draw the tests beside the steps.
 
     Args:
         results: of the tests, as `summary` in `bench.learning.learns` gives them.
         steps: of both stages.
+        practice: rewards of the battles of each step of the second stage.
         references: players that are lines and no points.
         path: of the picture.
     """
@@ -27,7 +34,7 @@ def draw(
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     tests, learning = figure.subplots(1, 2)
     _draw_tests(tests, results, references)
-    _draw_steps(learning, steps)
+    _draw_steps(learning, steps, practice)
     figure.savefig(path, metadata={"Date": None})
 
 
@@ -49,17 +56,18 @@ def _draw_tests(axes: Any, results: Sequence[dict[str, Any]], references: Sequen
     axes.legend()
 
 
-def _draw_steps(axes: Any, steps: Sequence[dict[str, Any]]) -> None:
+def _draw_steps(axes: Any, steps: Sequence[dict[str, Any]], practice: Sequence[dict[str, Any]]) -> None:
     taught = [step for step in steps if step["stage"] == "taught"]
-    practised = [step for step in steps if step["stage"] == "practised"]
-    axes.plot([step["step"] + 1 for step in taught], [step["loss"] for step in taught], label="loss, taught")
-    last = taught[-1]["step"] + 1 if taught else 0
-    axes.plot(
-        [last + step["step"] + 1 for step in practised],
-        [step["reward"] for step in practised],
-        marker=".",
-        label="reward of a group, practised",
-    )
+    axes.plot([step["step"] + 1 for step in taught], [step["loss"] for step in taught], label="taught: loss")
+    won, below, above = [], [], []
+    for step in practice:
+        rewards = [reward for group in step["rewards"] for reward in group]
+        share = wilson(sum(reward > 0 for reward in rewards), len(rewards))
+        won.append(share.value or 0.0)
+        below.append(won[-1] - (share.low or 0.0))
+        above.append((share.high or 0.0) - won[-1])
+    places = [len(taught) + step["step"] + 1 for step in practice]
+    axes.errorbar(places, won, yerr=[below, above], marker=".", capsize=4, label="practised: won, sampled")
     axes.set(xlabel="step")
     axes.grid(alpha=0.3)
     axes.legend()

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import random
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench.learning.battles import Answer, Answered, PlayedBattle, Scripted, play, shortest
-from bench.learning.journal import (
-    Journal,
-    advantages,
-    read_battle,
-    steps_of_tests,
-    summary,
-    write_battle,
-)
+from bench.learning.battles import Answer, Answered, Boards, PlayedBattle, Scripted, enemies_alone, shortest
+from bench.learning.journal import Journal, advantages, read_answered, summary, write_answered
 from bench.paths import ROOT
 from khala_orchestrator.config import load_task
 from khala_protocol.messages import ChatMessage
@@ -41,13 +33,6 @@ def test_advantages_of_a_group_sum_up_to_nothing_and_are_none_if_all_battles_wer
     assert advantages([0.3, 0.3, 0.3]) == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(
-    ("steps", "parts", "expected"), [(6, 1, {0, 6}), (10, 2, {0, 5, 10}), (5, 2, {0, 3, 5}), (0, 2, {0})]
-)
-def test_a_stage_is_tested_at_its_beginning_and_at_its_end(steps: int, parts: int, expected: set[int]) -> None:
-    assert steps_of_tests(steps, parts) == expected
-
-
 def test_a_line_that_was_not_written_to_its_end_is_left_out_and_the_next_one_stands_alone(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "new")
     journal.add("tests", {"seed": 1})
@@ -58,12 +43,21 @@ def test_a_line_that_was_not_written_to_its_end_is_left_out_and_the_next_one_sta
     assert journal.lines("tests") == [{"seed": 1}, {"seed": 3}]
 
 
-def test_a_battle_of_a_group_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_an_example_is_read_as_it_was_written(tmp_path: Path) -> None:
     prompt = (ChatMessage(role="system", content="S"), ChatMessage(role="user", content="U"))
-    battle = PlayedBattle(7, [Answered(prompt, Answer("<Stop()>", (5, 2)))], reward=0.25, won=True, obeyed=1)
+    answered = Answered(prompt, Answer("<Stop()>", (5, 2)))
     journal = Journal(tmp_path)
-    journal.add("practice-0", write_battle(battle))
-    assert [read_battle(line) for line in journal.lines("practice-0")] == [battle]
+    journal.add("examples", write_answered(answered))
+    assert [read_answered(line) for line in journal.lines("examples")] == [answered]
+
+
+def test_the_model_reads_the_enemies_of_an_observation() -> None:
+    text = (
+        "Team Marine\n    Your units:\n        Marine | tag 0x100040000 | screen [12, 12] | health 15/45\n"
+        "    Enemy units:\n        Marine | tag 0x100100000 | screen [17.6, 12] | distance 5.7 | health 27/45\n"
+        "    Since the last observation:\n        own Marine was hit: 0x100040000 -30\n"
+    )
+    assert enemies_alone(text) == "Enemy units:\n0x100100000 | health 27/45"
 
 
 def test_a_step_that_is_done_again_after_a_kill_counts_once(tmp_path: Path) -> None:
@@ -85,26 +79,27 @@ def test_results_are_counted_by_player(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_decisions_of_a_group_weigh_as_much_as_their_battles_were_better_than_the_others() -> None:
+def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_better_than_the_others() -> None:
     """Needs the group `learning`."""
     pytest.importorskip("peft")
     learns: Any = importlib.import_module("bench.learning.learns")
     model = SimpleNamespace(tokens=lambda prompt: [len(prompt)])
     prompt = (ChatMessage(role="user", content="U"),)
-    better = PlayedBattle(7, [Answered(prompt, Answer("a", (5, 2)))] * 3, reward=0.5)
-    worse = PlayedBattle(7, [Answered(prompt, Answer("b", (6, 2))), Answered(prompt, Answer(""))], reward=-0.5)
-    rows = learns.chosen_rows(model, [better, worse], 99, random.Random(0))
-    assert sorted((row.answer[0], row.weight) for row in rows) == [(5, 1.0)] * 3 + [(6, -1.0)]
-    assert learns.chosen_rows(model, [worse, worse], 99, random.Random(0)) == []
-    assert len(learns.chosen_rows(model, [better, worse], 2, random.Random(0))) == 2
+    alike = Answered(prompt, Answer("a", (4, 2)))
+    better = PlayedBattle(7, [alike] + [Answered(prompt, Answer("b", (5, 2)))] * 2, reward=0.5)
+    worse = PlayedBattle(7, [alike, Answered(prompt, Answer("c", (6, 2))), Answered(prompt, Answer(""))], reward=-0.5)
+    rows = learns.weigh(model, [better, worse])
+    assert [(row.answer[0], row.weight) for row in rows] == [(5, 2.0), (6, -1.0)]
+    assert learns.weigh(model, [worse, worse]) == []
 
 
 @pytest.mark.slow
 @pytest.mark.game
 def test_the_teacher_wins_with_the_shortest_answers_and_a_silent_player_does_not() -> None:
     task = load_task(str(ROOT / "bench" / "learning" / "learns_3m.yaml"))
-    (won,) = play(task, Scripted("skilled"), [1], 1)
-    (lost,) = play(task, Scripted("silent"), [1], 1)
+    with Boards(task, 1) as boards:
+        (won,) = boards.play(Scripted("skilled"), [1])
+        (lost,) = boards.play(Scripted("silent"), [1])
     assert (won.won, won.obeyed) == (True, len(won.answered))
     assert (lost.won, lost.obeyed) == (False, 0)
     assert {len(answered.prompt) for answered in won.answered} == {2}

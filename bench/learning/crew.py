@@ -1,0 +1,112 @@
+"""Processes that share the work of a course: each has the model, and plays groups of battles or learns rows.
+
+Above: `bench.learning.learns`; below: the model and the battles. Weights come with every piece of work, so it does not
+matter which process takes it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
+
+import numpy as np
+import torch
+
+from bench.learning.battles import Boards, PlayedBattle
+from bench.learning.model import ModelPlayer, Row, SmallModel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from khala_bridge.task.config import TaskConfig
+
+    Adapter: TypeAlias = Sequence[NDArray[np.float32]]
+
+
+PART: Final = 4
+"""Battles that a process plays in lockstep."""
+
+
+class Part(NamedTuple):
+    """Battles for a process."""
+
+    seeds: Sequence[int]
+    temperature: float
+    """Of the tokens; 0 for the likeliest."""
+    sampled: int = 0
+    """Seed of the sampling."""
+
+
+class _Worker(NamedTuple):
+    model: SmallModel
+    boards: Boards
+    most: int
+
+
+class Crew:
+    """The processes, forked from this one: the frozen weights are in memory once.
+
+    Each uses a single thread, because threads of a busy machine wait for each other.
+
+    Args:
+        count: of processes.
+        task: with one agent.
+        model: that plays and learns.
+        most: tokens of an answer.
+    """
+
+    def __init__(self, count: int, task: TaskConfig, model: SmallModel, most: int) -> None:
+        self._count = count
+        fork = multiprocessing.get_context("fork")
+        self._pool = ProcessPoolExecutor(count, fork, _begin, (_Worker(model, Boards(task, PART), most),))
+
+    def __enter__(self) -> Self:
+        """Start no process yet."""
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        """End the processes after the work that they have begun."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def play(self, adapter: Adapter, parts: Sequence[Part]) -> Iterator[list[PlayedBattle]]:
+        """Yield the battles of each part when they are over."""
+        for done in as_completed([self._pool.submit(_play, adapter, part) for part in parts]):
+            yield done.result()
+
+    def gradients(self, adapter: Adapter, rows: Sequence[Row]) -> tuple[Adapter, float]:
+        """Return the gradient of a batch, by parameter, and its loss, the mean over its tokens.
+
+        Args:
+            adapter: values of the trained parameters.
+            rows: at least one.
+        """
+        tokens = sum(len(row.answer) for row in rows)
+        parts = [rows[start :: self._count] for start in range(min(self._count, len(rows)))]
+        found = [done.result() for done in [self._pool.submit(_gradients, adapter, part, tokens) for part in parts]]
+        sums = [np.sum(values, axis=0) for values in zip(*(gradients for gradients, _ in found), strict=True)]
+        return sums, sum(loss for _, loss in found)
+
+
+_workers: list[_Worker] = []
+"""That of this process."""
+
+
+def _begin(worker: _Worker) -> None:
+    _workers.append(worker)
+
+
+def _play(adapter: Adapter, part: Part) -> list[PlayedBattle]:
+    (worker,) = _workers
+    worker.model.take_adapter(adapter)
+    torch.manual_seed(part.sampled)
+    player = ModelPlayer(worker.model, most=worker.most, temperature=part.temperature)
+    return list(worker.boards.play(player, part.seeds))
+
+
+def _gradients(adapter: Adapter, rows: Sequence[Row], tokens: int) -> tuple[Any, float]:
+    (worker,) = _workers
+    worker.model.take_adapter(adapter)
+    return worker.model.gradients(rows, tokens)
