@@ -79,7 +79,7 @@ def test_the_slope_of_the_policy_is_that_of_its_loss() -> None:
 
 
 def test_mappo_finds_the_action_that_is_rewarded_and_available() -> None:
-    assert share_of_the_best(ppo.Learner(SIZES, seed=1), rounds=15) == 1.0
+    assert share_of_the_best(ppo.Learner(SIZES, seed=1), rounds=8) == 1.0
 
 
 def test_qmix_finds_the_action_that_is_rewarded_and_available() -> None:
@@ -87,7 +87,7 @@ def test_qmix_finds_the_action_that_is_rewarded_and_available() -> None:
     from bench.environments import qmix
 
     settings = qmix.Settings(hidden=16, batch=16, kept=64, copied=80, explored=400, rate=5e-3)
-    assert share_of_the_best(qmix.Learner(SIZES, 1, settings), rounds=40) == 1.0
+    assert share_of_the_best(qmix.Learner(SIZES, 1, settings), rounds=25) == 1.0
 
 
 def test_returns_of_qmix_are_those_of_td_lambda() -> None:
@@ -106,9 +106,13 @@ def test_returns_of_qmix_are_those_of_td_lambda() -> None:
 
 
 def test_a_test_counts_each_battle_once() -> None:
+    def attack(_: np.ndarray, masks: np.ndarray) -> np.ndarray:
+        """Go east, and attack the first enemy that is near enough."""
+        near = masks[..., 6:]
+        return np.where(near.any(-1), 6 + near.argmax(-1), np.where(masks[..., 4], 4, masks.argmax(-1)))
+
     assert count_wins("3m", lambda _, masks: masks.argmax(-1), battles=3) == 0
-    attack = count_wins("2s3z", lambda _, masks: masks.shape[2] - 1 - masks[..., ::-1].argmax(-1), battles=4)
-    assert 1 <= attack <= 4
+    assert 1 <= count_wins("3m", attack, battles=8) <= 8
 
 
 @pytest.mark.parametrize("algorithm", train.ALGORITHMS)
