@@ -58,7 +58,8 @@ class Battles:
         self.steps = 0
         self.episodes = 0
         self.won: deque[bool] = deque(maxlen=RECENT)
-        self.sizes = Sizes(*self.seen.shape[1:], self.states.shape[1], self.masks.shape[2])
+        agents, seen = self.seen.shape[1:]
+        self.sizes = Sizes(agents, seen, self.states.shape[1], self.masks.shape[2])
 
     def step(self, actions: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Play a step of each battle; return [envs] rewards, and which episodes are over, be it by the limit."""

@@ -208,16 +208,19 @@ class Learner:
             yield from np.array_split(self._rng.permutation(rows), self.settings.batches)
 
 
-class _Critic(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Critic:
     """The slope of half the squared distance, which is no steeper than 1, in the outputs of the critic."""
 
     wanted: Array
 
     def __call__(self, out: Array) -> Array:
-        return np.clip(out - self.wanted, -1, 1) / len(out)
+        result: Array = np.clip(out - self.wanted, -1, 1) / len(out)
+        return result
 
 
-class _Policy(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class _Policy:
     """The slope of PPO's loss in the outputs of the policy: of its clipped gain, and of the entropy."""
 
     masks: Bools

@@ -67,7 +67,7 @@ class Step(NamedTuple):
     """[...]."""
 
 
-class Agent(nn.Module):
+class Agent(nn.Module):  # type: ignore[misc]  # torch is not installed where types are checked
     """Values of an agent's actions, from all that it has seen."""
 
     def __init__(self, inputs: int, hidden: int, actions: int) -> None:
@@ -82,7 +82,7 @@ class Agent(nn.Module):
         return self.above(out), memory
 
 
-class Mixer(nn.Module):
+class Mixer(nn.Module):  # type: ignore[misc]  # see above
     """The team's value from those of its agents; the state makes the weights, none of which is negative."""
 
     def __init__(self, state: int, agents: int, hidden: int, mixed: int) -> None:
@@ -167,7 +167,7 @@ class Learner:
         loss.backward()
         nn.utils.clip_grad_norm_(self._weights, self.settings.most_gradient)
         self._adam.step()
-        return loss.item()
+        return float(loss)
 
     def returns(self, rewards: torch.Tensor, there: torch.Tensor, ahead: torch.Tensor) -> torch.Tensor:
         """Return the TD(lambda) returns, all [steps, episodes]; `ahead` is the value of each step, if it is there."""

@@ -122,6 +122,6 @@ def test_a_team_is_trained_tested_and_drawn(algorithm: str, tmp_path: Path) -> N
     tests = list(train.train("3m", algorithm, seed=1, envs=4, steps=400, tests=2, battles=2))
     assert [test.battles for test in tests] == [2, 2]
     assert 200 <= tests[0].steps < tests[1].steps
-    assert 0 < tests[0].cpu_s < tests[1].cpu_s
+    assert 0 < tests[0].cpu_s <= tests[1].cpu_s
     train.draw(tests, tmp_path / "curve.svg")
     assert algorithm in (tmp_path / "curve.svg").read_text(encoding="utf-8")
