@@ -99,7 +99,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("environments.smacv2", "SMACv2's own package"),
         Benchmark("environments.smac_speed", "The simulator"),
         Benchmark("environments.env_parity", "Environments for training"),
-        Benchmark("environments.train", "docs/how-to/train.md"),
+        Benchmark("environments.train", "Teams that learn"),
         Benchmark("learning.learns", "A small model that learns"),
         Benchmark("language.offers", "Honest offers"),
         Benchmark("language.messages", "True messages"),

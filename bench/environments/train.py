@@ -1,146 +1,115 @@
-"""Train a team on a SMAC map through `khala_sc2.env.numeric`, and draw how its win rate grows.
+"""Train a team on a SMAC map through `khala_sc2.env.numeric`, and draw how many test battles it wins.
 
-    python -m bench train                                           3m, one seed, ten minutes
-    python -m bench train 3m --minutes 10 --seeds 1 2 3
-    python -m bench train 2s3z --minutes 30 --envs 16 --out curve.svg
+    python -m bench train                                          3m by MAPPO, one seed, a minute of one core
+    python -m bench train 3m --seeds 3 4 5
+    python -m bench train 3s5z --algorithm qmix --steps 2000000 --tests 40
+    python -m bench train --seeds --lines curves.jsonl --out curves.svg     no training: draw earlier lines
 
-The learner is PPO with shared weights (`ppo.py`), in this process, with all environments in turn. It prints the win
-rate of the last 200 episodes as they were sampled and, at the end, that of 100 new battles in which each agent takes
-its most likely action. Minutes are those of the processor, so that a busy machine changes nothing. Ctrl-C ends the
-training, and draws the curve so far.
+`mappo` (`ppo.py`) is NumPy; `qmix` (`qmix.py`) needs torch, which `uv sync --inexact --group learning` installs. Both
+have one set of settings for all maps. All battles are played in this process, in one thread.
+
+A test is a number of new battles, the same for each test, in which each agent takes the action that it thinks best.
+Each test is a line of JSON in the file of `--lines`: seconds are those of the processor, of the whole process but
+without the tests, so that a busy machine changes nothing. Ctrl-C ends the training, and draws the curves so far.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import time
-from collections import deque
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: these matrices are too small to share
 
 from bench.command_line import make_parser
-from bench.environments.ppo import Learner, Rollout
-from khala_sc2.env.numeric import CentralEnv
+from bench.environments import ppo
+from bench.environments.battles import Battles, count_wins
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterator
 
-STEPS = 32
-"""Of each environment between two updates."""
-RECENT = 200
-TESTED = 100
-TEST_SEED = 1_000_000
+    from bench.environments.battles import Learner, Sizes
+
+ALGORITHMS: Final = ("mappo", "qmix")
+PYMARL2: Final = "PyMARL2, 10 million steps"
+DI_ENGINE: Final = "DI-engine, 2 million steps"
+PUBLISHED: Final = {
+    "3s5z": (("qmix", PYMARL2, 1.0), ("qmix", DI_ENGINE, 1.0), ("mappo", DI_ENGINE, 1.0)),
+    "5m_vs_6m": (("qmix", PYMARL2, 0.9), ("qmix", DI_ENGINE, 0.6), ("mappo", DI_ENGINE, 0.75)),
+    "3s_vs_5z": (("qmix", PYMARL2, 1.0),),
+}
+"""Of each map: algorithm, source, and the share of battles won on StarCraft II at the end of training.
+
+PyMARL2's are the column Finetuned-QMIX in the README of hijkzzz/pymarl2 (8ccac7c), the code of arXiv:2102.03479;
+DI-engine's stand in dizoo/smac/README.md of opendilab/DI-engine.
+"""
 
 
-@dataclass(slots=True)
-class Run:
-    """What became of one seed."""
+@dataclass(frozen=True, slots=True)
+class Test:
+    """What a team won at a moment of its training."""
 
     map: str
+    algorithm: str
     seed: int
-    minutes: list[float] = field(default_factory=list)
-    steps: list[int] = field(default_factory=list)
-    """Of all environments, at the same moments."""
-    won: list[float] = field(default_factory=list)
-    """Part of the episodes before."""
-    episodes: int = 0
-    greedy: float | None = None
-    """Part of the battles that were won at the end, with the most likely actions; None if it was interrupted."""
+    steps: int
+    """Of all its battles together."""
+    cpu_s: float
+    """Of this process so far, without its tests."""
+    won: int
+    battles: int
 
 
-class Team:
-    """Several environments that are played by one learner."""
+def make_learner(algorithm: str, sizes: Sizes, seed: int) -> Learner:
+    """Return an algorithm with new networks."""
+    if algorithm == "mappo":
+        return ppo.Learner(sizes, seed)
+    from bench.environments import qmix  # noqa: PLC0415  # torch is not installed for `mappo` alone
 
-    def __init__(self, map_name: str, envs: int, seed: int) -> None:
-        self.envs = [CentralEnv(map_name) for _ in range(envs)]
-        self.seen = [env.reset(seed=seed * 1000 + number)[0] for number, env in enumerate(self.envs)]
-        self.won: deque[bool] = deque(maxlen=RECENT)
-        self.episodes = 0
-
-    def play(self, learner: Learner, steps: int) -> Rollout:
-        """Play some steps of each environment."""
-        return Rollout(*map(np.stack, zip(*(self._step(learner) for _ in range(steps)), strict=True)))
-
-    def states(self) -> np.ndarray[Any, Any]:
-        """Return [envs, size] the states now."""
-        return np.stack([step["state"] for step in self.seen])
-
-    def _step(self, learner: Learner) -> tuple[Any, ...]:
-        seen = np.stack([step["observation"] for step in self.seen])
-        states = self.states()
-        masks = np.stack([step["action_mask"] for step in self.seen]).astype(np.bool_)
-        actions, chance = learner.act(seen, masks)
-        rewards, ended = [], []
-        for number, env in enumerate(self.envs):
-            self.seen[number], reward, over, cut, info = env.step(actions[number])
-            rewards.append(reward)
-            ended.append(over or cut)
-            if over or cut:
-                self.won.append(bool(info["battle_won"]))
-                self.episodes += 1
-                self.seen[number], _ = env.reset()
-        return seen, masks, actions, chance, states, np.array(rewards), np.array(ended)
+    return qmix.Learner(sizes, seed)
 
 
-def train(map_name: str, seed: int, envs: int, minutes: float, tell: Callable[[Run], None]) -> tuple[Run, Learner]:
-    """Train one team; `tell` is called with the run each minute or so."""
-    team = Team(map_name, envs, seed)
-    first = team.seen[0]
-    (agents, size), (state_size,) = first["observation"].shape, first["state"].shape
-    learner = Learner(agents, size, state_size, team.envs[0].battles.n_actions, seed)
-    run = Run(map_name, seed)
+def train(map_name: str, algorithm: str, seed: int, envs: int, steps: int, tests: int, battles: int) -> Iterator[Test]:
+    """Train one team, and yield its tests, which are as many steps apart."""
     begun_s = time.process_time()
-    told = 0.0
-    steps = 0
-    with suppress(KeyboardInterrupt):
-        while (spent := (time.process_time() - begun_s) / 60) < minutes:
-            learner.learn(team.play(learner, STEPS), team.states())
-            steps += STEPS * envs
-            if spent >= told and team.won:
-                told = spent + min(0.25, minutes / 40)
-                run.minutes.append(spent)
-                run.steps.append(steps)
-                run.won.append(sum(team.won) / len(team.won))
-                run.episodes = team.episodes
-                tell(run)
-        run.greedy = win_rate(map_name, learner)
-    return run, learner
+    team = Battles(map_name, envs, seed)
+    learner = make_learner(algorithm, team.sizes, seed)
+    for number in range(1, tests + 1):
+        while team.steps < steps * number // tests:
+            learner.play(team)
+        spent_s = time.process_time() - begun_s
+        won = count_wins(map_name, learner.most_likely(), battles)
+        yield Test(map_name, algorithm, seed, team.steps, round(spent_s, 1), won, battles)
+        begun_s = time.process_time() - spent_s
 
 
-def win_rate(map_name: str, learner: Learner) -> float:
-    """Return the part of new battles that are won with the most likely actions."""
-    env = CentralEnv(map_name)
-    won = 0
-    for number in range(TESTED):
-        seen, _ = env.reset(seed=TEST_SEED + number)
-        over = cut = False
-        info: dict[str, Any] = {}
-        while not (over or cut):
-            masks = seen["action_mask"].astype(np.bool_)
-            actions, _ = learner.act(seen["observation"][None], masks[None], greedy=True)
-            seen, _, over, cut, info = env.step(actions[0])
-        won += info["battle_won"]
-    return won / TESTED
-
-
-def draw(runs: list[Run], path: Path) -> None:
-    """Draw the win rates over the minutes."""
+def draw(tests: list[Test], path: Path) -> None:
+    """Draw a panel for each map, with a line for each team, and what others published for the real game."""
     import matplotlib as mpl  # noqa: PLC0415  # loads fonts, which only a picture needs
     from matplotlib.figure import Figure  # noqa: PLC0415  # see above
 
     mpl.rcParams["svg.hashsalt"] = "khala"
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for run in runs:
-        greedy = "" if run.greedy is None else f", greedy {run.greedy:.2f}"
-        axes.plot(run.minutes, run.won, label=f"seed {run.seed}: {run.steps[-1] / 1000:.0f} 000 steps{greedy}")
-    axes.set(xlabel="minutes of one processor core", ylabel=f"won of the last {RECENT}", ylim=(0, 1), title=runs[0].map)
-    axes.grid(alpha=0.3)
-    axes.legend()
+    maps = list(dict.fromkeys(test.map for test in tests))
+    figure = Figure(figsize=(3.4 * len(maps), 3.6), layout="constrained")
+    colours = dict(zip(ALGORITHMS, ("C0", "C1"), strict=True))
+    for axes, name in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
+        here = [test for test in tests if test.map == name]
+        for algorithm, seed in dict.fromkeys((test.algorithm, test.seed) for test in here):
+            run = [test for test in here if (test.algorithm, test.seed) == (algorithm, seed)]
+            x = [0.0, *(test.steps / 1e6 for test in run)]
+            y = [0.0, *(test.won / test.battles for test in run)]
+            axes.plot(x, y, colours[algorithm], label=f"{algorithm}, seed {seed}", linewidth=1)
+        for algorithm, source, share in PUBLISHED.get(name, ()):
+            style = ":" if source == DI_ENGINE else "--"
+            axes.axhline(share, color=colours[algorithm], linestyle=style, label=f"{algorithm}, {source}", linewidth=1)
+        axes.set(xlabel="million steps", ylim=(0, 1.02), title=name)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=6)
+    figure.axes[0].set_ylabel("test battles won")
     figure.savefig(path, metadata={"Date": None})
 
 
@@ -148,29 +117,37 @@ def main() -> None:
     """Train as the command line asks."""
     parser = make_parser(__doc__)
     parser.add_argument("map", nargs="?", default="3m")
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
-    parser.add_argument("--envs", type=int, default=16)
-    parser.add_argument("--out", type=Path, help="where to draw the curve: .svg or .png")
+    parser.add_argument("--algorithm", choices=ALGORITHMS, default="mappo")
+    parser.add_argument("--seeds", type=int, nargs="*", default=[1], help="train a team with each")
+    parser.add_argument("--steps", type=int, default=200_000, help="of all battles of a team together")
+    parser.add_argument("--envs", type=int, default=32, help="battles at once")
+    parser.add_argument("--tests", type=int, default=10)
+    parser.add_argument("--battles", type=int, default=100, help="of a test")
+    parser.add_argument("--lines", type=Path, help="file to which each test is added")
+    parser.add_argument("--out", type=Path, help="where to draw the lines: .svg or .png")
     options = parser.parse_args()
-    runs = []
-    for seed in options.seeds:
-        run, _ = train(
-            options.map, seed, options.envs, options.minutes, lambda run: None if options.json else _tell(run)
-        )
-        runs.append(run)
-        if options.json:
-            print(json.dumps(asdict(run)))
-        elif run.greedy is not None:
-            print(f"seed {seed}: greedy {run.greedy:.2f} of {TESTED} battles")
-        if options.out:
-            draw(runs, options.out)
-        if run.greedy is None:
-            break
+    tests = _read(options.lines) if options.lines and options.lines.exists() else []
+    with suppress(KeyboardInterrupt):
+        for seed in options.seeds:
+            for test in train(
+                options.map, options.algorithm, seed, options.envs, options.steps, options.tests, options.battles
+            ):
+                tests.append(test)
+                line = json.dumps(asdict(test))
+                if options.lines:
+                    with options.lines.open("a", encoding="utf-8") as file:
+                        file.write(f"{line}\n")
+                print(line if options.json else _say(test), flush=True)
+    if options.out:
+        draw(tests, options.out)
 
 
-def _tell(run: Run) -> None:
-    print(
-        f"seed {run.seed}  {run.minutes[-1]:5.2f} min  {run.steps[-1]:8d} steps  {run.episodes:6d} episodes  "
-        f"won {run.won[-1]:.2f}", flush=True,
-    )  # fmt: skip
+def _read(lines: Path) -> list[Test]:
+    return [Test(**json.loads(line)) for line in lines.read_text(encoding="utf-8").splitlines()]
+
+
+def _say(test: Test) -> str:
+    return (
+        f"{test.map} {test.algorithm} seed {test.seed}  {test.cpu_s:7.1f} s  {test.steps:8d} steps  "
+        f"won {test.won} of {test.battles}"
+    )
