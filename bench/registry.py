@@ -97,6 +97,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("simulator.compilers", "docs/design/engine.md"),
         Benchmark("environments.smac", "SMAC's own package"),
         Benchmark("environments.smacv2", "SMACv2's own package"),
+        Benchmark("environments.scripts", "Scripts that were played on StarCraft II"),
         Benchmark("environments.smac_speed", "The simulator"),
         Benchmark("environments.env_parity", "Environments for training"),
         Benchmark("environments.train", "Teams that learn"),

@@ -43,8 +43,6 @@ LEVELS: Final = (
     "Harder", "VeryHard", "CheatVision", "CheatMoney", "CheatInsane",
 )  # fmt: skip
 """As python-sc2 names them, from 1 to 10."""
-PATIENCE_S: Final = 900.0
-"""Wall time of a game."""
 
 
 def play(options: argparse.Namespace) -> None:
@@ -86,11 +84,11 @@ def play_apart(options: argparse.Namespace, sc2path: Path, game: tuple[str, int,
     command += ["--seed", str(seed), "--minutes", str(options.minutes), "--map", options.map]
     try:
         done = subprocess.run(
-            command, env={**os.environ, "SC2PATH": str(sc2path)}, capture_output=True, text=True, timeout=PATIENCE_S,
-            check=False,
+            command, env={**os.environ, "SC2PATH": str(sc2path)}, capture_output=True, text=True,
+            timeout=options.patience_s, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return {"result": f"not over after {PATIENCE_S:.0f} s"}
+        return {"result": f"not over after {options.patience_s:.0f} s"}
     if done.returncode:
         return {"result": (done.stderr.strip().splitlines() or ["it failed"])[-1]}
     found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
@@ -126,6 +124,7 @@ def main() -> None:
     parser.add_argument("--games", type=int, default=1)
     parser.add_argument("--seed", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=15.0, help="of game time; then it is a tie")
+    parser.add_argument("--patience-s", type=float, default=900.0, help="wall time of a game; then it has no result")
     parser.add_argument("--map", default="Simple64", help="by default %(default)s; each map needs a log of its own")
     parser.add_argument("--maps", type=Path, help="a directory with maps of the game, to be played too")
     parser.add_argument("--log", type=Path, help="a file with a line for each game")
