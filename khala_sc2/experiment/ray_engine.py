@@ -35,7 +35,7 @@ with needs("ray", source="--on ray"):
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from khala_sc2.experiment.ray_node import Head
+    from khala_sc2.experiment.ray_node import RayHead
 
 MATCH_BYTES = MATCH_MB * 2**20
 REACH_S = 10.0
@@ -85,7 +85,7 @@ class Ray:
     async def _begin(self) -> None:
         # Ray prints on stdout when a node is gone, and stdout is for the result
         self._stack.enter_context(contextlib.redirect_stdout(sys.stderr))
-        head: Head | None = None
+        head: RayHead | None = None
         if self._head is not None:
             head = await self._stack.enter_async_context(running_head(self._head))
             self._address = self._head
@@ -133,7 +133,7 @@ class Ray:
             _write(record, recording)
         return Ended.model_validate_json(ended)
 
-    async def _connect_until(self, end_s: float, head: Head | None) -> None:
+    async def _connect_until(self, end_s: float, head: RayHead | None) -> None:
         """Connect; a head that listens may still need a minute until it is a node, or die before."""
         while True:
             try:

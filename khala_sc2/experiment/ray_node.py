@@ -38,7 +38,7 @@ _PATIENT = {
 }
 
 
-class Head:
+class RayHead:
     """The first node of a cluster, without room for matches."""
 
     def __init__(self, address: str) -> None:
@@ -71,7 +71,7 @@ class Head:
 
 
 @contextlib.asynccontextmanager
-async def running_head(address: str) -> AsyncIterator[Head]:
+async def running_head(address: str) -> AsyncIterator[RayHead]:
     """Begin a cluster without room for matches, and end it after the context.
 
     Args:
@@ -80,7 +80,7 @@ async def running_head(address: str) -> AsyncIterator[Head]:
     Raises:
         ConfigError: it is no address of this machine, or Ray does not start there.
     """
-    head = Head(address)
+    head = RayHead(address)
     try:
         async with asyncio.timeout(START_S):
             await head.listen()
