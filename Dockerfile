@@ -32,7 +32,8 @@ FROM ${PYTHON_IMAGE} AS base
 # /runs is writable for every user that a container may run as, and so is a new volume that is mounted there.
 RUN useradd --uid 1000 --user-group --create-home khala && install --directory --mode=1777 /runs
 ENV PATH=/opt/khala/bin:$PATH \
-    PYTHONUNBUFFERED=1
+    PYTHONUNBUFFERED=1 \
+    MPLCONFIGDIR=/tmp
 WORKDIR /home/khala
 CMD ["--help"]
 
