@@ -55,13 +55,7 @@ def play(map_name: str, weight: float, episodes: int, seed: int) -> int:
     won = 0
     for _ in range(episodes):
         agents, enemies = _begin(battle, map_name)
-        for _ in range(LONGEST):
-            _choose(battle, agents, enemies, weight)
-            battle.advance(LOOPS)
-            alive = [bool((battle.look(side.tags)[0] & ~side.heals).any()) for side in (agents, enemies)]
-            if not all(alive):
-                break
-        won += alive == [True, False]
+        won += _fight(battle, agents, enemies, weight)
         battle.kill(np.concatenate([battle.tags_of(PLAYER), battle.tags_of(ENEMY)]).tolist())
         battle.advance(LOOPS)
         battle.forget_past()
@@ -80,6 +74,17 @@ def _begin(battle: Battle, map_name: str) -> tuple[Side, Side]:
     kinds = battle.look(agents)[1].type_id
     heals = (kinds == kinds.max()) & (wanted.kind == "MMM")  # of SMAC's own types the Medivac is the last
     return Side(agents, heals), Side(enemies, battle.look(enemies)[1].type_id == MEDIVAC)
+
+
+def _fight(battle: Battle, agents: Side, enemies: Side, weight: float) -> bool:
+    """Fight until a side is dead; return whether the agents live."""
+    for _ in range(LONGEST):
+        _choose(battle, agents, enemies, weight)
+        battle.advance(LOOPS)
+        alive = [bool((battle.look(side.tags)[0] & ~side.heals).any()) for side in (agents, enemies)]
+        if not all(alive):
+            return alive == [True, False]
+    return False
 
 
 def _choose(battle: Battle, agents: Side, enemies: Side, weight: float) -> None:
