@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import random
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, Self
 
 from khala_agents.scripted.players import PLAYERS, PlayerName
+from khala_bridge.errors import GameError
 from khala_sc2.dataset.prompts import Prompter, count_example, without_example
 from khala_sc2.env import parallel_env
 
@@ -154,8 +156,13 @@ class Boards:
 
     def __exit__(self, *failure: object) -> None:
         """Close all environments."""
+        self.close()
+
+    def close(self) -> None:
+        """Close all environments, also those whose game was lost; the next battles open new ones."""
         for board in self._boards:
-            board.env.close()
+            with suppress(GameError):
+                board.env.close()
         self._boards.clear()
 
     def play(self, player: Player, seeds: Sequence[int]) -> Iterator[PlayedBattle]:

@@ -15,6 +15,7 @@ import torch
 
 from bench.learning.battles import Boards, PlayedBattle
 from bench.learning.model import ModelPlayer, Row, SmallModel
+from khala_bridge.errors import GameError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 PART: Final = 4
 """Battles that a process plays in lockstep."""
+
+GAMES_LOST: Final = 3
+"""Times that a part is played again because a game was lost."""
 
 
 class Part(NamedTuple):
@@ -103,6 +107,11 @@ def _play(adapter: Adapter, part: Part) -> list[PlayedBattle]:
     worker.model.take_adapter(adapter)
     torch.manual_seed(part.sampled)
     player = ModelPlayer(worker.model, most=worker.most, temperature=part.temperature)
+    for _ in range(GAMES_LOST):
+        try:
+            return list(worker.boards.play(player, part.seeds))
+        except GameError:  # a game that does not answer, as on a machine with many others
+            worker.boards.close()
     return list(worker.boards.play(player, part.seeds))
 
 

@@ -71,6 +71,8 @@ GROUP: Final = 8
 """Battles of a group."""
 MOST: Final = 24
 """Tokens of an answer: that of the teacher has 20."""
+TEST_PART: Final = 8
+"""Test battles that are kept together when they are over."""
 CLIP: Final = 1.0
 """Longest gradient of a step."""
 
@@ -213,8 +215,8 @@ class Course:
         adapter = learner.model.adapter()
 
         def play(seeds: Sequence[int]) -> Iterator[PlayedBattle]:
-            parts = [seeds[start :: self._given.processes] for start in range(self._given.processes)]
-            for battles in crew.play(adapter, [Part(part, temperature=0.0) for part in parts if part]):
+            parts = [seeds[start : start + TEST_PART] for start in range(0, len(seeds), TEST_PART)]
+            for battles in crew.play(adapter, [Part(part, temperature=0.0) for part in parts]):
                 yield from battles
 
         self._test(name, play)
@@ -291,9 +293,9 @@ def main() -> None:
     add = parser.add_argument
     add("--dir", type=Path, default=Path("runs/learns"), help="directory of everything that is kept; %(default)s")
     add("--lessons", type=int, default=24, help="battles of the teacher; %(default)s")
-    add("--taught", type=int, default=6, help="steps of the first stage; %(default)s")
+    add("--taught", type=int, default=5, help="steps of the first stage; %(default)s")
     add("--rate", type=float, default=1e-3, help="learning rate of the first stage; %(default)s")
-    add("--practised", type=int, default=10, help="steps of the second stage; %(default)s")
+    add("--practised", type=int, default=4, help="steps of the second stage; %(default)s")
     add("--groups", type=int, default=4, help="groups of eight battles of such a step; %(default)s")
     add("--practice-rate", type=float, default=5e-4, help="learning rate of the second stage; %(default)s")
     add("--tests", type=int, default=100, help="test battles; %(default)s")
