@@ -100,13 +100,13 @@ def draw(tests: list[Test], path: Path) -> None:
         here = [test for test in tests if test.map == name]
         for algorithm, seed in dict.fromkeys((test.algorithm, test.seed) for test in here):
             run = [test for test in here if (test.algorithm, test.seed) == (algorithm, seed)]
-            x = [0.0, *(test.steps / 1e6 for test in run)]
-            y = [0.0, *(test.won / test.battles for test in run)]
+            x = [test.steps / 1e6 for test in run]
+            y = [test.won / test.battles for test in run]
             axes.plot(x, y, colours[algorithm], label=f"{algorithm}, seed {seed}", linewidth=1)
         for algorithm, source, share in PUBLISHED.get(name, ()):
             style = ":" if source == DI_ENGINE else "--"
             axes.axhline(share, color=colours[algorithm], linestyle=style, label=f"{algorithm}, {source}", linewidth=1)
-        axes.set(xlabel="million steps", ylim=(0, 1.02), title=name)
+        axes.set(xlabel="million steps", ylim=(-0.02, 1.02), title=name)
         axes.grid(alpha=0.3)
         axes.legend(fontsize=6)
     figure.axes[0].set_ylabel("test battles won")
