@@ -18,14 +18,14 @@ import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
 
 from bench.command_line import make_parser
-from khala_sc2.env.numeric import MAPS
+from khala_sc2.env.numeric.forces import fighters_of
+from khala_sc2.env.numeric.maps import smac_map
 from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import ENEMY, PLAYER, Battle
 from khala_simulator.world.orders import ATTACK
 
 HEAL: Final = 386
-MEDIVAC: Final = 54
 WEIGHTS: Final = {"closest": 0.0, "weakest": 1.0}
 """How much an enemy's health counts in the choice of a target; its distance is the rest."""
 LOOPS: Final = 2
@@ -64,16 +64,10 @@ def play(map_name: str, weight: float, episodes: int, seed: int) -> int:
 
 def _begin(battle: Battle, map_name: str) -> tuple[Side, Side]:
     """Wait until both sides are there."""
-    wanted = MAPS[map_name]
-    while (len(battle.tags_of(PLAYER)), len(battle.tags_of(ENEMY))) != (wanted.agents, wanted.enemies):
+    while (fighters := fighters_of(battle, smac_map(map_name))) is None:
         battle.advance(1)
-    agents = battle.tags_of(PLAYER)
-    enemies = battle.tags_of(ENEMY)
-    _, seen = battle.look(agents)
-    agents = agents[np.lexsort((seen.y, seen.x, seen.type_id))]
-    kinds = battle.look(agents)[1].type_id
-    heals = (kinds == kinds.max()) & (wanted.kind == "MMM")  # of SMAC's own types the Medivac is the last
-    return Side(agents, heals), Side(enemies, battle.look(enemies)[1].type_id == MEDIVAC)
+    n = fighters.agents
+    return Side(fighters.tag[:n], fighters.medivac[:n]), Side(fighters.tag[n:], fighters.medivac[n:])
 
 
 def _fight(battle: Battle, agents: Side, enemies: Side, weight: float) -> bool:

@@ -21,6 +21,14 @@ if TYPE_CHECKING:
 GRAVITON_BEAM = 5
 
 
+def leader_of(unit_type: str) -> AgentConfig:
+    """Return an agent whose only team is of this type, and may attack units."""
+    team = {"name": "T", "unit_types": [unit_type]}
+    return AgentConfig.model_validate(
+        {"name": "A", "role": "", "teams": [team], "actions": {unit_type: ["Attack_Unit"]}}
+    )
+
+
 @pytest.mark.parametrize(
     ("attacker", "buffs", "refused"),
     [
@@ -38,15 +46,7 @@ def test_what_is_lifted_is_hit_in_the_air(
     unit: Callable[..., raw_pb2.Unit],
     snapshot: Callable[..., Snapshot],
 ) -> None:
-    agent = AgentConfig.model_validate(
-        {
-            "name": "A",
-            "role": "",
-            "teams": [{"name": "T", "unit_types": [attacker]}],
-            "actions": {attacker: ["Attack_Unit"]},
-        }
-    )
-    config = task("2s3z", agents=(agent,))
+    config = task("2s3z", agents=(leader_of(attacker),))
     queen = unit(0x100180001, "Queen", 12, 10, alliance="enemy", buff_ids=buffs)
     observation = Observer(config).observe(snapshot([unit(0x100040001, attacker, 10, 10), queen]))
     joint = Actor(config).joint(observation, {"A": parse("<Attack_Unit(0x100180001)>")})
@@ -75,19 +75,11 @@ def test_a_unit_whose_weapon_is_off_attacks_nothing(
     unit: Callable[..., raw_pb2.Unit],
     snapshot: Callable[..., Snapshot],
 ) -> None:
-    agent = AgentConfig.model_validate(
-        {
-            "name": "A",
-            "role": "",
-            "teams": [{"name": "T", "unit_types": ["Phoenix"]}],
-            "actions": {"Phoenix": ["Attack_Unit"]},
-        }
-    )
     holder = unit(HOLDER, "Phoenix", 10, 10, is_flying=True, buff_ids=buffs)
     if order is not None:
         holder.orders.add(ability_id=order, target_unit_tag=QUEEN)
     queen = unit(QUEEN, "Queen", 12, 10, alliance="enemy", buff_ids=() if on is None else (on,))
-    config = task("2s3z", agents=(agent,))
+    config = task("2s3z", agents=(leader_of("Phoenix"),))
     seen = Observer(config).observe(snapshot([holder, unit(OTHER, "Phoenix", 11, 10, is_flying=True), queen]))
     joint = Actor(config).joint(seen, {"A": parse(f"<Attack_Unit({hex(QUEEN)})>")})
     assert tuple(tag for command in joint.commands for tag in command.units) == able
