@@ -6,7 +6,6 @@ from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY
 cdef int64_t SCAN_PERIOD
-cdef int64_t PLAYER_BITS
 
 @cython.locals(loop=int64_t, slot=int64_t, lacking=dict)
 cpdef look_out(WorldFields world)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from khala_simulator.world.world import World
 
 SCAN_PERIOD: Final = MECHANICS.scan_period
-PLAYER_BITS: Final = 8
 FREE: Final = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, OrderKind.PATROL, OrderKind.HOLD})
 
 
@@ -34,23 +33,22 @@ def look_out(world: World) -> None:
     loop = world.loop
     if not world.autocast or loop % SCAN_PERIOD:
         return
-    lacking: dict[int, bool] = {}
+    lacking: dict[tuple[int, int], bool] = {}
     for slot in sorted(world.autocast):
         c = columns.columns_of(world)
         if c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]:
             _use_first_wanted(world, slot, c.owner[slot], lacking)
 
 
-def _use_first_wanted(world: World, slot: int, owner: int, lacking: dict[int, bool]) -> None:
+def _use_first_wanted(world: World, slot: int, owner: int, lacking: dict[tuple[int, int], bool]) -> None:
     """Make a unit use the first of its abilities that its player would want now.
 
-    ``lacking`` has what was found for other units: by ability and player, whether an upgrade is missing.
+    ``lacking`` has what was found for other units: by player and ability, whether an upgrade is missing.
     """
     for number in world.autocast[slot]:
-        key = number << PLAYER_BITS | owner
-        if key not in lacking:
-            lacking[key] = lacks_upgrade(world, owner, number)
-        if lacking[key]:
+        if (owner, number) not in lacking:
+            lacking[owner, number] = lacks_upgrade(world, owner, number)
+        if lacking[owner, number]:
             continue
         if attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
             return
