@@ -13,8 +13,8 @@ health alone. It answers with bare calls.
 3. It practises: groups of battles with the same seed, sampled; what it said in battles that were better than the mean
    of their group becomes likelier, what it said in worse ones less likely (GRPO with one update for each step).
 
-Before, between and after, it plays the test battles, whose seeds it never meets otherwise, with its likeliest answers;
-`silent`, `random-legal` and `skilled` play the same. All that is done is kept in the directory. A run that was killed
+Before, between and after, it plays the test battles, whose seeds it never meets otherwise, once with its likeliest
+answers and once with sampled ones; `silent`, `random-legal` and `skilled` play the same. All that is done is kept in the directory. A run that was killed
 goes on from its last step.
 """
 
@@ -46,7 +46,7 @@ from bench.learning.journal import (
     write_answered,
 )
 from bench.learning.model import Row, SmallModel, dequantize
-from bench.learning.picture import draw
+from bench.learning.picture import SAMPLED, draw
 from bench.tables import print_table
 from khala_orchestrator.config import load_task
 
@@ -214,12 +214,14 @@ class Course:
     def _test_model(self, learner: Learner, crew: Crew, name: str) -> None:
         adapter = learner.model.adapter()
 
-        def play(seeds: Sequence[int]) -> Iterator[PlayedBattle]:
-            parts = [seeds[start : start + TEST_PART] for start in range(0, len(seeds), TEST_PART)]
-            for battles in crew.play(adapter, [Part(part, temperature=0.0) for part in parts]):
+        def play(temperature: float, seeds: Sequence[int]) -> Iterator[PlayedBattle]:
+            starts = range(0, len(seeds), TEST_PART)
+            parts = [Part(seeds[start : start + TEST_PART], temperature, sampled=seeds[start]) for start in starts]
+            for battles in crew.play(adapter, parts):
                 yield from battles
 
-        self._test(name, play)
+        self._test(name, partial(play, 0.0))
+        self._test(name + SAMPLED, partial(play, 1.0))
 
     def _test(self, name: str, play: Callable[[Sequence[int]], Iterator[PlayedBattle]]) -> None:
         """Play the test battles that a player has not played yet."""

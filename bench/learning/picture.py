@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from khala_sc2.experiment.statistics import wilson
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+SAMPLED: Final = ", sampled"
+"""End of the model's name in tests that it plays with sampled answers."""
 
 
 def draw(
@@ -40,13 +43,12 @@ def draw(
 
 def _draw_tests(axes: Any, results: Sequence[dict[str, Any]], references: Sequence[str]) -> None:
     points = [result for result in results if result["player"] not in references]
-    names = [result["player"] for result in points]
-    won = [result["won"] for result in points]
-    bounds = [
-        [result["won"] - result["low"] for result in points],
-        [result["high"] - result["won"] for result in points],
-    ]
-    axes.errorbar(names, won, yerr=bounds, marker="o", capsize=4, label="SmolLM2-135M")
+    for label, sampled in (("its likeliest answers", False), ("sampled answers", True)):
+        line = [point for point in points if point["player"].endswith(SAMPLED) == sampled]
+        below = [point["won"] - point["low"] for point in line]
+        above = [point["high"] - point["won"] for point in line]
+        names = [point["player"].removesuffix(SAMPLED) for point in line]
+        axes.errorbar(names, [point["won"] for point in line], yerr=[below, above], marker="o", capsize=4, label=label)
     for result, style in zip([r for r in results if r["player"] in references], (":", "-.", "--"), strict=False):
         axes.axhline(result["won"], linestyle=style, color="gray", label=result["player"])
     battles = max((result["battles"] for result in points), default=0)
