@@ -14,8 +14,8 @@ health alone. It answers with bare calls.
    of their group becomes likelier, what it said in worse ones less likely (GRPO with one update for each step).
 
 Before, between and after, it plays the test battles, whose seeds it never meets otherwise, once with its likeliest
-answers and once with sampled ones; `silent`, `random-legal` and `skilled` play the same. All that is done is kept in the directory. A run that was killed
-goes on from its last step.
+answers and once with sampled ones; `silent`, `random-legal` and `skilled` play the same. All that is done is kept in
+the directory. A run that was killed goes on from its last step.
 """
 
 from __future__ import annotations
