@@ -4,15 +4,15 @@
     python -m bench scripts --episodes 50 --scripts closest --maps 3s5z corridor
 
 Figures of the real game are those that https://github.com/caiyangcy/SCMM (3c44e89) has drawn in its folder `plots`, ten
-episodes each; its maps are SMAC's with other triggers for the camera and for names. As there, each agent chooses its
-target anew every two loops of the game, Medivacs heal the ally with the least share of its health, and a battle ends
-only with a side. Here it is not won after 4000 choices.
+episodes each. As there, each agent chooses its target anew every two loops of the game, Medivacs heal the ally with the
+least share of its health, and a battle ends only with a side; here it is not won after 4000 choices. Its maps are
+SMAC's with a trigger that gives all enemies their order to attack again whenever an agent dies.
 """
 
 from __future__ import annotations
 
 import json
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from s2clientprotocol import sc2api_pb2 as sc
@@ -20,10 +20,16 @@ from s2clientprotocol import sc2api_pb2 as sc
 from bench.command_line import make_parser
 from khala_sc2.env.numeric.forces import fighters_of
 from khala_sc2.env.numeric.maps import smac_map
+from khala_simulator.abilities import commands
 from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import ENEMY, PLAYER, Battle
-from khala_simulator.world.orders import ATTACK
+from khala_simulator.world.columns import NOBODY
+from khala_simulator.world.orders import ATTACK, OrderKind
+
+if TYPE_CHECKING:
+    from khala_simulator.abilities.commands import Point
+    from khala_simulator.world.world import World
 
 HEAL: Final = 386
 WEIGHTS: Final = {"closest": 0.0, "weakest": 1.0}
@@ -72,13 +78,34 @@ def _begin(battle: Battle, map_name: str) -> tuple[Side, Side]:
 
 def _fight(battle: Battle, agents: Side, enemies: Side, weight: float) -> bool:
     """Fight until a side is dead; return whether the agents live."""
+    world = battle.world
+    slots = [world.slot_of(tag) for tag in enemies.tags.tolist()]
+    goals = {world.tag_of(slot): _goal(world, slot) for slot in slots if world.order_kind[slot] != OrderKind.IDLE}
+    living = len(agents.tags)
     for _ in range(LONGEST):
         _choose(battle, agents, enemies, weight)
-        battle.advance(LOOPS)
+        for _ in range(LOOPS):
+            battle.advance(1)
+            before, living = living, int(battle.look(agents.tags)[0].sum())
+            if living < before:
+                _send_again(world, goals)
         alive = [bool((battle.look(side.tags)[0] & ~side.heals).any()) for side in (agents, enemies)]
         if not all(alive):
             return alive == [True, False]
     return False
+
+
+def _goal(world: World, slot: int) -> Point:
+    x, y = world.order_point[slot].tolist()
+    return x, y
+
+
+def _send_again(world: World, goals: dict[int, Point]) -> None:
+    """Give each living enemy the order again that the map's trigger gave it."""
+    for tag, goal in goals.items():
+        slot = world.slot_of(tag)
+        if slot != NOBODY:
+            commands.attack_move(world, [slot], goal)
 
 
 def _choose(battle: Battle, agents: Side, enemies: Side, weight: float) -> None:

@@ -33,5 +33,7 @@ cdef bint _give(WorldFields world, int64_t slot, object wanted, bint queue) exce
 cdef _of_its_own(WorldFields world, int64_t row, object order)
 @cython.locals(c=Columns, kind=int64_t, target=int64_t, opponent=int64_t, fights_on=bint, attacks=bint, casts=bint)
 cpdef begin(WorldFields world, int64_t slot, object order)
+@cython.locals(target=int64_t, goal=memory.Point, x=double, y=double)
+cdef bint _leads_away(Columns c, int64_t slot) except -1
 @cython.locals(x=double, y=double)
 cdef memory.Point _point(object given, memory.Point place) except *

@@ -35,6 +35,7 @@ from khala_simulator.world.world import NO_TAG
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from khala_simulator.native.columns import Columns
     from khala_simulator.tables.catalog import UnitType
     from khala_simulator.world.world import World
 
@@ -332,7 +333,7 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     """Make ``order`` the unit's current one (None: idle), dropping an attack that has not taken effect yet.
 
     An order to seek fights leaves a unit in the one that it has found by itself: an attack-move that is given again
-    and again interrupts nothing.
+    and again interrupts nothing. A unit that goes around others goes on doing so where that leads to the new goal.
     """
     order = order or IDLENESS
     kind = int(order.kind)
@@ -369,8 +370,9 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     c.returning[slot] = False
     c.nav_end[slot] = False
     c.nav_loop[slot] = 0
-    c.blocked[slot] = 0
-    c.detour[slot] = 0
+    if _leads_away(c, slot):
+        c.blocked[slot] = 0
+        c.detour[slot] = 0
     c.scan_loop[slot] = 0
     if kind in (GATHER, RETURN):
         _begin_harvest(world, slot, kind, target)
@@ -382,6 +384,15 @@ def _point(given: Point | None, place: memory.Point) -> memory.Point:
         return place
     x, y = given
     return memory.point(x, y)
+
+
+def _leads_away(c: Columns, slot: int) -> bool:
+    """Return whether a unit's way around others leads away from where its order takes it."""
+    target = c.order_target[slot]
+    goal = c.order_point[slot] if target == NOBODY else c.pos[target]
+    x = goal.x - c.pos[slot].x
+    y = goal.y - c.pos[slot].y
+    return x * c.aside[slot].x + y * c.aside[slot].y < 0.0
 
 
 def _begin_harvest(world: World, slot: int, kind: int, target: int) -> None:

@@ -16,6 +16,9 @@ cdef double EVEN
 cdef int64_t AIR
 cdef double PUSH_FIRM
 cdef double PUSH_IDLE
+cdef double PUSH_RANGED
+cdef double PUSH_MELEE
+cdef double MELEE
 cdef double PUSH_AHEAD
 cdef double PUSH_LIMIT
 cdef int64_t PUSH_ROUNDS

@@ -1,9 +1,9 @@
 """Pushing: bodies that overlap are pushed apart along the line between their centres, a few times over.
 
-The rules: a walker gives way to a unit that fights, and an idle unit to a friend that comes through. No unit gives way
-to an enemy, and a unit that holds its place gives way to none. Of two walkers the one that is nearer to its next corner
-goes first. Flyers pass through each other and drift apart where they stop. How much is an estimate (see
-``data/mechanics.yaml``).
+The rules: an idle unit gives way to a friend that comes through, and a unit that fights gives way to friends less than
+a walker does. No unit gives way to an enemy, and a unit that holds its place gives way to none. Of two walkers the one
+that is nearer to its next corner goes first. Flyers pass through each other and drift apart where they stop. How much
+is an estimate (see ``data/mechanics.yaml``).
 
 The steps of one loop, and why they come in this order:
 
@@ -49,6 +49,9 @@ AIR: Final = int(Layer.AIR)
 EIGHT_DIRECTIONS: Final = tuple((math.cos(i * math.pi / 4), math.sin(i * math.pi / 4)) for i in range(8))
 PUSH_FIRM: Final = MECHANICS.push_firm
 PUSH_IDLE: Final = MECHANICS.push_idle
+PUSH_RANGED: Final = MECHANICS.push_ranged
+PUSH_MELEE: Final = MECHANICS.push_melee
+MELEE: Final = MECHANICS.flank_reach
 PUSH_AHEAD: Final = MECHANICS.push_ahead
 PUSH_LIMIT: Final = MECHANICS.push_limit
 PUSH_ROUNDS: Final = MECHANICS.push_rounds
@@ -181,7 +184,12 @@ def _share_out(crowd: Crowd, c: Columns, slots: Cells) -> None:
         firm = IMMOBILE_YIELDING if immobile else (1.0 if c.wants[slot] else PUSH_FIRM) * c.lightness[slot]
         idles = c.target[slot] == NOBODY and not c.wants[slot] and not immobile
         crowd.enemy[i] = firm
-        crowd.friend[i] = PUSH_IDLE * c.lightness[slot] if idles else firm
+        if immobile or c.wants[slot]:
+            crowd.friend[i] = firm
+        elif idles:
+            crowd.friend[i] = PUSH_IDLE * c.lightness[slot]
+        else:
+            crowd.friend[i] = (PUSH_MELEE if c.reach[slot] <= MELEE else PUSH_RANGED) * c.lightness[slot]
     for k in range(crowd.pairs):
         first = slots[crowd.first[k]]
         second = slots[crowd.second[k]]

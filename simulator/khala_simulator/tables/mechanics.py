@@ -49,6 +49,8 @@ class Mechanics:
     push_limit: float
     push_firm: float
     push_idle: float
+    push_ranged: float
+    push_melee: float
     push_ahead: float
     flyer_drift: float
     flyer_drift_limit: float

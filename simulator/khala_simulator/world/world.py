@@ -178,7 +178,9 @@ class World(UnitColumns, WorldFields):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        self.in_reach[self.target == slot] = False
+        bereft = self.target == slot
+        self.in_reach[bereft] = False
+        self.scan_loop[bereft & self.defensive] = 0  # else workers would end an attack-move before they look again
         for column in (
             self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
             self.occupant,
@@ -208,7 +210,9 @@ class World(UnitColumns, WorldFields):
         self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
         self.wants[slot] = self.in_reach[slot] = False
         self.visible[:, slot] = False
-        self.in_reach[self.target == slot] = False
+        bereft = self.target == slot
+        self.in_reach[bereft] = False
+        self.scan_loop[bereft & self.defensive] = 0  # else workers would end an attack-move before they look again
         for column in (self.target, self.order_target):
             column[column == slot] = NOBODY
         self.target[slot] = NOBODY

@@ -148,7 +148,7 @@ def test_workers_on_an_attack_move_fight_who_they_meet(field: Any, give: Any) ->
 def test_an_attack_on_a_place_goes_on_with_what_else_is_there_when_the_first_enemy_is_dead(field: Any) -> None:
     world = field.world
     drones = [field.put("Drone", 1, 20 + i % 2, 13 + i // 2) for i in range(12)]
-    weak, depot = field.put("SupplyDepot", 2, 24, 16), field.put("SupplyDepot", 2, 28, 16)
+    weak, depot = field.put("SupplyDepot", 2, 24, 16), field.put("SupplyDepot", 2, 26, 16)
     world.life[weak] = 60.0
     commands.attack_move(world, drones, (24, 16))
     field.until(lambda: not world.alive[weak], most=200)
