@@ -48,7 +48,7 @@ def test_as_many_reach_one_target_as_fit_round_it(field: Any, attacker: str, tar
     world.life[foe] = world.life_max[foe] = 1e6
     field.play(160)
     most = places_around(world, attacker, target)
-    assert PARKED * most < world.in_reach[slots].sum() <= most + 0.1
+    assert PARKED * most < world.in_reach[slots].sum() <= most + 0.15  # the second row presses a little
 
 
 def test_a_second_row_goes_round_the_first_to_the_other_side(field: Any) -> None:
