@@ -98,8 +98,8 @@ def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_b
 def test_the_teacher_wins_with_the_shortest_answers_and_a_silent_player_does_not() -> None:
     task = load_task(str(ROOT / "bench" / "learning" / "learns_3m.yaml"))
     with Boards(task, 1) as boards:
-        (won,) = boards.play(Scripted("skilled"), [1])
-        (lost,) = boards.play(Scripted("silent"), [1])
+        (won,) = boards.play(Scripted("skilled"), [2])
+        (lost,) = boards.play(Scripted("silent"), [2])
     assert (won.won, won.obeyed) == (True, len(won.answered))
     assert (lost.won, lost.obeyed) == (False, 0)
     assert {len(answered.prompt) for answered in won.answered} == {2}

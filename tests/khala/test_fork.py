@@ -244,8 +244,8 @@ BAD = [
     ("nowhere.mcap --at 3", "nowhere.mcap: there is no such file"),
     ("golden.mcap", "say where to fork: --at STEP, or --scan for many steps"),
     ("golden.mcap --at 3 --scan --model skilled", "say where to fork: --at STEP, or --scan"),
-    ("golden.mcap --at 44", "has the steps 0 to 43 of episode 0: it cannot be forked at step 44"),
-    ("golden.mcap --at 44 --policy silent", "it cannot be forked at step 44"),
+    ("golden.mcap --at 51", "has the steps 0 to 50 of episode 0: it cannot be forked at step 51"),
+    ("golden.mcap --at 51 --policy silent", "it cannot be forked at step 51"),
     ("golden.mcap --at 3 --episode 2", "has no complete step of episode 2"),
     ("real.mcap --at 3", "was played on StarCraft II"),
     ("real.mcap --at 3 --policy silent", "which does not play the same game twice"),
@@ -358,7 +358,7 @@ def test_steps_are_ranked_by_wins_and_then_by_value(golden: Trunk, futures: Any)
 
 
 def test_a_scan_has_a_dozen_steps_and_needs_an_end_to_compare_with(golden: Trunk) -> None:
-    assert steps_of(golden, None) == [*range(0, 44, 4)]
+    assert steps_of(golden, None) == [*range(0, 51, 5)]
     assert steps_of(golden, 20, advised=True) == [20, 40]
     with pytest.raises(RecordingError, match="has no end of episode 0 to compare forks with"):
         steps_of(replace(golden, results=[]), None)
