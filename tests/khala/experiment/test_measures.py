@@ -113,7 +113,7 @@ def test_the_golden_battle_has_one_row_with_the_sums_of_its_result() -> None:
     golden = Recording.open(GOLDEN)
     (row,) = measure(golden)
     assert_agrees(row, golden.results[0])
-    assert (row.task, row.seed, row.outcome, row.killed_units, row.lost_value) == ("2s3z_pair", 1, "win", 5, 200.0)
+    assert (row.task, row.seed, row.outcome, row.killed_units, row.lost_value) == ("2s3z_pair", 1, "win", 5, 475.0)
     assert row.latency_p95_s == golden.results[0].latency_p95_s
     assert row.messages_sent == len(list(golden.of(Message)))
     assert (row.models, row.paid_usd) == ("focus-fire", sum(spent_usd(golden).values()))
