@@ -25,11 +25,10 @@ from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
 from khala_simulator.battle import ENEMY, PLAYER, Battle
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.orders import ATTACK, OrderKind
+from khala_simulator.world.orders import ATTACK
 
 if TYPE_CHECKING:
-    from khala_simulator.abilities.commands import Point
-    from khala_simulator.world.world import World
+    from khala_simulator.world.orders import Order
 
 HEAL: Final = 386
 WEIGHTS: Final = {"closest": 0.0, "weakest": 1.0}
@@ -78,9 +77,8 @@ def _begin(battle: Battle, map_name: str) -> tuple[Side, Side]:
 
 def _fight(battle: Battle, agents: Side, enemies: Side, weight: float) -> bool:
     """Fight until a side is dead; return whether the agents live."""
-    world = battle.world
-    slots = [world.slot_of(tag) for tag in enemies.tags.tolist()]
-    goals = {world.tag_of(slot): _goal(world, slot) for slot in slots if world.order_kind[slot] != OrderKind.IDLE}
+    slots = map(battle.world.slot_of, enemies.tags.tolist())
+    given = {battle.world.tag_of(slot): battle.world.orders_of(slot) for slot in slots}  # by the map's trigger
     living = len(agents.tags)
     for _ in range(LONGEST):
         _choose(battle, agents, enemies, weight)
@@ -88,24 +86,20 @@ def _fight(battle: Battle, agents: Side, enemies: Side, weight: float) -> bool:
             battle.advance(1)
             before, living = living, int(battle.look(agents.tags)[0].sum())
             if living < before:
-                _send_again(world, goals)
+                _give_again(battle, given)
         alive = [bool((battle.look(side.tags)[0] & ~side.heals).any()) for side in (agents, enemies)]
         if not all(alive):
             return alive == [True, False]
     return False
 
 
-def _goal(world: World, slot: int) -> Point:
-    x, y = world.order_point[slot].tolist()
-    return x, y
-
-
-def _send_again(world: World, goals: dict[int, Point]) -> None:
-    """Give each living enemy the order again that the map's trigger gave it."""
-    for tag, goal in goals.items():
-        slot = world.slot_of(tag)
+def _give_again(battle: Battle, given: dict[int, list[Order]]) -> None:
+    """Give each living enemy its order again."""
+    for tag, orders in given.items():
+        slot = battle.world.slot_of(tag)
         if slot != NOBODY:
-            commands.attack_move(world, [slot], goal)
+            for order in orders:
+                commands.give(battle.world, [slot], order, queue=False)
 
 
 def _choose(battle: Battle, agents: Side, enemies: Side, weight: float) -> None:

@@ -42,8 +42,9 @@ cdef bint _drifts(Crowd crowd, Columns c, int64_t* slots, Py_ssize_t k, int64_t 
 @cython.locals(depth=double, push=double)
 cdef bint _drift(Crowd crowd, Py_ssize_t k, Py_ssize_t body, double sign) noexcept
 
-@cython.locals(i=Py_ssize_t, k=Py_ssize_t, immobile=bint, firm=double, idles=bint, mine=double, theirs=double)
+@cython.locals(i=Py_ssize_t, k=Py_ssize_t, slot=int64_t, mine=double, theirs=double)
 cdef void _share_out(Crowd crowd, Columns c, int64_t* slots) noexcept
+cdef double _standing_yields(Columns c, int64_t slot) noexcept
 cdef double _squared_distance_left(Columns c, int64_t slot) noexcept
 @cython.locals(i=Py_ssize_t, n=Py_ssize_t, overlapping=Py_ssize_t, deepest=double)
 cdef void _relax(Crowd crowd, int64_t rounds) noexcept

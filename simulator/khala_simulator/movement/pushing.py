@@ -180,16 +180,13 @@ def _share_out(crowd: Crowd, c: Columns, slots: Cells) -> None:
     """Write the shares of an overlap by which the two of each pair give way."""
     for i in range(crowd.count):
         slot = slots[i]
-        immobile = c.step_max[slot] <= 0.0 or c.holds[slot]
-        firm = IMMOBILE_YIELDING if immobile else (1.0 if c.wants[slot] else PUSH_FIRM) * c.lightness[slot]
-        idles = c.target[slot] == NOBODY and not c.wants[slot] and not immobile
-        crowd.enemy[i] = firm
-        if immobile or c.wants[slot]:
-            crowd.friend[i] = firm
-        elif idles:
-            crowd.friend[i] = PUSH_IDLE * c.lightness[slot]
+        if c.step_max[slot] <= 0.0 or c.holds[slot]:
+            crowd.enemy[i] = crowd.friend[i] = IMMOBILE_YIELDING
+        elif c.wants[slot]:
+            crowd.enemy[i] = crowd.friend[i] = c.lightness[slot]
         else:
-            crowd.friend[i] = (PUSH_MELEE if c.reach[slot] <= MELEE else PUSH_RANGED) * c.lightness[slot]
+            crowd.enemy[i] = PUSH_FIRM * c.lightness[slot]
+            crowd.friend[i] = _standing_yields(c, slot) * c.lightness[slot]
     for k in range(crowd.pairs):
         first = slots[crowd.first[k]]
         second = slots[crowd.second[k]]
@@ -205,6 +202,13 @@ def _share_out(crowd: Crowd, c: Columns, slots: Cells) -> None:
                 theirs *= PUSH_AHEAD
         crowd.share[k] = mine / (mine + theirs)
         crowd.rest[k] = theirs / (mine + theirs)
+
+
+def _standing_yields(c: Columns, slot: int) -> float:
+    """Return how easily a friend pushes a unit that stands."""
+    if c.target[slot] == NOBODY:
+        return PUSH_IDLE
+    return PUSH_MELEE if c.reach[slot] <= MELEE else PUSH_RANGED
 
 
 def _squared_distance_left(c: Columns, slot: int) -> float:

@@ -178,9 +178,7 @@ class World(UnitColumns, WorldFields):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        bereft = self.target == slot
-        self.in_reach[bereft] = False
-        self.scan_loop[bereft & self.defensive] = 0  # else workers would end an attack-move before they look again
+        self._end_fights_with(slot)
         for column in (
             self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
             self.occupant,
@@ -203,6 +201,12 @@ class World(UnitColumns, WorldFields):
         self.ground.unblock(slot)
         self.population_changed()
 
+    def _end_fights_with(self, slot: int) -> None:
+        """Note that the target of whoever fights a unit goes; workers look again before they end an attack-move."""
+        fighters = self.target == slot
+        self.in_reach[fighters] = False
+        self.scan_loop[fighters & self.defensive] = 0
+
     def stow(self, slot: int, carrier: int) -> None:
         """Take a unit out of the world into a carrier: it lives on, unseen and untouchable."""
         self.carrier[slot] = carrier
@@ -210,9 +214,7 @@ class World(UnitColumns, WorldFields):
         self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
         self.wants[slot] = self.in_reach[slot] = False
         self.visible[:, slot] = False
-        bereft = self.target == slot
-        self.in_reach[bereft] = False
-        self.scan_loop[bereft & self.defensive] = 0  # else workers would end an attack-move before they look again
+        self._end_fights_with(slot)
         for column in (self.target, self.order_target):
             column[column == slot] = NOBODY
         self.target[slot] = NOBODY
