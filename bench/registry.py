@@ -71,7 +71,6 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = {
         Benchmark("simulator.abilities", "Observations and actions", "figures"),
         Benchmark("matches.games_per_hour", "Games per hour", "figures"),
         Benchmark("environments.env", "Environments for training", "figures"),
-        Benchmark("environments.vector", "Environments for training", "figures"),
         Benchmark("environments.sessions", "docs/how-to/openenv.md", "figures"),
         Benchmark("simulator.simulator_memory", "The simulator", "table"),
         Benchmark("language.recognition", "Accuracy of the parser", "table"),

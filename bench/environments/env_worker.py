@@ -1,8 +1,7 @@
-"""One environment that `python -m bench env` measures: it waits for a line, plays, and says how long that took.
+"""Battles of one kind, in a process that `env.py` starts: a line of input asks for a round.
 
-It needs nothing of Khala for SMAClite, so that another Python can run it as a script: `env_worker.py smaclite 3m 1`.
-Between two steps it reads what a learner reads: observations, the state, and which actions are available, of which it
-takes one at random for each agent.
+Run by the Python of the kind: it imports nothing of the project but what it measures. Every agent takes one of its
+available actions at random, which is part of the time, as it is in training.
 """
 
 from __future__ import annotations
@@ -16,103 +15,200 @@ from typing import Any
 import numpy as np
 
 
-class Khala:
-    """Ours, in this process."""
+class Batch:
+    """Ours, on two worker processes."""
 
-    def __init__(self, map_name: str, seed: int) -> None:
-        from khala_sc2.env.numeric import StarCraft2Env  # noqa: PLC0415  # what other workers need not have
+    def __init__(self, map_name: str, envs: int) -> None:
+        from khala_sc2.env import numeric  # noqa: PLC0415  # what other kinds need not have
 
-        self._env: Any = StarCraft2Env(map_name, seed=seed)
+        self._envs: Any = numeric.vector_env(map_name, envs, threads=min(2, envs))
+        self._rng = np.random.default_rng(1)
+        _, info = self._envs.reset(seed=1)
+        self._masks = info["action_mask"]
 
-    def reset(self) -> None:
-        self._env.reset()
+    def step(self) -> int:
+        """Play a step of each battle, and return how many steps that was."""
+        actions = (self._rng.random(self._masks.shape) * self._masks).argmax(-1)
+        self._masks = self._envs.step(actions)[4]["action_mask"]
+        return len(self._masks)
 
-    def read(self) -> Any:
-        self._env.observations(), self._env.get_state()
-        return self._env.masks()
-
-    def step(self, actions: list[int]) -> bool:
-        return bool(self._env.step(actions)[1])
-
-    def cpu_s(self) -> float:
-        """Return the processor time of the environment, of all of its processes."""
-        return time.process_time()
+    def processes(self) -> list[int]:
+        """Return the ids of the processes that play."""
+        return [os.getpid(), *(share.process.pid for _, share in self._envs.shares.parts if hasattr(share, "process"))]
 
     def close(self) -> None:
-        self._env.close()
+        self._envs.close()
 
 
-class Smac(Khala):
-    """SMAC's package, on the simulator's server in a process of its own."""
+class Single(Batch):
+    """Ours, one environment after the other in this process."""
 
-    def __init__(self, map_name: str, seed: int) -> None:
+    def __init__(self, map_name: str, envs: int) -> None:
+        self._rng = np.random.default_rng(1)
+        self._envs = [self._make(map_name, seed) for seed in range(1, envs + 1)]
+        for env in self._envs:
+            self._reset(env)
+
+    def _make(self, map_name: str, seed: int) -> Any:
+        from khala_sc2.env.numeric import StarCraft2Env  # noqa: PLC0415  # see above
+
+        return StarCraft2Env(map_name, seed=seed)
+
+    def _reset(self, env: Any) -> None:
+        env.reset()
+
+    def _can(self, env: Any) -> Any:
+        return env.masks()
+
+    def _play(self, env: Any, actions: Any) -> bool:
+        """Play a step, read what a learner reads, and return whether the battle is over."""
+        over = env.step(actions)[1]
+        env.get_obs(), env.get_state(), env.get_avail_actions()
+        return bool(over)
+
+    def step(self) -> int:
+        for env in self._envs:
+            masks = self._can(env)
+            if self._play(env, (self._rng.random(masks.shape) * masks).argmax(-1)):
+                self._reset(env)
+        return len(self._envs)
+
+    def processes(self) -> list[int]:
+        return [os.getpid()]
+
+    def close(self) -> None:
+        for env in self._envs:
+            env.close()
+
+
+class Smac(Single):
+    """SMAC's package; each environment has the simulator's server in a process of its own."""
+
+    def _make(self, map_name: str, seed: int) -> Any:
         from smac.env import StarCraft2Env  # noqa: PLC0415  # see above
 
-        self._env = StarCraft2Env(map_name=map_name, seed=seed)
+        return StarCraft2Env(map_name=map_name, seed=seed)
 
-    def read(self) -> Any:
-        self._env.get_obs(), self._env.get_state()
-        return np.array(self._env.get_avail_actions())
+    def _can(self, env: Any) -> Any:
+        return np.array(env.get_avail_actions())
 
-    def cpu_s(self) -> float:
-        import psutil  # noqa: PLC0415  # see above
+    def _play(self, env: Any, actions: Any) -> bool:
+        over = env.step(actions)[1]
+        env.get_obs(), env.get_state()
+        return bool(over)
 
-        game = psutil.Process(self._env._sc2_proc.pid).cpu_times()  # noqa: SLF001  # SMAC tells it nowhere else
-        return time.process_time() + float(game.user + game.system)
+    def processes(self) -> list[int]:
+        games = [env._sc2_proc.pid for env in self._envs]  # noqa: SLF001  # SMAC tells it nowhere else
+        return [os.getpid(), *games]
 
 
-class SmacLite(Khala):
+class SmacLite(Smac):
     """SMAClite, which imitates the game in Python."""
 
-    def __init__(self, map_name: str, seed: int) -> None:
+    def _make(self, map_name: str, seed: int) -> Any:
         import gymnasium  # noqa: PLC0415  # see above
         import smaclite  # noqa: F401, PLC0415  # registers its environments
 
-        self._env = gymnasium.make(f"smaclite/{map_name}-v0").unwrapped
-        self._seed: int | None = seed
-        self._obs: Any = None
+        env = gymnasium.make(f"smaclite/{map_name}-v0").unwrapped
+        env.reset(seed=seed)
+        return env
 
-    def reset(self) -> None:
-        self._obs, _ = self._env.reset(seed=self._seed)
-        self._seed = None
-
-    def read(self) -> Any:
-        self._env.get_state()
-        return np.array(self._env.get_avail_actions())
-
-    def step(self, actions: list[int]) -> bool:
-        self._obs, _, over, cut, _ = self._env.step(actions)
+    def _play(self, env: Any, actions: Any) -> bool:
+        _, _, over, cut, _ = env.step(actions.tolist())  # with observations
+        env.get_state()
         return bool(over or cut)
 
+    def processes(self) -> list[int]:
+        return [os.getpid()]
 
-KINDS: dict[str, type[Khala]] = {"khala": Khala, "smac": Smac, "smaclite": SmacLite}
+
+class Smax(Single):
+    """SMAX of JaxMARL: other rules, compiled by XLA for all battles and 32 steps at once."""
+
+    STEPS = 32
+
+    def __init__(self, map_name: str, envs: int) -> None:
+        import jax  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        import jax.numpy as jnp  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        from jaxmarl import make  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+        from jaxmarl.environments.smax import map_name_to_scenario  # type: ignore[import-not-found]  # noqa: PLC0415  # see above
+
+        env = make("HeuristicEnemySMAX", scenario=map_name_to_scenario(map_name))
+
+        def one(key: Any, state: Any) -> Any:
+            key, acts, steps = jax.random.split(key, 3)
+            can = env.get_avail_actions(state)
+            keys = dict(zip(env.agents, jax.random.split(acts, len(env.agents)), strict=True))
+            chosen = {
+                name: jax.random.categorical(keys[name], jnp.where(can[name] > 0, 0.0, -1e9)) for name in env.agents
+            }
+            seen, state, _, _, _ = env.step(steps, state, chosen)
+            return key, state, sum(part.sum() for part in seen.values())
+
+        def many(keys: Any, states: Any) -> Any:
+            def body(carry: Any, _: Any) -> Any:
+                keys, states, seen = jax.vmap(one)(*carry)
+                return (keys, states), seen.sum()
+
+            return jax.lax.scan(body, (keys, states), None, length=self.STEPS)
+
+        self._count = envs
+        self._keys = jax.random.split(jax.random.PRNGKey(1), envs)
+        _, self._states = jax.jit(jax.vmap(env.reset))(self._keys)
+        self._many = jax.jit(many)
+        self.step()
+
+    def step(self) -> int:
+        (self._keys, self._states), seen = self._many(self._keys, self._states)
+        seen.block_until_ready()
+        return self._count * self.STEPS
+
+    def close(self) -> None:
+        return
+
+
+KINDS: dict[str, Any] = {"batch": Batch, "single": Single, "smac": Smac, "smaclite": SmacLite, "smax": Smax}
+
+
+def cpu_s(processes: list[int]) -> float:
+    """Return the processor time that processes have used."""
+    total = 0.0
+    for process in processes:
+        with open(f"/proc/{process}/stat") as stat:  # noqa: PTH123  # of the kernel
+            fields = stat.read().rpartition(")")[2].split()
+        total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return total
+
+
+def memory_mb(processes: list[int]) -> float:
+    """Return the memory that processes have for themselves, and a share of what they have together."""
+    total = 0
+    for process in processes:
+        with open(f"/proc/{process}/smaps_rollup") as rollup:  # noqa: PTH123  # of the kernel
+            total += next(int(line.split()[1]) for line in rollup if line.startswith("Pss:"))
+    return total / 1024
 
 
 def work() -> None:
-    """Make an environment, and play it for as many seconds as each line of the input says; its end is the end."""
-    kind = sys.argv[1]
-    map_name = sys.argv[2]
-    seed = int(sys.argv[3])
-    said, sys.stdout = sys.stdout, open(os.devnull, "w")  # noqa: SIM115, PTH123  # SMAClite prints
-    env = KINDS[kind](map_name, seed)
-    rng = np.random.default_rng(seed)
-    env.reset()
+    """Answer each line of input, the seconds of a round, with what was played in it."""
+    kind, map_name, envs = sys.argv[1:4]
+    said = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what a library prints is no answer
+    battles = KINDS[kind](map_name, int(envs))
     print("ready", file=said, flush=True)
     for line in sys.stdin:
-        print(json.dumps(_play(env, rng, float(line))), file=said, flush=True)
-    env.close()
-
-
-def _play(env: Khala, rng: np.random.Generator, seconds: float) -> dict[str, float]:
-    begun_s = time.perf_counter()
-    cpu_s = env.cpu_s()
-    steps = 0
-    while time.perf_counter() - begun_s < seconds:
-        over = env.step([int(rng.choice(np.flatnonzero(can))) for can in env.read()])
-        steps += 1
-        if over:
-            env.reset()
-    return {"steps": steps, "wall_s": time.perf_counter() - begun_s, "cpu_s": env.cpu_s() - cpu_s}
+        seconds = float(line)
+        processes = battles.processes()
+        before_s = cpu_s(processes)
+        began_s = time.perf_counter()
+        steps = 0
+        while time.perf_counter() - began_s < seconds:
+            steps += battles.step()
+        took_s = time.perf_counter() - began_s
+        spent_s = cpu_s(processes) - before_s
+        row = {"steps": steps, "wall_s": took_s, "cpu_s": spent_s, "memory_mb": memory_mb(processes)}
+        print(json.dumps(row), file=said, flush=True)
+    battles.close()
 
 
 if __name__ == "__main__":

@@ -87,6 +87,8 @@ class Answered(NamedTuple):
 
     prompt: tuple[ChatMessage, ...]
     answer: Answer
+    obeyed: bool = True
+    """Whether at least one order of it was carried out."""
 
 
 @dataclass(slots=True)
@@ -98,8 +100,11 @@ class PlayedBattle:
     reward: float = 0.0
     """The sum of `khala_sc2.env.rewards.battle`: (destroyed - lost value) / 1000, +1 for a win, -1 for a loss."""
     won: bool = False
-    obeyed: int = 0
-    """Answers of which at least one order was carried out."""
+
+    @property
+    def obeyed(self) -> int:
+        """Answers of which at least one order was carried out."""
+        return sum(answered.obeyed for answered in self.answered)
 
 
 class _Board:
@@ -121,12 +126,12 @@ class _Board:
 
     def play(self, answer: Answer) -> None:
         """Give an answer, if there was a question."""
-        if self.question is not None:
-            self.battle.answered.append(Answered(self.question.prompt, answer))
         _, rewards, _, _, infos = self.env.step({self._agent: answer.text})
         info = infos[self._agent]
         self.battle.reward += rewards[self._agent]
-        self.battle.obeyed += any(report.accepted for report in info["reports"])
+        if self.question is not None:
+            obeyed = any(report.accepted for report in info["reports"])
+            self.battle.answered.append(Answered(self.question.prompt, answer, obeyed))
         if "result" in info:
             self.battle.won = info["result"].outcome == "win"
         self.question = self._ask(info["briefing"], info["observation"]) if info["asked"] else None

@@ -11,7 +11,8 @@ health alone. It answers with bare calls.
 1. The scripted player `skilled` plays battles; its prompts and answers are the examples, each different prompt once.
 2. The model learns them: steps of a batch, with the loss on the tokens of answers alone.
 3. It practises: groups of battles with the same seed, sampled; what it said in battles that were better than the mean
-   of their group becomes likelier, what it said in worse ones less likely (GRPO with one update for each step).
+   of their group becomes likelier, what it said in worse ones less likely (GRPO with one update for each step). So do
+   answers that were carried out, and those that were refused.
 
 Before, between and after, it plays the test battles, whose seeds it never meets otherwise, once with its likeliest
 answers and once with sampled ones; `silent`, `random-legal` and `skilled` play the same. All that is done is kept in
@@ -26,6 +27,7 @@ import sys
 import time
 from collections import defaultdict
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, Final
@@ -52,7 +54,7 @@ from khala_orchestrator.config import load_task
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from bench.learning.battles import Answered, PlayedBattle
     from bench.learning.crew import Adapter
@@ -71,8 +73,6 @@ GROUP: Final = 8
 """Battles of a group."""
 MOST: Final = 24
 """Tokens of an answer: that of the teacher has 20."""
-TEST_PART: Final = 8
-"""Test battles that are kept together when they are over."""
 CLIP: Final = 1.0
 """Longest gradient of a step."""
 
@@ -189,16 +189,12 @@ class Course:
             begun = time.monotonic()
             adapter = learner.model.adapter()
             first = PRACTICE_SEED + step * given.groups
-            parts = [
-                Part([seed] * PART, temperature=1.0, sampled=GROUP * seed + number)
-                for seed in range(first, first + given.groups)
-                for number in range(GROUP // PART)
-            ]
+            seeds = [seed for seed in range(first, first + given.groups) for _ in range(GROUP)]
             by_seed: dict[int, list[PlayedBattle]] = defaultdict(list)
-            for battles in crew.play(adapter, parts):
-                by_seed[battles[0].seed] += battles
+            for battle in chain.from_iterable(crew.play(adapter, parts_of(seeds, temperature=1.0))):
+                by_seed[battle.seed].append(battle)
             groups = list(by_seed.values())
-            rows = [row for group in groups for row in weigh(learner.model, group)]
+            rows = weigh(learner.model, groups)
             gradients, loss = crew.gradients(adapter, rows) if rows else ((), 0.0)
             learner.step("practised", gradients, given.practice_rate)
             everything = [battle for group in groups for battle in group]
@@ -215,10 +211,7 @@ class Course:
         adapter = learner.model.adapter()
 
         def play(temperature: float, seeds: Sequence[int]) -> Iterator[PlayedBattle]:
-            starts = range(0, len(seeds), TEST_PART)
-            parts = [Part(seeds[start : start + TEST_PART], temperature, sampled=seeds[start]) for start in starts]
-            for battles in crew.play(adapter, parts):
-                yield from battles
+            yield from chain.from_iterable(crew.play(adapter, parts_of(seeds, temperature)))
 
         self._test(name, partial(play, 0.0))
         self._test(name + SAMPLED, partial(play, 1.0))
@@ -255,15 +248,24 @@ class Course:
         _tell(f"{stage} {step + 1}: {said}, {wall_s:.0f} s; {left:.0f} minutes are left of this stage")
 
 
-def weigh(model: SmallModel, group: Sequence[PlayedBattle]) -> list[Row]:
-    """Return the decisions of a group, each once, with the sum of the advantages of the battles that took it as weight.
+def parts_of(seeds: Sequence[int], temperature: float) -> list[Part]:
+    """Return battles with some seeds, which may repeat, in parts; each samples with a seed of its own."""
+    starts = range(0, len(seeds), PART)
+    return [Part(seeds[start : start + PART], temperature, sampled=GROUP * seeds[start] + start) for start in starts]
 
-    What battles on both sides of the mean said alike may cancel out; then it is left out.
+
+def weigh(model: SmallModel, groups: Iterable[Sequence[PlayedBattle]]) -> list[Row]:
+    """Return the decisions of groups, each once, with the sum of its advantages as weight.
+
+    An advantage is that of the battle in its group, plus 1 for an order that was carried out, less the share of such
+    orders in the group. What counts for and against a decision may cancel out; then it is left out.
     """
     weights: dict[tuple[tuple[ChatMessage, ...], tuple[int, ...]], float] = defaultdict(float)
-    for battle, advantage in zip(group, advantages([battle.reward for battle in group]), strict=True):
-        for answered in battle.answered:
-            weights[answered.prompt, answered.answer.tokens] += advantage
+    for group in groups:
+        legal = fmean(answered.obeyed for battle in group for answered in battle.answered)
+        for battle, advantage in zip(group, advantages([battle.reward for battle in group]), strict=True):
+            for answered in battle.answered:
+                weights[answered.prompt, answered.answer.tokens] += advantage + answered.obeyed - legal
     return [
         Row(model.tokens(prompt), list(tokens), weight)
         for (prompt, tokens), weight in weights.items()

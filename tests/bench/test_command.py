@@ -30,7 +30,7 @@ SHORT = {
     "abilities": (),
     "games_per_hour": ("--tasks", "2s3z_pair", "--games", "2", "--jobs", "2"),
     "sessions": ("--clients", "2", "--seconds", "1"),
-    "env": ("--maps", "2s3z", "--seconds", "0.1", "--rounds", "1", "--at-once", "1"),
+    "env": ("--maps", "2s3z", "--seconds", "0.1", "--rounds", "1", "--envs", "1"),
 }
 """By measurement, the options of its shortest run."""
 

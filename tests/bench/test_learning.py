@@ -88,9 +88,10 @@ def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_b
     alike = Answered(prompt, Answer("a", (4, 2)))
     better = PlayedBattle(7, [alike] + [Answered(prompt, Answer("b", (5, 2)))] * 2, reward=0.5)
     worse = PlayedBattle(7, [alike, Answered(prompt, Answer("c", (6, 2))), Answered(prompt, Answer(""))], reward=-0.5)
-    rows = learns.weigh(model, [better, worse])
+    rows = learns.weigh(model, [[better, worse]])
     assert [(row.answer[0], row.weight) for row in rows] == [(5, 2.0), (6, -1.0)]
-    assert learns.weigh(model, [worse, worse]) == []
+    assert [row.weight for row in learns.weigh(model, [[better, worse]] * 2)] == [4.0, -2.0]
+    assert learns.weigh(model, [[worse, worse]]) == []
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from bench.registry import BENCH, BENCHMARKS, having
 if TYPE_CHECKING:
     from bench.registry import Benchmark
 
-SCRIPTS = {"__main__", "environments.env_worker", "environments.vector_worker", "simulator.at_once"}
+SCRIPTS = {"__main__", "environments.env_worker", "simulator.at_once"}
 """The command itself, and what benchmarks start as processes of their own."""
 MEASUREMENTS = (ROOT / "docs" / "measurements.md").read_text(encoding="utf-8")
 CALL = re.compile(r"python -m\s+bench(?:[ \n](?P<name>[a-z]\w*)|\.\w+)")
