@@ -6,7 +6,9 @@ matter which process takes it.
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
+import signal
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 
 PART: Final = 16
 """Battles that a process plays in lockstep: the model answers 16 prompts in hardly more time than one."""
+
+PARENT_DIED: Final = 1
+"""What `prctl` of Linux calls the signal that a process gets when its parent ends."""
 
 GAMES_LOST: Final = 3
 """Times that a part is played again because a game was lost."""
@@ -99,6 +104,7 @@ _workers: list[_Worker] = []
 
 
 def _begin(worker: _Worker) -> None:
+    ctypes.CDLL(None).prctl(PARENT_DIED, signal.SIGKILL)  # else a course that is killed leaves its processes behind
     _workers.append(worker)
 
 

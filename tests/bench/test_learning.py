@@ -95,6 +95,20 @@ def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_b
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_an_answer_that_was_refused_weighs_less_than_one_that_was_carried_out() -> None:
+    """Needs the group `learning`."""
+    pytest.importorskip("peft")
+    learns: Any = importlib.import_module("bench.learning.learns")
+    model = SimpleNamespace(tokens=lambda prompt: [len(prompt)])
+    prompt = (ChatMessage(role="user", content="U"),)
+    obeyed = PlayedBattle(7, [Answered(prompt, Answer("a", (4, 2)))])
+    refused = PlayedBattle(7, [Answered(prompt, Answer("b", (5, 2)), obeyed=False)])
+    rows = learns.weigh(model, [[obeyed, refused]])
+    assert [(row.answer[0], row.weight) for row in rows] == [(4, 0.5), (5, -0.5)]
+
+
+@pytest.mark.slow
 @pytest.mark.game
 def test_the_teacher_wins_with_the_shortest_answers_and_a_silent_player_does_not() -> None:
     task = load_task(str(ROOT / "bench" / "learning" / "learns_3m.yaml"))
