@@ -167,7 +167,7 @@ class Learner:
         loss.backward()
         nn.utils.clip_grad_norm_(self._weights, self.settings.most_gradient)
         self._adam.step()
-        return float(loss)
+        return float(loss.detach())
 
     def returns(self, rewards: torch.Tensor, there: torch.Tensor, ahead: torch.Tensor) -> torch.Tensor:
         """Return the TD(lambda) returns, all [steps, episodes]; `ahead` is the value of each step, if it is there."""
