@@ -47,15 +47,12 @@ class Single(Batch):
         self._rng = np.random.default_rng(1)
         self._envs = [self._make(map_name, seed) for seed in range(1, envs + 1)]
         for env in self._envs:
-            self._reset(env)
+            env.reset()
 
     def _make(self, map_name: str, seed: int) -> Any:
         from khala_sc2.env.numeric import StarCraft2Env  # noqa: PLC0415  # see above
 
         return StarCraft2Env(map_name, seed=seed)
-
-    def _reset(self, env: Any) -> None:
-        env.reset()
 
     def _can(self, env: Any) -> Any:
         return env.masks()
@@ -70,7 +67,7 @@ class Single(Batch):
         for env in self._envs:
             masks = self._can(env)
             if self._play(env, (self._rng.random(masks.shape) * masks).argmax(-1)):
-                self._reset(env)
+                env.reset()
         return len(self._envs)
 
     def processes(self) -> list[int]:

@@ -45,7 +45,7 @@ class Part(NamedTuple):
     seeds: Sequence[int]
     temperature: float
     """Of the tokens; 0 for the likeliest."""
-    sampled: int = 0
+    sampled: int
     """Seed of the sampling."""
 
 
@@ -80,10 +80,10 @@ class Crew:
         """End the processes after the work that they have begun."""
         self._pool.shutdown(cancel_futures=True)
 
-    def play(self, adapter: Adapter, parts: Sequence[Part]) -> Iterator[list[PlayedBattle]]:
-        """Yield the battles of each part when they are over."""
+    def play(self, adapter: Adapter, parts: Sequence[Part]) -> Iterator[PlayedBattle]:
+        """Yield the battles of each part when all of them are over."""
         for done in as_completed([self._pool.submit(_play, adapter, part) for part in parts]):
-            yield done.result()
+            yield from done.result()
 
     def gradients(self, adapter: Adapter, rows: Sequence[Row]) -> tuple[Adapter, float]:
         """Return the gradient of a batch, by parameter, and its loss, the mean over its tokens.

@@ -27,7 +27,6 @@ import sys
 import time
 from collections import defaultdict
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, Final
@@ -191,7 +190,7 @@ class Course:
             first = PRACTICE_SEED + step * given.groups
             seeds = [seed for seed in range(first, first + given.groups) for _ in range(GROUP)]
             by_seed: dict[int, list[PlayedBattle]] = defaultdict(list)
-            for battle in chain.from_iterable(crew.play(adapter, parts_of(seeds, temperature=1.0))):
+            for battle in crew.play(adapter, parts_of(seeds, temperature=1.0)):
                 by_seed[battle.seed].append(battle)
             groups = list(by_seed.values())
             rows = weigh(learner.model, groups)
@@ -211,7 +210,7 @@ class Course:
         adapter = learner.model.adapter()
 
         def play(temperature: float, seeds: Sequence[int]) -> Iterator[PlayedBattle]:
-            yield from chain.from_iterable(crew.play(adapter, parts_of(seeds, temperature)))
+            return crew.play(adapter, parts_of(seeds, temperature))
 
         self._test(name, partial(play, 0.0))
         self._test(name + SAMPLED, partial(play, 1.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from khala_protocol.messages import ChatMessage
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+PROMPT = (ChatMessage(role="user", content="U"),)
 
 
 def test_the_shortest_form_of_a_reply_is_its_calls() -> None:
@@ -77,34 +80,34 @@ def test_results_are_counted_by_player(tmp_path: Path) -> None:
     assert taught["low"] < 0.5 < taught["high"]
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_better_than_the_others() -> None:
-    """Needs the group `learning`."""
+@pytest.fixture
+def weigh() -> Any:
+    """Return the function, with a model whose prompts have one token; it needs the group `learning`."""
     pytest.importorskip("peft")
     learns: Any = importlib.import_module("bench.learning.learns")
-    model = SimpleNamespace(tokens=lambda prompt: [len(prompt)])
-    prompt = (ChatMessage(role="user", content="U"),)
-    alike = Answered(prompt, Answer("a", (4, 2)))
-    better = PlayedBattle(7, [alike] + [Answered(prompt, Answer("b", (5, 2)))] * 2, reward=0.5)
-    worse = PlayedBattle(7, [alike, Answered(prompt, Answer("c", (6, 2))), Answered(prompt, Answer(""))], reward=-0.5)
-    rows = learns.weigh(model, [[better, worse]])
+    return partial(learns.weigh, SimpleNamespace(tokens=lambda prompt: [len(prompt)]))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_decision_of_a_group_weighs_as_much_as_the_battles_that_took_it_were_better_than_the_others(
+    weigh: Any,
+) -> None:
+    alike = Answered(PROMPT, Answer("a", (4, 2)))
+    better = PlayedBattle(7, [alike] + [Answered(PROMPT, Answer("b", (5, 2)))] * 2, reward=0.5)
+    worse = PlayedBattle(7, [alike, Answered(PROMPT, Answer("c", (6, 2))), Answered(PROMPT, Answer(""))], reward=-0.5)
+    rows = weigh([[better, worse]])
     assert [(row.answer[0], row.weight) for row in rows] == [(5, 2.0), (6, -1.0)]
-    assert [row.weight for row in learns.weigh(model, [[better, worse]] * 2)] == [4.0, -2.0]
-    assert learns.weigh(model, [[worse, worse]]) == []
+    assert [row.weight for row in weigh([[better, worse]] * 2)] == [4.0, -2.0]
+    assert weigh([[worse, worse]]) == []
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_an_answer_that_was_refused_weighs_less_than_one_that_was_carried_out() -> None:
-    """Needs the group `learning`."""
-    pytest.importorskip("peft")
-    learns: Any = importlib.import_module("bench.learning.learns")
-    model = SimpleNamespace(tokens=lambda prompt: [len(prompt)])
-    prompt = (ChatMessage(role="user", content="U"),)
-    obeyed = PlayedBattle(7, [Answered(prompt, Answer("a", (4, 2)))])
-    refused = PlayedBattle(7, [Answered(prompt, Answer("b", (5, 2)), obeyed=False)])
-    rows = learns.weigh(model, [[obeyed, refused]])
+def test_an_answer_that_was_refused_weighs_less_than_one_that_was_carried_out(weigh: Any) -> None:
+    obeyed = PlayedBattle(7, [Answered(PROMPT, Answer("a", (4, 2)))])
+    refused = PlayedBattle(7, [Answered(PROMPT, Answer("b", (5, 2)), obeyed=False)])
+    rows = weigh([[obeyed, refused]])
     assert [(row.answer[0], row.weight) for row in rows] == [(4, 0.5), (5, -0.5)]
 
 

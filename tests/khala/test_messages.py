@@ -70,8 +70,11 @@ def test_a_message_that_no_rule_judges_is_an_error() -> None:
 
 
 @pytest.mark.slow
-def test_messages_of_a_full_game_are_true_and_not_said_over_and_over() -> None:
-    found = measure("simple64_sceb", steps=200, seed=1)
-    assert sum(found.said.values()) > 20
-    assert found.share >= GOAL
-    assert found.again < 2 / 3 * sum(found.said.values())  # seeds 1 to 4: 15, 12, 5, 5 of 28, 26, 28, 28
+def test_messages_of_full_games_are_true_and_mostly_said_once() -> None:
+    games = [measure("simple64_sceb", steps=200, seed=seed) for seed in (1, 2, 3)]
+    said = [sum(found.said.values()) for found in games]
+    assert min(said) > 20
+    assert min(found.share for found in games) >= GOAL
+    assert sum(found.again for found in games) < 0.5 * sum(
+        said
+    )  # one game is no measure: 15, 12 and 5 of 28, 26 and 28
