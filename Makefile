@@ -21,7 +21,7 @@ INSTALLED := agents bridge configs khala_sc2 orchestrator protocol simulator
 DISTRIBUTIONS := khala-sc2 khala-sc2-agents khala-sc2-bridge khala-sc2-configs khala-sc2-orchestrator khala-sc2-protocol khala-sc2-simulator
 DIST ?= dist
 
-.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted standards cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted install-standards standards cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -98,7 +98,9 @@ PYTHON_313 ?= $(firstword $(foreach p,python3.13 $(wildcard $(HOME)/.pyenv/versi
 	@test -n "$(PYTHON_313)" || { echo "NeMo Gym needs Python 3.13: say make standards PYTHON_313=/path/to/python3.13"; exit 1; }
 	@UV=$(UV) bash .ci/environment .venv-nemo-gym $(PYTHON_313) --python-version 3.13.14 "nemo-gym>=0.7,<0.8"
 
-standards: install-tests .venv-verifiers/.ready .venv-nemo-gym/.ready ## The checks of verifiers and NeMo Gym, each in an environment of its own
+install-standards: .venv-verifiers/.ready .venv-nemo-gym/.ready ## Install verifiers and NeMo Gym, without which `make slow` leaves out their checks
+
+standards: install-tests install-standards ## The checks of verifiers and NeMo Gym, each in an environment of its own
 	$(RUN)pytest -m "slow or not slow" tests/standards
 
 cover: install-tests ## Branch coverage of packages by their own tests; fails below COVERED per cent

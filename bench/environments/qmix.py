@@ -54,7 +54,7 @@ class Settings:
 
 
 class Step(NamedTuple):
-    """A step of a battle, the steps of an episode, [steps, ...], or those of a batch, [steps, episodes, ...]."""
+    """A step of a battle, or the steps of an episode or of a batch, [steps, ...]."""
 
     seen: Any
     """[..., agents, size], with what an agent did last and its number."""
@@ -67,19 +67,47 @@ class Step(NamedTuple):
     """[...]."""
 
 
+class Batch(NamedTuple):
+    """Steps of some episodes: the first steps of all of them, then the second ones, and so on while any goes on."""
+
+    steps: Step
+    there: NDArray[np.bool_]
+    """[time, episodes]: whether the episode has such a step; the longest episodes come first."""
+
+
 class Agent(nn.Module):  # type: ignore[misc]  # torch is not installed where types are checked
-    """Values of an agent's actions, from all that it has seen."""
+    """Values of an agent's actions, from all that it has seen; between two layers is a gated recurrent unit.
+
+    torch's own unit plays episodes of different lengths either to the end of the longest or, packed, ten times as long.
+    """
 
     def __init__(self, inputs: int, hidden: int, actions: int) -> None:
         super().__init__()
         self.below = nn.Linear(inputs, hidden)
-        self.memory = nn.GRU(hidden, hidden)
+        self.reads = nn.Linear(hidden, 3 * hidden)
+        self.remembers = nn.Linear(hidden, 3 * hidden)
         self.above = nn.Linear(hidden, actions)
 
-    def forward(self, seen: torch.Tensor, memory: torch.Tensor | None = None) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return [steps, rows, actions] values for [steps, rows, inputs], and the memory after them."""
-        out, memory = self.memory(F.relu(self.below(seen)), memory)
-        return self.above(out), memory
+    def forward(
+        self, seen: torch.Tensor, at_once: list[int], memory: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return [rows, actions] values for [rows, inputs], and the memory after them, [rows of the last moment, size].
+
+        `at_once` says how many rows each moment has: as many as the one before, or only its first ones.
+        """
+        memories = []
+        if memory is None:
+            memory = seen.new_zeros(at_once[0], self.above.in_features)
+        for read in self.reads(F.relu(self.below(seen))).split(at_once):
+            memory = self._remember(read, memory[: len(read)])
+            memories.append(memory)
+        return self.above(torch.cat(memories)), memory
+
+    def _remember(self, read: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
+        read_gates, read_new = read.tensor_split((2 * memory.shape[1],), 1)
+        gates, old = self.remembers(memory).tensor_split((2 * memory.shape[1],), 1)
+        keep, use = (read_gates + gates).sigmoid().chunk(2, 1)
+        return torch.lerp((read_new + use * old).tanh(), memory, keep)
 
 
 class Mixer(nn.Module):  # type: ignore[misc]  # see above
@@ -99,6 +127,18 @@ class Mixer(nn.Module):  # type: ignore[misc]  # see above
         weights = self.weights(states).abs().unflatten(-1, (self._agents, self._mixed))
         inner = F.elu((values[..., None] * weights).sum(-2) + self.bias(states))
         return (inner * self.last_weights(states).abs()).sum(-1) + self.last_bias(states).squeeze(-1)
+
+
+def _unroll(agent: Agent, seen: torch.Tensor, there: torch.Tensor) -> torch.Tensor:
+    """Return [steps, agents, actions] values of a batch's steps; each agent of each episode has a memory of its own."""
+    agents = seen.shape[1]
+    values: torch.Tensor = agent(seen.flatten(0, 1), (there.sum(1) * agents).tolist())[0]
+    return values.unflatten(0, (-1, agents))
+
+
+def _by_time(rows: torch.Tensor, there: torch.Tensor) -> torch.Tensor:
+    """Return [time, episodes] numbers of a batch's steps, 0 where there is none."""
+    return torch.zeros(there.shape).masked_scatter(there, rows)
 
 
 def _two_layers(inputs: int, hidden: int, outputs: int) -> nn.Module:
@@ -149,20 +189,17 @@ class Learner:
 
         return act
 
-    def learn(self, batch: Step) -> float:
-        """Learn from a batch of episodes, and return the loss; rewards are NaN where an episode is over."""
-        masks = torch.from_numpy(batch.masks)
-        actions = torch.from_numpy(batch.actions)[..., None]
-        rewards = torch.from_numpy(batch.rewards)
-        states = torch.from_numpy(batch.states)
-        there = ~rewards.isnan()
-        values = self._unroll(self.agent, batch.seen)
-        team = self.mixer(values.gather(-1, actions).squeeze(-1), states)
+    def learn(self, batch: Batch) -> float:
+        """Learn from a batch of episodes, and return the loss."""
+        seen, masks, states, actions, rewards = map(torch.from_numpy, batch.steps)
+        there = torch.from_numpy(batch.there)
+        values = _unroll(self.agent, seen, there)
+        team = self.mixer(values.gather(-1, actions[..., None]).squeeze(-1), states)
         with torch.no_grad():
             best = values.masked_fill(~masks, -torch.inf).argmax(-1, keepdim=True)
-            ahead = self._unroll(self._old_agent, batch.seen).gather(-1, best).squeeze(-1)
-            wanted = self.returns(rewards.nan_to_num(), there, self._old_mixer(ahead, states))
-        loss = F.mse_loss(team[there], wanted[there])
+            ahead = self._old_mixer(_unroll(self._old_agent, seen, there).gather(-1, best).squeeze(-1), states)
+            wanted = self.returns(_by_time(rewards, there), there, _by_time(ahead, there))[there]
+        loss = F.mse_loss(team, wanted)
         self._adam.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._weights, self.settings.most_gradient)
@@ -181,11 +218,6 @@ class Learner:
             result[step] = later
         return result
 
-    def _unroll(self, agent: Agent, seen: Array) -> torch.Tensor:
-        """Return [steps, episodes, agents, actions]."""
-        rows: torch.Tensor = agent(torch.from_numpy(seen).flatten(1, 2))[0]
-        return rows.unflatten(1, seen.shape[1:3])
-
     def _step(self, battles: Battles) -> None:
         envs = len(battles.seen)
         if not self._playing:
@@ -199,15 +231,13 @@ class Learner:
         explores = self._rng.random(actions.shape) < chance
         actions = np.where(explores, (self._rng.random(masks.shape) * masks).argmax(-1), actions)
         rewards, over = battles.step(actions)
-        self._last = actions
         for row, playing in enumerate(self._playing):
             playing.append(Step(seen[row], masks[row], states[row], actions[row], np.float32(rewards[row])))
             if over[row]:
                 self.episodes.append(Step(*map(np.stack, zip(*playing, strict=True))))
                 self._playing[row] = []
         self._last = np.where(over[:, None], -1, actions)
-        self._memory = self._memory.unflatten(1, actions.shape)
-        self._memory = (self._memory * torch.from_numpy(~over)[:, None, None]).flatten(1, 2)
+        self._memory *= torch.from_numpy(~over).repeat_interleave(self._sizes.agents)[:, None]
 
     def _inputs(self, seen: Array, last: Array | None) -> Array:
         """Return [envs, agents, size] of what an agent sees, its last action (-1: none) and its number."""
@@ -220,23 +250,19 @@ class Learner:
 
     def _values(self, seen: Array, memory: torch.Tensor | None) -> tuple[Array, torch.Tensor]:
         with torch.no_grad():
-            values, memory = self.agent(torch.from_numpy(seen).flatten(0, 1)[None], memory)
-        return values[0].unflatten(0, seen.shape[:2]).numpy(), memory
+            rows = torch.from_numpy(seen).flatten(0, 1)
+            values, memory = self.agent(rows, [len(rows)], memory)
+        return values.unflatten(0, seen.shape[:2]).numpy(), memory
 
-    def _batch(self) -> Step:
-        """Return some episodes, which are filled up with NaN rewards to the length of the longest."""
+    def _batch(self) -> Batch:
+        """Return some of the episodes that are kept."""
         chosen = self._rng.choice(len(self.episodes), self.settings.batch, replace=False)
-        episodes = [self.episodes[number] for number in chosen]
-        longest = max(len(episode.rewards) for episode in episodes)
-        batch = []
-        for name, parts in zip(Step._fields, zip(*episodes, strict=True), strict=True):
-            rows = np.zeros((longest, len(parts), *parts[0].shape[1:]), parts[0].dtype)
-            if name == "rewards":
-                rows[:] = np.nan
-            for column, part in enumerate(parts):
-                rows[: len(part), column] = part
-            batch.append(rows)
-        return Step(*batch)
+        episodes = sorted((self.episodes[number] for number in chosen), key=lambda one: -len(one.rewards))
+        lengths = np.array([len(episode.rewards) for episode in episodes])
+        there = np.arange(lengths[0])[:, None] < lengths
+        time, episode = np.nonzero(there)
+        rows = (lengths.cumsum() - lengths)[episode] + time
+        return Batch(Step(*(np.concatenate(parts)[rows] for parts in zip(*episodes, strict=True))), there)
 
     def _renew(self) -> None:
         self._old_agent = copy.deepcopy(self.agent)

@@ -105,6 +105,17 @@ def test_returns_of_qmix_are_those_of_td_lambda() -> None:
     torch.testing.assert_close(learner.returns(rewards, there, ahead), expected)
 
 
+def test_an_agent_of_qmix_remembers_its_own_episode_alone() -> None:
+    torch = pytest.importorskip("torch")
+    from bench.environments import qmix
+
+    agent = qmix.Agent(inputs=3, hidden=4, actions=2)
+    there = torch.tensor([[True, True], [True, False], [True, False]])
+    seen = torch.rand(4, 2, 3)  # of two agents: the first moment of both episodes, then two more of the first one
+    alone = qmix._unroll(agent, seen[[0, 2, 3]][:, 1:], torch.ones(3, 1, dtype=torch.bool))
+    torch.testing.assert_close(qmix._unroll(agent, seen, there)[[0, 2, 3]][:, 1:], alone)
+
+
 def test_a_test_counts_each_battle_once() -> None:
     def attack(_: np.ndarray, masks: np.ndarray) -> np.ndarray:
         """Go east, and attack the first enemy that is near enough."""
