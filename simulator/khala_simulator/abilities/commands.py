@@ -80,7 +80,7 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
 
 def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
     """Attack one unit (a tag) until it is dead; allies too, if the order says so."""
-    victim = world.slot_of(target)
+    victim = tags.slot_of(columns.columns_of(world), target)
     if victim == NOBODY:
         return []
     takers = [s for s in slots if s != victim and can_reach(world, s, victim)]

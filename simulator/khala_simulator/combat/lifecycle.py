@@ -6,6 +6,7 @@ units. Below: ``traits``, ``targets``, the world.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.combat.targets import take_other_weapon
@@ -13,6 +14,7 @@ from khala_simulator.combat.traits import refresh
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
+    from khala_simulator.tables.catalog import Catalog
     from khala_simulator.tables.records import UnitType
     from khala_simulator.world.world import World
 
@@ -27,9 +29,8 @@ def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], 
     world.energy[slot] = world.stats.energy_start[owner, unit.row]
     world.burrowed[slot] = unit.burrowed
     world.contents[slot] = unit.resource_amount
-    autocast = tuple(ability.id for ability in world.catalog.cards[unit.row] if ability.autocast == "on")
-    if autocast and not unit.passive:
-        world.autocast[slot] = autocast
+    if not unit.passive:
+        world.let_use(slot, _used_by_itself(world.catalog, unit.row))
     world.looks_around[slot] = True
     world.visible[:, slot] = not (world.fog or unit.cloaked or unit.burrowed)  # vision refines this
     world.visible[owner, slot] = True
@@ -71,14 +72,19 @@ def _keep_vitals(world: World, slot: int, unit: UnitType, life: float, life_max:
 def _keep_autocast(world: World, slot: int, old: int) -> None:
     """Keep the unit's autocast settings; abilities that only its new type has are as the tables say."""
     known = {ability.id for ability in world.catalog.cards[old]}
-    chosen = world.autocast.pop(slot, ())
+    chosen = world.autocast.get(slot, ())
     wanted = tuple(
         ability.id
         for ability in world.catalog.cards[int(world.type[slot])]
         if ability.id in chosen or (ability.autocast == "on" and ability.id not in known)
     )
-    if wanted:
-        world.autocast[slot] = wanted
+    world.let_use(slot, wanted)
+
+
+@lru_cache(maxsize=4096)
+def _used_by_itself(catalog: Catalog, row: int) -> tuple[int, ...]:
+    """Return the abilities that units of a type use by themselves from the start."""
+    return tuple(ability.id for ability in catalog.cards[row] if ability.autocast == "on")
 
 
 def give(world: World, slot: int, owner: int) -> None:

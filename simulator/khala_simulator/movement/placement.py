@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from khala_simulator.movement import pathfinding
+from khala_simulator.movement import grids
 from khala_simulator.native import columns, memory
-from khala_simulator.tables.layers import Layer, layer_of
+from khala_simulator.tables.layers import layer_of
 from khala_simulator.tables.stats import LAYERS, bit_set
 from khala_simulator.world.columns import NOBODY
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from khala_simulator.native.memory import Cells, Points
     from khala_simulator.numeric.geometry import Floats
     from khala_simulator.tables.records import UnitType
-    from khala_simulator.world.columns import Bools
     from khala_simulator.world.world import World
 
 CANDIDATE_STEP = 0.25
@@ -52,8 +51,7 @@ def _places_within(
 ) -> list[tuple[float, float]]:
     bodiless = bit_set(unit.collide, LAYERS) == 0
     apart = 0.0 if bodiless else 2.0 * unit.radius - ROUNDING
-    at, found = _search(world, unit, point, radius, NOBODY, count, apart)
-    return [(x, y) for x, y in at[found].tolist()]
+    return [(x, y) for x, y in _search(world, unit, point, radius, NOBODY, count, apart).tolist()]
 
 
 def candidates(
@@ -63,15 +61,13 @@ def candidates(
 
     The body of the unit in the slot ``ignoring`` does not count.
     """
-    at, found = _search(world, unit, point, radius, ignoring, -1, 0.0)
-    free: Floats = at[found]
-    return free
+    return _search(world, unit, point, radius, ignoring, -1, 0.0)
 
 
 def _search(
     world: World, unit: UnitType, point: tuple[float, float], radius: float, ignoring: int, most: int, apart: float
-) -> tuple[Floats, list[int]]:
-    """Return (k, 2) places around a point, nearest first, and which of them are free for one more unit.
+) -> Floats:
+    """Return (k, 2) places around a point, nearest first, that are free for one more unit.
 
     Args:
         world: The world.
@@ -82,24 +78,35 @@ def _search(
         most: How many to find, -1 for all.
         apart: How far from each other they have to be.
     """
-    array = np.array(point) + _offsets(radius)
-    on_surface = _on_surface(world, unit, array)
+    x0, y0, x1, y1 = world.map.terrain.playable
+    grid = grids.grid_of(world.ground, layer_of(unit))
     bits = bit_set(unit.collide, LAYERS)
     bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
     bodies = bodies[bodies != ignoring]
-    at = memory.points(array)
-    inside = memory.bools(on_surface)
     slots = memory.ints(bodies)
     c = columns.columns_of(world)
     reach = unit.radius - ROUNDING
     n = len(bodies)
-    found: list[int] = []
-    for i in range(len(array)):
-        if len(found) == most:
+    offsets = _offsets(radius)
+    offset = memory.points(offsets)
+    places: Floats = np.empty((len(offsets) if most < 0 else most, 2))
+    found = memory.points(places)
+    px, py = point
+    count = 0
+    for i in range(len(offsets)):
+        if count == most:
             break
-        if inside[i] and _is_clear(c, slots, n, at[i], reach) and _is_apart(at, found, i, apart):
-            found.append(i)
-    return array, found
+        at = memory.point(px + offset[i].x, py + offset[i].y)
+        if (
+            x0 <= at.x < x1
+            and y0 <= at.y < y1
+            and grid.flat[grids.cell_at(grid, at.x, at.y)]
+            and _is_clear(c, slots, n, at, reach)
+            and _is_apart(found, count, at, apart)
+        ):
+            found[count] = at
+            count += 1
+    return places[:count]
 
 
 def _is_clear(c: Columns, slots: Cells, n: int, at: memory.Point, reach: float) -> bool:
@@ -114,13 +121,13 @@ def _is_clear(c: Columns, slots: Cells, n: int, at: memory.Point, reach: float) 
     return True
 
 
-def _is_apart(at: Points, found: list[int], i: int, apart: float) -> bool:
-    """Return whether a place is far enough from all that were found."""
+def _is_apart(places: Points, count: int, at: memory.Point, apart: float) -> bool:
+    """Return whether a point is far enough from the first places."""
     if apart <= 0.0:
         return True
-    for other in found:
-        x = at[i].x - at[other].x
-        y = at[i].y - at[other].y
+    for i in range(count):
+        x = at.x - places[i].x
+        y = at.y - places[i].y
         if x * x + y * y < apart * apart:
             return False
     return True
@@ -130,16 +137,6 @@ def snap(point: tuple[float, float], size: tuple[int, int]) -> tuple[float, floa
     """Return the centre nearest to ``point`` at which a footprint of ``size`` cells lies on the grid."""
     x, y = (round(v - s / 2.0) + s / 2.0 for v, s in zip(point, size, strict=True))
     return x, y
-
-
-def _on_surface(world: World, unit: UnitType, at: Floats) -> Bools:
-    x0, y0, x1, y1 = world.map.terrain.playable
-    inside: Bools = (at[:, 0] >= x0) & (at[:, 1] >= y0) & (at[:, 0] < x1) & (at[:, 1] < y1)
-    layer = layer_of(unit)
-    if layer is Layer.AIR:
-        return inside
-    surface = pathfinding.surface(world.ground, layer)
-    return inside & surface.flat[surface.cell(at)]
 
 
 @lru_cache(maxsize=16)

@@ -7,6 +7,7 @@ from khala_simulator.world.fields cimport WorldFields
 cdef int64_t NOBODY
 cdef int64_t SCAN_PERIOD
 
-@cython.locals(loop=int64_t, slot=int64_t, lacking=dict)
+@cython.locals(slot=int64_t, abilities=tuple)
 cpdef look_out(WorldFields world)
-cdef _use_first_wanted(WorldFields world, int64_t slot, int64_t owner, dict lacking)
+cdef list _find_casters(WorldFields world)
+cdef _use_first_wanted(WorldFields world, int64_t slot, tuple abilities)

@@ -30,26 +30,30 @@ FREE: Final = frozenset({OrderKind.IDLE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_M
 
 def look_out(world: World) -> None:
     """Make every unit with autocast use its abilities, in the order of slots."""
-    loop = world.loop
-    if not world.autocast or loop % SCAN_PERIOD:
+    if not world.autocast or world.loop % SCAN_PERIOD:
         return
-    lacking: dict[tuple[int, int], bool] = {}
-    for slot in sorted(world.autocast):
+    if world.casters is None:
+        world.casters = _find_casters(world)
+    for slot, abilities in world.casters:
         c = columns.columns_of(world)
-        if c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]:
-            _use_first_wanted(world, slot, c.owner[slot], lacking)
+        if c.alive[slot] and c.carrier[slot] == NOBODY and c.can_cast[slot] and not c.casts[slot]:
+            _use_first_wanted(world, slot, abilities)
 
 
-def _use_first_wanted(world: World, slot: int, owner: int, lacking: dict[tuple[int, int], bool]) -> None:
-    """Make a unit use the first of its abilities that its player would want now.
+def _find_casters(world: World) -> list[tuple[int, tuple[int, ...]]]:
+    """Return who may use which abilities by itself, by slot: those for which its player has the upgrades."""
+    casters = []
+    for slot, abilities in sorted(world.autocast.items()):
+        owner = int(world.owner[slot])
+        usable = tuple(number for number in abilities if not lacks_upgrade(world, owner, number))
+        if usable:
+            casters.append((slot, usable))
+    return casters
 
-    ``lacking`` has what was found for other units: by player and ability, whether an upgrade is missing.
-    """
-    for number in world.autocast[slot]:
-        if (owner, number) not in lacking:
-            lacking[owner, number] = lacks_upgrade(world, owner, number)
-        if lacking[owner, number]:
-            continue
+
+def _use_first_wanted(world: World, slot: int, abilities: tuple[int, ...]) -> None:
+    """Make a unit use the first of its abilities that its player would want now."""
+    for number in abilities:
         if attempt(world, slot, casting.as_is(world, slot, world.catalog.ability(number))):
             return
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from khala_simulator.combat import buffs
 from khala_simulator.combat.damage import apply_damage
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.creep import GENERATING, spreads
@@ -27,12 +28,14 @@ WITHERING: Final = "ZergBuildingNotOnCreep"
 
 def spread(world: World) -> None:
     """Look for new and lost sources, take the steps that are due, and harm structures that have lost their creep."""
+    if world.bare_at == world.population:
+        return
     creep = world.growth
     if creep.looked_at != world.population or ((creep.sources or creep.has_makers) and world.loop % LOOK_PERIOD == 0):
         _look_over(world)
     if creep.sources and creep.due <= world.loop:
         _step(world)
-    if world.growth.withering.size:
+    if creep.withering:
         _wither(world)
 
 
@@ -40,9 +43,13 @@ def _look_over(world: World) -> None:
     """Compare the sources with the present units."""
     creep = world.growth
     creep.looked_at = world.population
-    slots = world.live[makers(world.catalog)[world.type[world.live]]]
-    creep.has_makers = bool(slots.size)
-    stand = {world.tag_of(s): s for s in slots.tolist() if _generates(world, s)}
+    standing = _of_types(world, makers(world.catalog))
+    creep.withering = _of_types(world, needy(world.catalog))
+    creep.has_makers = bool(standing)
+    if not (standing or creep.withering or creep.sources):
+        world.bare_at = world.population
+        return
+    stand = {world.tag_of(s): s for s in standing if _generates(world, s)}
     for source in creep.sources:
         slot = stand.get(source.tag, NOBODY)
         if source.fades:
@@ -57,7 +64,15 @@ def _look_over(world: World) -> None:
         creep.add(tag, world.unit_type(slot).name, _cell(world, slot), world.loop, grown=_old(world, slot))
     if stand:
         creep.settle()
-    world.growth.withering = world.live[needy(world.catalog)[world.type[world.live]]]
+
+
+def _of_types(world: World, wanted: Bools) -> list[int]:
+    """Return the living units whose type is marked in (unit rows,), by slot."""
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    marked = memory.bools(wanted)
+    return [slots[i] for i in range(len(live)) if marked[c.type[slots[i]]]]
 
 
 def _generates(world: World, slot: int) -> bool:
@@ -110,7 +125,7 @@ def _wither(world: World) -> None:
     period = world.catalog.buff(WITHERING).period_loops
     if int(world.loop / period) == int((world.loop - 1) / period):
         return
-    for slot in world.growth.withering.tolist():
+    for slot in world.growth.withering:
         if world.build_progress[slot] >= 1.0 and not world.on_creep(slot):
             apply_damage(world, NOBODY, int(world.owner[slot]), slot, MECHANICS.off_creep_damage)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from khala_simulator.abilities.registry import DEATHS, FINALS
 from khala_simulator.native import columns, memory
-from khala_simulator.numeric.arrays import which
+from khala_simulator.world import roll
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
 
@@ -39,20 +39,23 @@ def _find_dead(world: World) -> list[int]:
 
 
 def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
-    attacker, owner = int(world.attacker[slot]), int(world.owner[slot])
-    killer = int(world.owner[attacker]) if attacker != NOBODY else killers.get(slot, NO_KILLER)
+    c = columns.columns_of(world)
+    attacker, owner = c.attacker[slot], c.owner[slot]
+    killer = c.owner[attacker] if attacker != NOBODY else killers.get(slot, NO_KILLER)
     name = world.unit_type(slot).name
     if name in DEATHS:
         DEATHS[name](world, slot)
     if len(world.buffs):
         _last_of_buffs(world, slot)
     _note(world, slot, killer)
-    for passenger in world.passengers(slot):
+    for passenger in roll.passengers(world, slot):
         world.life[passenger] = 0.0
         _note(world, passenger, killer)
         world.remove(passenger)
-    n = world.top
-    killers.update(dict.fromkeys(which((world.attacker[:n] == slot) & (world.life[:n] <= 0.0)).tolist(), owner))
+    c = columns.columns_of(world)
+    for victim in range(world.top):
+        if c.attacker[victim] == slot and c.life[victim] <= 0.0:
+            killers[victim] = owner
     world.remove(slot)
 
 

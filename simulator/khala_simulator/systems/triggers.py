@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from khala_simulator.maps.game_map import GameMap
-    from khala_simulator.maps.scenario import Scenario
     from khala_simulator.maps.script import Condition, EnterSpec, NumberCondition, TouchSpec, Trigger, When, Who
     from khala_simulator.world.columns import Ints
     from khala_simulator.world.world import Death, World
@@ -47,9 +46,9 @@ def start(world: World) -> None:
 
 def run(world: World) -> None:
     """Run the triggers that are due at this loop, in the scenario's order, until one ends the game."""
-    scenario = world.map.scenario
-    if len(world.deaths) == world.deaths_seen and not scenario.watches and not _is_time(scenario, world.loop):
+    if len(world.deaths) == world.deaths_seen and not world.watches and not _is_time(world):
         return
+    scenario = world.map.scenario
     deaths = world.deaths[world.deaths_seen :]
     world.deaths_seen = len(world.deaths)
     for number, trigger in enumerate(scenario.triggers):
@@ -62,12 +61,12 @@ def run(world: World) -> None:
         melee_start.judge(world)
 
 
-def _is_time(scenario: Scenario, loop: int) -> bool:
-    """Return whether a loop is one at which a trigger is due."""
-    if loop in scenario.moments:
+def _is_time(world: World) -> bool:
+    """Return whether this loop is one at which a trigger is due."""
+    if world.loop in world.moments:
         return True
-    for period in scenario.periods:  # noqa: SIM110  # a generator costs more than the question
-        if loop % period == 0:
+    for period in world.periods:  # noqa: SIM110  # a generator costs more than the question
+        if world.loop % period == 0:
             return True
     return False
 

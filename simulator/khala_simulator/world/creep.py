@@ -97,7 +97,7 @@ class Creep:
         self.sources: list[CreepSource] = []
         self.has_makers = False  # whether any unit lives that makes creep, or could
         self.waiting: dict[int, tuple[float, float, int]] = {}  # tag -> where and since when a source by choice stands
-        self.withering: Ints = np.zeros(0, dtype=np.int64)  # slots of structures that need creep
+        self.withering: list[int] = []  # slots of structures that need creep
         self.looked_at = -1  # the population that the sources were last compared with
         self.due = 0.0  # loop at which the next source takes a step
         self._painted: Bools = terrain.creep

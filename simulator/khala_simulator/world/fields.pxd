@@ -9,6 +9,9 @@ cdef class WorldFields:
     cdef public object ground
     cdef public object growth
     cdef public object script
+    cdef public bint watches
+    cdef public frozenset moments
+    cdef public tuple periods
     cdef public object buffs
     cdef public list players
     cdef public bint fog
@@ -44,6 +47,8 @@ cdef class WorldFields:
     cdef public object bodies
     cdef public object steps
     cdef public object census
+    cdef public list casters
+    cdef public int64_t bare_at
     cdef public object tally
     cdef public int64_t tallied
     cdef public tuple regenerating

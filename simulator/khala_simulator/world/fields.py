@@ -28,6 +28,8 @@ class WorldFields:
         self.bodies: object | None = None  # room for what is measured between them, for ``contacts``
         self.steps: object | None = None  # room for the steps of those that walk, for ``movement``
         self.census: object | None = None  # of this population, for ``census``
+        self.casters: list[tuple[int, tuple[int, ...]]] | None = None  # who may use what by itself, for ``autocast``
+        self.bare_at = -1  # the population in which nothing makes creep or needs it
         self.tally: NDArray[np.int64] | None = None  # how many of each type each player has, for ``requirements``
         self.tallied = -1  # the loop in which that was counted
         self.regenerating = (False, False, False)  # whether any unit regains shields, life, energy
