@@ -20,13 +20,9 @@ from khala_simulator.process.status import AFTER, LEGAL, Status
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.mechanics import entries
 from khala_simulator.tables.versions import DEFAULT_VERSION, VERSION_OF_BUILD
-from khala_simulator.tick import SYSTEMS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from khala_simulator.tables.mechanics import Constant
-    from khala_simulator.world.world import World
 
 SOURCES = "SOURCES.md"
 REFUSAL = "not supported"
@@ -47,7 +43,7 @@ def page() -> str:
         "The systems of the world, in the order in which they run.",
         table(
             ("system", "in words"),
-            [(code(system.__module__.rpartition(".")[2]), _system(system)) for system in SYSTEMS],
+            [(code(name), _system(name)) for name in _systems()],
         ),
         "## What a player can order",
         _abilities(),
@@ -82,8 +78,16 @@ def _tables() -> str:
     return table(("tables of version", "build", "unit types", "weapons", "upgrades", "installed by"), rows)
 
 
-def _system(system: Callable[[World], None]) -> str:
-    return (inspect.getdoc(sys.modules[system.__module__]) or "").split("\n\n", maxsplit=1)[0]
+def _systems() -> list[str]:
+    """Return the modules of the systems, in the order in which a loop calls them."""
+    tree = ast.parse((resources.files("khala_simulator") / "tick.py").read_text(encoding="utf-8"))
+    loop = next(part for part in tree.body if isinstance(part, ast.FunctionDef) and part.name == "play_loop")
+    calls = sorted((part for part in ast.walk(loop) if isinstance(part, ast.Call)), key=lambda call: call.lineno)
+    return [ast.unparse(call.func).partition(".")[0] for call in calls]
+
+
+def _system(name: str) -> str:
+    return (inspect.getdoc(sys.modules[f"khala_simulator.systems.{name}"]) or "").split("\n\n", maxsplit=1)[0]
 
 
 def _abilities() -> str:

@@ -6,7 +6,7 @@ file of ``systems`` per line.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from khala_simulator.native import engine
 from khala_simulator.systems import (
@@ -42,46 +42,13 @@ from khala_simulator.systems import (
 from khala_simulator.world.world import World
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from khala_simulator.maps.game_map import GameMap
     from khala_simulator.tables.catalog import Catalog
     from khala_simulator.world.players import PlayerSetup
 
 engine.check()
-
-SYSTEMS: Final[tuple[Callable[[World], None], ...]] = (
-    death.bury,  # what a debug command killed since the last loop
-    opponents.run,  # computer players give their orders
-    orders.carry_out,  # finished orders end, queued ones begin
-    acquire.choose_targets,  # units choose their targets
-    autocast.look_out,  # units use abilities with autocast
-    engagement.measure,  # which units are in reach of their target, and where each wants to walk
-    power.run,  # which structures have power
-    construction.run,  # what is being built
-    casts.carry_on,  # abilities are prepared, take effect, go on
-    death.bury,  # what an ability killed at once: it makes, mines and hits nothing more
-    production.run,  # queues of structures and eggs
-    harvest.run,  # workers take, deliver and come again
-    passives.run,  # what units do by their nature
-    weapons.fire,  # attacks start, take effect, cool down
-    navigation.find_ways,  # the next corner on the way to every goal
-    avoidance.find_headings,  # around bodies in the way
-    movement.move,  # steps, turning, acceleration
-    collision.separate,  # bodies and walls
-    missiles.fly,
-    sweeps.run,  # lines of hits in progress
-    hits.fall_due,
-    area_effects.run,  # storms, scans and other effects on the ground
-    buffs.run_out,
-    idleness.count,
-    regeneration.regenerate,
-    creep.spread,
-    lifetimes.run_out,
-    death.bury,
-    vision.look,
-    triggers.run,  # the map's own script, which may end the game
-)
 
 
 def new_game(
@@ -108,16 +75,51 @@ def new_game(
     return world
 
 
-def advance(world: World, loops: int = 1, systems: Sequence[Callable[[World], None]] | None = None) -> int:
-    """Advance by up to ``loops`` game loops; return how many, fewer when the game ends on the way.
+def play_loop(world: World, *, fights: bool = True) -> None:
+    """Play one game loop: every system in turn.
 
-    ``systems`` are ``SYSTEMS`` unless the caller, such as a test, names others.
+    Args:
+        world: The world.
+        fights: Whether units pick fights by themselves; False is for tests of what else they do.
     """
-    chosen = SYSTEMS if systems is None else systems
+    world.loop += 1
+    death.bury(world)  # what a debug command killed since the last loop
+    opponents.run(world)  # computer players give their orders
+    orders.carry_out(world)  # finished orders end, queued ones begin
+    if fights:
+        acquire.choose_targets(world)  # units choose their targets
+    autocast.look_out(world)  # units use abilities with autocast
+    engagement.measure(world)  # which units are in reach of their target, and where each wants to walk
+    power.run(world)  # which structures have power
+    construction.run(world)  # what is being built
+    casts.carry_on(world)  # abilities are prepared, take effect, go on
+    death.bury(world)  # what an ability killed at once: it makes, mines and hits nothing more
+    production.run(world)  # queues of structures and eggs
+    harvest.run(world)  # workers take, deliver and come again
+    passives.run(world)  # what units do by their nature
+    weapons.fire(world)  # attacks start, take effect, cool down
+    navigation.find_ways(world)  # the next corner on the way to every goal
+    avoidance.find_headings(world)  # around bodies in the way
+    movement.move(world)  # steps, turning, acceleration
+    collision.separate(world)  # bodies and walls
+    missiles.fly(world)
+    sweeps.run(world)  # lines of hits in progress
+    hits.fall_due(world)
+    area_effects.run(world)  # storms, scans and other effects on the ground
+    buffs.run_out(world)
+    idleness.count(world)
+    regeneration.regenerate(world)
+    creep.spread(world)
+    lifetimes.run_out(world)
+    death.bury(world)
+    vision.look(world)
+    triggers.run(world)  # the map's own script, which may end the game
+
+
+def advance(world: World, loops: int = 1, *, fights: bool = True) -> int:
+    """Play up to ``loops`` game loops; return how many, fewer when the game ends on the way."""
     for done in range(loops):
         if world.ended:
             return done
-        world.loop += 1
-        for system in chosen:
-            system(world)
+        play_loop(world, fights=fights)
     return loops

@@ -17,19 +17,20 @@ if TYPE_CHECKING:
 
 def run(world: World) -> None:
     """Run the rule of every type that has one, for all living units of the type."""
-    if world.passive_units_at != world.population:
+    if world.natures_at != world.population:
         _look_over(world)
-    for name, slots in world.passive_units.items():
-        PASSIVES[name](world, slots)
+    for rule, slots in world.natures:
+        rule(world, slots)
 
 
 def _look_over(world: World) -> None:
     """List the units whose types have a rule, after a unit came or went."""
-    world.passive_units_at = world.population
-    world.passive_units = {}
+    world.natures_at = world.population
+    of_type: dict[str, list[int]] = {}
     slots = world.live[_has_rule(world.catalog).take(world.type.take(world.live))]
     for slot in slots.tolist():
-        world.passive_units.setdefault(world.unit_type(slot).name, []).append(slot)
+        of_type.setdefault(world.unit_type(slot).name, []).append(slot)
+    world.natures = [(PASSIVES[name], slots) for name, slots in of_type.items()]
 
 
 @lru_cache(maxsize=4)

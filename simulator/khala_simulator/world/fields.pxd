@@ -55,8 +55,8 @@ cdef class WorldFields:
     cdef public bint harvesting
     cdef public bint mortal
     cdef public bint hiding
-    cdef public dict passive_units
-    cdef public int64_t passive_units_at
+    cdef public list natures
+    cdef public int64_t natures_at
     cdef public object hands
     cdef public int64_t hands_at
     cdef public tuple opponents

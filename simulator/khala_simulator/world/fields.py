@@ -8,7 +8,7 @@ says for which ``population`` it holds. Values that only a layer above understan
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,8 @@ class WorldFields:
         self.harvesting = False  # whether any unit harvests
         self.mortal = False  # whether any unit's life is timed
         self.hiding = False  # whether any unit is cloaked or burrowed
-        self.passive_units: dict[str, list[int]] = {}  # type's name -> slots of units with a nature, for ``passives``
-        self.passive_units_at = -1  # the population for which this was written
+        self.natures: list[tuple[Any, list[int]]] = []  # what types do by their nature, and whose it is
+        self.natures_at = -1  # the population for which this was written
         self.hands: Ints = np.zeros(0, dtype=np.int64)  # slots of workers and of structures that train
         self.hands_at = -1  # the population for which this was written
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up

@@ -44,6 +44,9 @@ def bare_map(terrain: str = "agria_open", *, fog: bool = False) -> GameMap:
 class Field:
     """A world with short names for what tests do to it."""
 
+    fights = True
+    """Whether units pick fights by themselves."""
+
     def __init__(
         self,
         terrain: str = "agria_open",
@@ -99,13 +102,13 @@ class Field:
             commands.grant_upgrade(self.world, player, self.world.catalog.upgrade(name).id)
 
     def play(self, loops: int) -> World:
-        advance(self.world, loops)
+        advance(self.world, loops, fights=self.fights)
         return self.world
 
     def loops(self, count: int) -> Iterator[int]:
         """Play loop by loop; yield the number of each loop after it."""
         for _ in range(count):
-            advance(self.world)
+            advance(self.world, fights=self.fights)
             yield self.world.loop
 
     def until(self, holds: Callable[[], object], most: int = 500) -> int:

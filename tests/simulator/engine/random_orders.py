@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import random
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from khala_simulator.systems.triggers import players_of
 from khala_simulator.tables.abilities import AbilityAim
 from khala_simulator.tick import advance, new_game
 from khala_simulator.world.world import World
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 FIELD = "llm_smac/corridor"
 EVERY = 8
@@ -69,7 +65,7 @@ def check(world: World) -> None:
     assert (world.energy[world.live] >= 0).all()
 
 
-def play(world: World, seed: int, loops: int, systems: Sequence[Callable[[World], None]] | None = None) -> World:
+def play(world: World, seed: int, loops: int) -> World:
     """Play at most ``loops`` loops with random orders; every debug state that allows more is on."""
     chance = random.Random(seed)
     for player in world.players[1:]:
@@ -78,7 +74,7 @@ def play(world: World, seed: int, loops: int, systems: Sequence[Callable[[World]
     while world.loop < loops and not world.ended:
         if world.loop % EVERY == 0:
             give_orders(world, chance)
-        advance(world, 1, systems)
+        advance(world)
         check(world)
     return world
 

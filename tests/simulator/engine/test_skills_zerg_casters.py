@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_simulator import tick
 from khala_simulator.abilities import commands
 from khala_simulator.combat import buffs
 from khala_simulator.combat.damage import apply_damage
-from khala_simulator.systems import acquire
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 
@@ -27,11 +25,16 @@ CASTERS = {
 }  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def _peace(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep all units from picking fights by themselves."""
-    laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
-    monkeypatch.setattr(tick, "SYSTEMS", laws)
+@pytest.fixture
+def make_field(make_field: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what makes fields in which units do not pick fights by themselves."""
+
+    def make_peaceful(**options: Any) -> Any:
+        field = make_field(**options)
+        field.fights = False
+        return field
+
+    return make_peaceful
 
 
 @pytest.fixture(params=VERSIONS)

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from khala_simulator import tick
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.zerg import larvae
 from khala_simulator.combat import buffs, lifecycle
-from khala_simulator.systems import acquire
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
@@ -32,10 +30,9 @@ def field(request: pytest.FixtureRequest, make_field: Callable[..., Any]) -> Any
 
 
 @pytest.fixture
-def peace(monkeypatch: pytest.MonkeyPatch) -> None:
+def peace(field: Any) -> None:
     """Keep all units from picking fights by themselves."""
-    laws = tuple(law for law in tick.SYSTEMS if law is not acquire.choose_targets)
-    monkeypatch.setattr(tick, "SYSTEMS", laws)
+    field.fights = False
 
 
 def census(field: Any) -> Counter[str]:
