@@ -24,11 +24,11 @@ import math
 import statistics
 import sys
 import time
-from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
+from unittest import mock
 
 from bench.command_line import make_parser
 from khala_sc2.experiment.statistics import wilson
@@ -326,25 +326,25 @@ def grown(options: argparse.Namespace) -> list[Growth]:
 
 def speed(options: argparse.Namespace) -> Iterator[str]:
     """Yield the lines of a table: loops per second of CPU time of a game, and what of it the computer players take."""
-    from khala_simulator import tick  # noqa: PLC0415  # only here its list of systems is changed
-    from khala_simulator.systems import opponents  # noqa: PLC0415
+    think = player.think
+    spent_ns = 0
+
+    def think_in_time(world: World, number: int) -> None:
+        nonlocal spent_ns
+        began = time.process_time_ns()
+        think(world, number)
+        spent_ns += time.process_time_ns() - began
 
     yield "| level | loops | loops/s | without thinking | units |"
     yield f"|{'---|' * 5}"
     for level in options.levels:
-        spent = Counter[str]()
-
-        def time_opponents(world: World, spent: Counter[str] = spent) -> None:
-            began = time.process_time_ns()
-            opponents.run(world)
-            spent["ns"] += time.process_time_ns() - began
-
-        tick.SYSTEMS = (time_opponents, *tick.SYSTEMS[1:])  # type: ignore[misc]  # measured in place
+        spent_ns = 0
         world = world_of(options.map, [Seat(race, level, options.build) for race in ("terran", "zerg")], options.seed)
-        began = time.process_time()
-        advance(world, math.ceil(options.minutes * 60 * FASTER_LOOPS))
-        whole = time.process_time() - began
-        rest = whole - spent["ns"] / 1e9
+        with mock.patch.object(player, "think", think_in_time):
+            began = time.process_time()
+            advance(world, math.ceil(options.minutes * 60 * FASTER_LOOPS))
+            whole = time.process_time() - began
+        rest = whole - spent_ns / 1e9
         yield f"| {level} | {world.loop} | {world.loop / whole:.0f} | {world.loop / rest:.0f} | {len(world.live)} |"
 
 

@@ -3,7 +3,6 @@ from libc.stdint cimport int64_t
 
 from khala_simulator.native cimport columns, memory
 from khala_simulator.native.columns cimport Columns
-from khala_simulator.world cimport roll
 from khala_simulator.world.fields cimport WorldFields
 
 cdef int64_t NOBODY

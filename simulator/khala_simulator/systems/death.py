@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from khala_simulator.abilities.registry import DEATHS, FINALS
 from khala_simulator.native import columns, memory
-from khala_simulator.world import roll
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
 
@@ -48,7 +47,7 @@ def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
     if len(world.buffs):
         _last_of_buffs(world, slot)
     _note(world, slot, killer)
-    for passenger in roll.passengers(world, slot):
+    for passenger in world.passengers(slot):
         world.life[passenger] = 0.0
         _note(world, passenger, killer)
         world.remove(passenger)

@@ -19,8 +19,8 @@ def run(world: World) -> None:
     """Run the rule of every type that has one, for all living units of the type."""
     if world.natures_at != world.population:
         _look_over(world)
-    for rule, slots in world.natures:
-        rule(world, slots)
+    for name, slots in world.natures:
+        PASSIVES[name](world, slots)
 
 
 def _look_over(world: World) -> None:
@@ -30,7 +30,7 @@ def _look_over(world: World) -> None:
     slots = world.live[_has_rule(world.catalog).take(world.type.take(world.live))]
     for slot in slots.tolist():
         of_type.setdefault(world.unit_type(slot).name, []).append(slot)
-    world.natures = [(PASSIVES[name], slots) for name, slots in of_type.items()]
+    world.natures = list(of_type.items())
 
 
 @lru_cache(maxsize=4)

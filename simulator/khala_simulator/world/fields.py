@@ -8,7 +8,7 @@ says for which ``population`` it holds. Values that only a layer above understan
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class WorldFields:
         self.harvesting = False  # whether any unit harvests
         self.mortal = False  # whether any unit's life is timed
         self.hiding = False  # whether any unit is cloaked or burrowed
-        self.natures: list[tuple[Any, list[int]]] = []  # what types do by their nature, and whose it is
+        self.natures: list[tuple[str, list[int]]] = []  # types with a nature, and their slots, for ``passives``
         self.natures_at = -1  # the population for which this was written
         self.hands: Ints = np.zeros(0, dtype=np.int64)  # slots of workers and of structures that train
         self.hands_at = -1  # the population for which this was written

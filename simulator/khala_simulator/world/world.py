@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.numeric import geometry
+from khala_simulator.numeric.arrays import some, which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
-from khala_simulator.world import roll, shots
+from khala_simulator.world import shots
 from khala_simulator.world.active_buffs import ActiveBuffs
 from khala_simulator.world.columns import INDEX_SHIFT, NOBODY, SLOT_BITS, Bools, Floats, Ints, UnitColumns
 from khala_simulator.world.creep import Creep
@@ -179,7 +180,12 @@ class World(UnitColumns, WorldFields):
         self.clear(slot)
         self._recycles[slot] += 1
         self.queue[slot] = []
-        roll.forget(self, slot)
+        self._end_fights_with(slot)
+        for column in (
+            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
+            self.occupant,
+        ):  # fmt: skip
+            column[column == slot] = NOBODY
         self.buffs.forget(slot)
         for job in self.jobs.pop(slot, ()):
             self.players[job.owner].underway.remove(job.makes)
@@ -197,6 +203,12 @@ class World(UnitColumns, WorldFields):
         self.ground.unblock(slot)
         self.population_changed()
 
+    def _end_fights_with(self, slot: int) -> None:
+        """Note that the target of whoever fights a unit goes; workers look again before they end an attack-move."""
+        fighters = self.target == slot
+        self.in_reach[fighters] = False
+        self.scan_loop[fighters & self.defensive] = 0
+
     def stow(self, slot: int, carrier: int) -> None:
         """Take a unit out of the world into a carrier: it lives on, unseen and untouchable."""
         self.carrier[slot] = carrier
@@ -204,7 +216,9 @@ class World(UnitColumns, WorldFields):
         self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
         self.wants[slot] = self.in_reach[slot] = False
         self.visible[:, slot] = False
-        roll.end_fights_with(self, slot)
+        self._end_fights_with(slot)
+        for column in (self.target, self.order_target):
+            column[column == slot] = NOBODY
         self.target[slot] = NOBODY
         self.ground.unblock(slot)
         self.population_changed()
@@ -231,7 +245,8 @@ class World(UnitColumns, WorldFields):
 
     def passengers(self, carrier: int) -> list[int]:
         """Return the slots of the units inside a carrier, ascending."""
-        return roll.passengers(self, carrier)
+        inside: list[int] = which(self.alive & (self.carrier == carrier)).tolist()
+        return inside
 
     def slot_of(self, tag: int) -> int:
         """Return the slot of a living unit with this tag, or NOBODY."""
@@ -362,10 +377,14 @@ class World(UnitColumns, WorldFields):
 
     def population_changed(self) -> None:
         """Note that a unit came, went or changed its type."""
-        roll.call(self)
+        self.live = which(self.alive & (self.carrier == NOBODY))
         self.population += 1
         self.census = self.tally = self.casters = None
         self.scan_now = self.orders_changed = True
+        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
+        self.regenerating = _any(shields), _any(life), _any(energy)
+        self.mortal = _any(self.expires)
+        self.hiding = some(self.cloaked | self.burrowed)
 
     def note_traits(self, slot: int) -> None:
         """Note a unit's changed traits for the systems that skip worlds without such units."""
@@ -381,12 +400,13 @@ class World(UnitColumns, WorldFields):
         self.scan_now = True
 
     def _free_slot(self) -> int:
-        slot = roll.free_slot(self)
-        if slot == self.top:
-            if self.top == self.capacity:
-                self._grow(self.capacity * 2)
-            self.top += 1
-        return slot
+        free = which(~self.alive[1 : self.top])
+        if free.size:
+            return int(free[0]) + 1
+        if self.top == self.capacity:
+            self._grow(self.capacity * 2)
+        self.top += 1
+        return self.top - 1
 
     def _grow(self, capacity: int) -> None:
         visible = np.zeros((len(self.players), capacity), dtype=np.bool_)
@@ -403,6 +423,11 @@ class World(UnitColumns, WorldFields):
 def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
     """Return the cells of a footprint as an array (k, 2)."""
     return np.array(cells, dtype=np.int64)
+
+
+def _any(column: Floats | Ints) -> bool:
+    """Return whether any number is not zero; four times as fast as ``any``."""
+    return bool(np.count_nonzero(column))
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:
