@@ -94,7 +94,8 @@ def toggle_autocast(world: World, player: int, requested: int, tags: Iterable[in
     all_on = all(number in world.autocast.get(slot, ()) for slot, number in chosen)
     for slot, number in chosen:
         kept = tuple(n for n in world.autocast.get(slot, ()) if n != number)
-        world.let_use(slot, kept if all_on else (*kept, number))
+        world.autocast[slot] = kept if all_on else (*kept, number)
+    world.casters = None
     return bool(chosen)
 
 

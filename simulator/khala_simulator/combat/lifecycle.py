@@ -29,8 +29,9 @@ def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], 
     world.energy[slot] = world.stats.energy_start[owner, unit.row]
     world.burrowed[slot] = unit.burrowed
     world.contents[slot] = unit.resource_amount
-    if not unit.passive:
-        world.let_use(slot, _used_by_itself(world.catalog, unit.row))
+    autocast = _used_by_itself(world.catalog, unit.row)
+    if autocast and not unit.passive:
+        world.autocast[slot] = autocast
     world.looks_around[slot] = True
     world.visible[:, slot] = not (world.fog or unit.cloaked or unit.burrowed)  # vision refines this
     world.visible[owner, slot] = True
@@ -72,13 +73,14 @@ def _keep_vitals(world: World, slot: int, unit: UnitType, life: float, life_max:
 def _keep_autocast(world: World, slot: int, old: int) -> None:
     """Keep the unit's autocast settings; abilities that only its new type has are as the tables say."""
     known = {ability.id for ability in world.catalog.cards[old]}
-    chosen = world.autocast.get(slot, ())
+    chosen = world.autocast.pop(slot, ())
     wanted = tuple(
         ability.id
         for ability in world.catalog.cards[int(world.type[slot])]
         if ability.id in chosen or (ability.autocast == "on" and ability.id not in known)
     )
-    world.let_use(slot, wanted)
+    if wanted:
+        world.autocast[slot] = wanted
 
 
 @lru_cache(maxsize=4096)

@@ -232,13 +232,6 @@ class World(UnitColumns, WorldFields):
         self.stand(slot)
         self.population_changed()
 
-    def let_use(self, slot: int, abilities: tuple[int, ...]) -> None:
-        """Set which abilities a unit uses by itself."""
-        self.autocast.pop(slot, None)
-        if abilities:
-            self.autocast[slot] = abilities
-        self.casters = None
-
     def alert(self, player: int, name: str) -> None:
         """Send a player an alert, by its name in the API."""
         self.alerts.append(PlayerAlert(self.loop, player, name))

@@ -196,7 +196,7 @@ def test_autocast_is_switched_off_and_on(make_table: Any, by: str) -> None:
     for expected in ((), (HEAL,)):
         table.game.act(1, action)
         table.game.step(1)
-        assert table.world.autocast.get(slot, ()) == expected
+        assert table.world.autocast[slot] == expected
         (told,) = table.respond().actions  # PySC2 knows the words of the panel only
         assert told.action_ui.toggle_autocast.ability_id == told.action_raw.toggle_autocast.ability_id == HEAL
         assert list(told.action_raw.toggle_autocast.unit_tags) == [tag]

@@ -128,7 +128,7 @@ def make_hallucination(world: World, slot: int, loops: float) -> None:
     world.hallucination[slot] = True
     buffs.apply(world, slot, "Hallucination", loops=0)
     buffs.apply(world, slot, "HallucinationTimedLife", loops=loops)
-    world.let_use(slot, ())
+    world.autocast.pop(slot, None)
     teleport.live_until(world, slot, world.loop + loops)
     refresh(world, slot)
 
