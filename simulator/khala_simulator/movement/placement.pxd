@@ -15,7 +15,7 @@ cdef int64_t NOBODY
     x0=double, y0=double, x1=double, y1=double, px=double, py=double, grid=SurfaceGrid, c=Columns, reach=double,
     n=int64_t, i=int64_t, count=int64_t, at=Point
 )
-cdef _search(WorldFields world, object unit, tuple point, object radius, int64_t ignoring, int64_t most, double apart)
+cdef _search(WorldFields world, object unit, object point, object radius, int64_t ignoring, int64_t most, double apart)
 @cython.locals(i=int64_t, slot=int64_t, x=double, y=double, apart=double)
 cdef bint _is_clear(Columns c, int64_t* slots, int64_t n, Point at, double reach) noexcept
 @cython.locals(i=int64_t, x=double, y=double)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -68,6 +68,18 @@ def test_a_blink_onto_a_body_or_a_wall_ends_beside_it(field: Any) -> None:
     field.play(1)
     apart = field.world.separation[slot] + field.world.separation[body]
     assert apart - 0.02 <= math.dist(place(field, slot), place(field, body)) <= apart + 0.5
+
+
+def test_a_point_may_have_named_coordinates(field: Any) -> None:
+    class WorldPoint(NamedTuple):
+        x: float
+        y: float
+
+    slot = field.put("Stalker", 1, 8.0, 8.0)
+    field.research(1, "BlinkTech")
+    assert field.order(slot, BLINK, point=WorldPoint(12.0, 8.0))
+    field.play(1)
+    assert place(field, slot) == (12.0, 8.0)
 
 
 def test_nobody_blinks_where_his_player_does_not_see(make_field: Any) -> None:
