@@ -238,8 +238,8 @@ DRAWN = {
 
 @pytest.mark.slow
 @pytest.mark.timeout(WHOLE_S)
-def test_the_whole_set_finds_hardly_any_difference_between_two_seeds() -> None:
-    probes = [one for one in PROBES if one.id != "opponent.growth"]  # eighty whole games
+def test_a_third_of_the_probes_find_hardly_any_difference_between_two_seeds() -> None:
+    probes = [one for one in PROBES[::3] if one.id != "opponent.growth"]  # eighty whole games
     found = compare(played(probes), played(probes, seed=2))
     assert {(one.probe, one.name) for one in found.differences} <= DRAWN
     assert (found.missing, found.not_compared) == ((), {})

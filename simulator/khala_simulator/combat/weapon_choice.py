@@ -58,7 +58,9 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     c.least_range[slot] = 0.0 if ground is None or close is not None else ground.min_range
     c.ground_scan[slot] = NO_SCAN if ground is None else scan[first + ground.row]
     c.air_scan[slot] = NO_SCAN if air is None else scan[first + air.row]
-    c.acquires[slot] = bool(weapons) and not (unit.passive or unit.uncommandable) and owner != 0
+    turrets = [w.turret_deg_n for w in weapons if w.turret_deg_n is not None]
+    by_itself = bool(turrets) or not unit.passive
+    c.acquires[slot] = bool(weapons) and by_itself and not unit.uncommandable and owner != 0
     planes = (GROUND_PLANE if ground is not None else 0) | (AIR_PLANE if air is not None else 0)
     c.threat_bits[slot] = GROUND_PLANE | AIR_PLANE if unit.always_threatens else planes
     c.defensive[slot] = unit.defensive or (unit.passive and not unit.always_threatens)
@@ -66,7 +68,6 @@ def weapon_traits(world: World, slot: int, unit: UnitType, kinds: Iterable[Buff]
     c.guns_walking[slot] = bool([w for w in weapons if w.fires_moving and w.moves == "moving"])
     aimed_at_all = [w for w in weapons if w.acquires != "unit" and w.excluding != "structure"]
     c.spares_structures[slot] = bool(weapons) and not aimed_at_all
-    turrets = [w.turret_deg_n for w in weapons if w.turret_deg_n is not None]
     turn = math.radians(min((turrets[0] if turrets else 0.0) / LOOPS_PER_NORMAL_SECOND, WIDEST_TURN_DEG))
     c.turret_cos[slot] = math.cos(turn)
     c.turret_sin[slot] = math.sin(turn)

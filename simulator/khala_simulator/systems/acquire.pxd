@@ -51,6 +51,7 @@ cdef bint _is_due(Columns c, int64_t slot, int64_t loop) noexcept
 cdef bint _loses(Columns c, int64_t slot) noexcept
 cdef bint _seeks_fights(Columns c, int64_t slot) noexcept
 cdef bint _stays(Columns c, int64_t slot) noexcept
+cdef bint _has_turret(Columns c, int64_t slot) noexcept
 cdef double _squared_distance_from_guard(Columns c, int64_t slot) noexcept
 @cython.locals(too_far=bint)
 cdef bint _gives_up(Columns c, int64_t slot) noexcept

@@ -2,7 +2,8 @@
 
 Units that idle, hold, patrol or attack-move look around every few loops; those on a plain walk do not. The best target
 is the one with the highest attack priority, then one that threatens the unit before one that is harmless to it, then
-the nearest. A type that does not fight of its own accord threatens only its target, from when it first has it in reach.
+the nearest. A type that does not fight of its own accord threatens only its target, from when it first has it in reach;
+if it has a turret, that fires at what comes into its range while the unit stands without an order.
 
 A unit keeps its target until that dies, hides or leaves the reach in which it was; until its next look it fires on
 within the weapon's slop. Before, the unit changes only for a higher rank: at once on its way, between two shots when it
@@ -80,7 +81,7 @@ def _is_due(c: Columns, slot: int, loop: int) -> bool:
         return False
     if not c.acquires[slot] or c.scan_loop[slot] > loop or not c.windup[slot] < 0.0 or c.leashed[slot]:
         return False
-    if c.defensive[slot] and not _seeks_fights(c, slot):
+    if c.defensive[slot] and not (_has_turret(c, slot) or _seeks_fights(c, slot)):
         return False
     target = c.target[slot]
     if target == NOBODY or not c.in_reach[slot]:
@@ -99,8 +100,13 @@ def _seeks_fights(c: Columns, slot: int) -> bool:
 
 
 def _stays(c: Columns, slot: int) -> bool:
-    """Return whether a unit chases no target: it holds its place, or fires only at what it passes."""
-    return c.holds[slot] or not c.looks_around[slot]
+    """Return whether a unit chases no target: it holds its place, or fires only at what comes into its range."""
+    return c.holds[slot] or not c.looks_around[slot] or (c.defensive[slot] and not _seeks_fights(c, slot))
+
+
+def _has_turret(c: Columns, slot: int) -> bool:
+    """Return whether a unit fires from a turret."""
+    return c.turret_cos[slot] < 1.0
 
 
 def _squared_distance_from_guard(c: Columns, slot: int) -> float:

@@ -182,7 +182,8 @@ class UnitType:
 
     ``cost`` is cumulative (a Baneling's includes its Zergling), as in the API; ``made_by`` has the price of one
     production. ``radius`` is the body used by the rules, ``radius_shown`` the one the API reports. A type that is
-    ``like`` another is a copy of it that a map has made; ``passive`` ones never fight or cast by themselves.
+    ``like`` another is a copy of it that a map has made; ``passive`` ones never cast or, but for a turret, fight by
+    themselves.
     """
 
     row: int

@@ -145,6 +145,19 @@ def test_workers_on_an_attack_move_fight_who_they_meet(field: Any, give: Any) ->
     assert world.alive[drones].all()
 
 
+def test_a_passive_type_fires_from_its_turret_at_what_comes_into_range_and_walks_to_nobody(field: Any) -> None:
+    near, far = field.put("Zergling", 2, 14, 16), field.put("Zergling", 2, 22, 16)
+    colossus, zealot = field.put("Colossus_RL", 1, 8, 16), field.put("Zealot_RL", 1, 13, 18)
+    world = field.world
+    world.acquires[[near, far]] = False
+    world.life[[near, far]] = 1e6
+    field.play(100)
+    assert world.life[near] < 1e6
+    assert world.life[far] == 1e6
+    assert world.pos[colossus].tolist() == [8, 16]
+    assert world.target[zealot] == -1
+
+
 def test_an_attack_on_a_place_goes_on_with_what_else_is_there_when_the_first_enemy_is_dead(field: Any) -> None:
     world = field.world
     drones = [field.put("Drone", 1, 20 + i % 2, 13 + i // 2) for i in range(12)]
