@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -24,7 +25,6 @@ from khala_sc2.experiment.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
-    from pathlib import Path
 
 pytestmark = [pytest.mark.netns, pytest.mark.game]
 
@@ -32,6 +32,9 @@ ROUTER = "tls/192.0.2.1:7447"  # addresses of this range belong to nobody (RFC 5
 RUN, TASK, DUEL = "machines", "2s3z_pair", "duel_3m"
 AGENTS = ("Stalkers", "Zealots")
 READY_S, MATCH_S, END_S = 30.0, 60.0, 15.0
+RAY = Path("/tmp/ray")  # where Ray has the sockets of a node
+OWN_FILES = f'mount --bind "$0" {RAY} && exec "$@"'
+"""Two nodes that begin together in one directory take the same names, and one of them dies."""
 
 
 @dataclass
@@ -92,8 +95,11 @@ class Machine:
 
     async def python(self, *arguments: str) -> Command:
         """Start Python there."""
+        files = self.directory / f"{self.name}-ray"
+        for directory in (files, RAY):
+            directory.mkdir(exist_ok=True)
         process = await asyncio.create_subprocess_exec(
-            *("ip", "netns", "exec", self.name, sys.executable, *arguments),
+            *("ip", "netns", "exec", self.name, "sh", "-c", OWN_FILES, files, sys.executable, *arguments),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
