@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from statistics import fmean, pstdev
 from typing import TYPE_CHECKING, Any
 
 from bench.learning.battles import Answer, Answered
@@ -15,7 +14,6 @@ from khala_protocol.messages import ChatMessage
 from khala_sc2.experiment.statistics import mean, wilson
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
 
@@ -62,15 +60,6 @@ def read_answered(line: dict[str, Any]) -> Answered:
     """Return what `write_answered` wrote; other fields are ignored."""
     prompt = tuple(ChatMessage(role=role, content=content) for role, content in line["prompt"])
     return Answered(prompt, Answer(line["answer"], tuple(line["tokens"])))
-
-
-def advantages(rewards: Sequence[float]) -> list[float]:
-    """Return how much better each battle of a group was than their mean, in standard deviations; 0 if all are alike."""
-    spread = pstdev(rewards)
-    if spread < 1e-6:
-        return [0.0] * len(rewards)
-    centre = fmean(rewards)
-    return [(reward - centre) / spread for reward in rewards]
 
 
 def summary(journal: Journal) -> list[dict[str, Any]]:

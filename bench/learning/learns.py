@@ -39,17 +39,12 @@ except ImportError:
 from bench.command_line import make_parser
 from bench.learning.battles import Boards, Scripted
 from bench.learning.crew import PART, Crew, Part
-from bench.learning.journal import (
-    Journal,
-    advantages,
-    read_answered,
-    summary,
-    write_answered,
-)
+from bench.learning.journal import Journal, read_answered, summary, write_answered
 from bench.learning.model import Row, SmallModel, dequantize
 from bench.learning.picture import SAMPLED, draw
 from bench.tables import print_table
 from khala_orchestrator.config import load_task
+from khala_sc2.dataset.credit import advantages
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -262,7 +257,7 @@ def weigh(model: SmallModel, groups: Iterable[Sequence[PlayedBattle]]) -> list[R
     weights: dict[tuple[tuple[ChatMessage, ...], tuple[int, ...]], float] = defaultdict(float)
     for group in groups:
         legal = fmean(answered.obeyed for battle in group for answered in battle.answered)
-        for battle, advantage in zip(group, advantages([battle.reward for battle in group]), strict=True):
+        for battle, advantage in zip(group, advantages([battle.reward for battle in group], scaled=True), strict=True):
             for answered in battle.answered:
                 weights[answered.prompt, answered.answer.tokens] += advantage + answered.obeyed - legal
     return [

@@ -55,6 +55,8 @@ __all__ = [
     "rewards_to_go",
     "with_weights",
 ]
+ROUNDING = 1e-9
+"""No spread of returns that are alike is wider."""
 
 
 @dataclass(slots=True)
@@ -169,13 +171,13 @@ def advantages(returns: Sequence[float], baseline: Baseline = group_mean, *, sca
     Args:
         returns: of plays that began alike: the same task and seed, and the same agent.
         baseline: of each return.
-        scaled: whether to divide by the standard deviation of the group, as GRPO does; all 0 if that is 0.
+        scaled: whether to divide by the standard deviation of the group, as GRPO does; all 0 if that is nothing.
     """
     above = [own - base for own, base in zip(returns, baseline(returns), strict=True)]
     if not scaled:
         return above
     spread = pstdev(returns)
-    return [each / spread if spread else 0.0 for each in above]
+    return [each / spread if spread > ROUNDING else 0.0 for each in above]
 
 
 def by_agent(turns: Sequence[AgentTurn]) -> dict[str, list[AgentTurn]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bench.learning.battles import Answer, Answered, Boards, PlayedBattle, Scripted, enemies_alone, shortest
-from bench.learning.journal import Journal, advantages, read_answered, summary, write_answered
+from bench.learning.journal import Journal, read_answered, summary, write_answered
 from bench.paths import ROOT
 from khala_orchestrator.config import load_task
 from khala_protocol.messages import ChatMessage
@@ -28,12 +28,6 @@ def test_the_shortest_form_of_a_reply_is_its_calls() -> None:
     )
     assert shortest(reply) == "<Select_Unit_Move_Screen(0x100040000, [4.5, 12.0])>\n<Attack_Unit(0x100180000)>"
     assert shortest("Analysis: I watch.\nActions:\n") == ""
-
-
-def test_advantages_of_a_group_sum_up_to_nothing_and_are_none_if_all_battles_were_alike() -> None:
-    found = advantages([1.0, -1.0, -1.0, -1.0])
-    assert found == pytest.approx([3**0.5, *[-(3**-0.5)] * 3])
-    assert advantages([0.3, 0.3, 0.3]) == [0.0, 0.0, 0.0]
 
 
 def test_a_line_that_was_not_written_to_its_end_is_left_out_and_the_next_one_stands_alone(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ class Machine:
         for directory in (files, RAY):
             directory.mkdir(exist_ok=True)
         process = await asyncio.create_subprocess_exec(
-            *("ip", "netns", "exec", self.name, "sh", "-c", OWN_FILES, files, sys.executable, *arguments),
+            *("ip", "netns", "exec", self.name, "sh", "-c", OWN_FILES, str(files), sys.executable, *arguments),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
