@@ -81,7 +81,7 @@ def _is_due(c: Columns, slot: int, loop: int) -> bool:
         return False
     if not c.acquires[slot] or c.scan_loop[slot] > loop or not c.windup[slot] < 0.0 or c.leashed[slot]:
         return False
-    if c.defensive[slot] and not (_has_turret(c, slot) or _seeks_fights(c, slot)):
+    if not (_seeks_fights(c, slot) or _has_turret(c, slot)):
         return False
     target = c.target[slot]
     if target == NOBODY or not c.in_reach[slot]:
@@ -95,13 +95,13 @@ def _loses(c: Columns, slot: int) -> bool:
 
 
 def _seeks_fights(c: Columns, slot: int) -> bool:
-    """Return whether a worker with this order picks fights by itself."""
-    return c.order_kind[slot] == ATTACK_MOVE or c.order_kind[slot] == PATROL
+    """Return whether a unit picks fights by itself; a worker and its like do so on an attack-move or a patrol."""
+    return not c.defensive[slot] or c.order_kind[slot] == ATTACK_MOVE or c.order_kind[slot] == PATROL
 
 
 def _stays(c: Columns, slot: int) -> bool:
     """Return whether a unit chases no target: it holds its place, or fires only at what comes into its range."""
-    return c.holds[slot] or not c.looks_around[slot] or (c.defensive[slot] and not _seeks_fights(c, slot))
+    return c.holds[slot] or not c.looks_around[slot] or not _seeks_fights(c, slot)
 
 
 def _has_turret(c: Columns, slot: int) -> bool:
@@ -324,7 +324,7 @@ def _hears(c: Columns, friend: int, victim: int) -> bool:
 def _turn_on(world: World, c: Columns, slot: int, attacker: int) -> None:
     """Make a unit that is free to do so fight an attacker that it sees."""
     roams = c.looks_around[slot] and not (c.holds[slot] or c.leashed[slot]) and c.step_max[slot] > 0.0
-    is_free = c.acquires[slot] and c.target[slot] == NOBODY and (not c.defensive[slot] or _seeks_fights(c, slot))
+    is_free = c.acquires[slot] and c.target[slot] == NOBODY and _seeks_fights(c, slot)
     if roams and is_free and c.visible[c.owner[slot] * c.capacity + attacker]:
         _take(world, c, slot, attacker)
 

@@ -120,4 +120,7 @@ def test_returns_and_baselines_follow_their_formulas() -> None:
     assert advantages([1, 3]) == [-1, 1]
     assert advantages([1, 2, 6], leave_one_out) == [-3, -1.5, 4.5]
     assert advantages([0, 4], scaled=True) == [-1, 1]
-    assert advantages([0.1 + 0.2, 0.3], scaled=True) == [0, 0]
+    assert advantages([1, -1, -1, -1], scaled=True) == pytest.approx([3**0.5, *[-(3**-0.5)] * 3])
+    assert advantages([2, 2], scaled=True) == [0, 0]
+    assert advantages([0.3, 0.3, 0.3], scaled=True) == [0, 0, 0]
+    assert advantages([0.1 + 0.2, 0.3], scaled=True) == [0, 0]  # alike but for rounding
