@@ -64,6 +64,7 @@ OWN = f"khala/{RUN}/{BLUE}/{MALLORY}"
 FORGED = b"FORGED"
 ANSWER_S = 1.0
 PAUSE_S = 0.02
+CALM_STEPS, RECOVER_S = 5, 20
 MANY = 70_000
 FRAME = FORGED + bytes(20_000)
 
@@ -324,6 +325,7 @@ class Siege:
     def __init__(self, host: Bus, published: Sequence[Publisher], turn: Turn, endpoint: str, keys: Path) -> None:
         self.endpoint, self.keys = endpoint, keys
         self.seen = Seen()
+        self.in_time = 0  # steps without a late reply, up to now
         self._turn = turn
         self._host = host
         self._published = published
@@ -334,6 +336,13 @@ class Siege:
         seen, self.seen = self.seen, Seen()
         return seen
 
+    async def recover(self) -> None:
+        """Wait for steps in time: what an attack leaves behind belongs to its row, not to the next one's."""
+        self.in_time = 0
+        async with asyncio.timeout(RECOVER_S):
+            while self.in_time < CALM_STEPS:
+                await asyncio.sleep(PAUSE_S)
+
     async def play(self) -> None:
         """Ask the agents, step after step."""
         while True:
@@ -342,7 +351,9 @@ class Siege:
             took_ms = 1000 * (time.perf_counter() - began)
             honest = {seat: answer for seat, answer in answers.by_seat.items() if seat.agent in HONEST}
             self.seen.steps += 1
-            self.seen.late += sum(answer.status != "ok" for answer in honest.values())
+            late = sum(answer.status != "ok" for answer in honest.values())
+            self.seen.late += late
+            self.in_time = 0 if late else self.in_time + 1
             self.seen.statuses.update(answer.status for answer in honest.values())
             self.seen.forged += sum(FORGED.decode() in (answer.text or "") for answer in honest.values())
             self.seen.slowest_ms = max(self.seen.slowest_ms, took_ms)
@@ -485,19 +496,19 @@ async def attack(match: Siege, name: str, *, seconds: float, through: Sequence[s
         stdout=asyncio.subprocess.PIPE, cwd=paths.ROOT,
     )  # fmt: skip
     said, _ = await process.communicate()
-    tried = Tried(*json.loads(said.splitlines()[-1]))
-    return row(match, name, tried)
+    return await row(match, name, Tried(*json.loads(said.splitlines()[-1])))
 
 
 async def attack_here(match: Siege, name: str, *, seconds: float) -> Row:
     """Run an attack in a thread."""
     match.look()
     tried = await asyncio.to_thread(ATTACKS[name], Stranger(match.endpoint, match.keys, seconds))
-    return row(match, name, tried)
+    return await row(match, name, tried)
 
 
-def row(match: Siege, name: str, tried: Tried) -> Row:
-    """Return the row of an attack that has just ended."""
+async def row(match: Siege, name: str, tried: Tried) -> Row:
+    """Return the row of an attack that has just ended, once the match has recovered from it."""
+    await match.recover()
     seen = match.look()
     return Row(name, tried.tried, tried.succeeded + seen.forged, seen.steps, seen.late, round(seen.slowest_ms, 1))
 
