@@ -231,9 +231,11 @@ def test_the_list_says_what_each_probe_settles(capsys: pytest.CaptureFixture[str
 DRAWN = {
     ("weapon.interrupted", "Zealot"),
     ("damage.splash", "Colossus beside 0.00"),
+    ("damage.splash", "Ultralisk behind 0.75"),  # the edge of its cleave: a matter of its facing
+    ("damage.splash", "Ultralisk beside 0.75"),
     ("spell.delay", "Graviton Beam at 6.5"),
 }
-"""Numbers of one sample, which a weapon's random delay moves."""
+"""Numbers of one sample, which the random delay or facing of a weapon's holder moves."""
 
 
 @pytest.mark.slow
