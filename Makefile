@@ -12,6 +12,8 @@ RUN := .venv/bin/
 PROGRESS := bash .ci/progress
 # pytest on every core; `PARALLEL=` for one core
 PARALLEL ?= -n logical --maxprocesses 8 --dist worksteal
+# folders of `make test`, all by default: make test TESTS="tests/bridge tests/protocol"
+TESTS ?=
 # per cent that `make cover` requires of these packages; make cover COVERED=0 COVERED_PACKAGES=bridge only prints
 COVERED ?= 90
 COVERED_PACKAGES ?= orchestrator protocol agents
@@ -72,7 +74,7 @@ demo: install ## Play a battle on this machine: simulator, host, two agents, scr
 test: install-tests ## Lint, types, contracts and every short test
 	@said=$$(mktemp) && trap 'rm -f $$said' EXIT; \
 	$(MAKE) --no-print-directory check >$$said 2>&1 & checks=$$!; \
-	$(RUN)pytest $(PARALLEL); tests=$$?; \
+	$(RUN)pytest $(PARALLEL) $(TESTS); tests=$$?; \
 	wait $$checks; checks=$$?; cat $$said; \
 	[ $$tests = 0 ] || echo "make test: tests failed, see above the checks"; \
 	[ $$checks = 0 ] || echo "make test: a check failed, it is the last one above"; \

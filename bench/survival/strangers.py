@@ -325,7 +325,8 @@ class Siege:
     def __init__(self, host: Bus, published: Sequence[Publisher], turn: Turn, endpoint: str, keys: Path) -> None:
         self.endpoint, self.keys = endpoint, keys
         self.seen = Seen()
-        self.in_time = 0  # steps without a late reply, up to now
+        self._in_time = 0  # steps without a late reply, up to now
+        self._calm = asyncio.Event()  # enough of them
         self._turn = turn
         self._host = host
         self._published = published
@@ -338,10 +339,10 @@ class Siege:
 
     async def recover(self) -> None:
         """Wait for steps in time: what an attack leaves behind belongs to its row, not to the next one's."""
-        self.in_time = 0
+        self._in_time = 0
+        self._calm.clear()
         async with asyncio.timeout(RECOVER_S):
-            while self.in_time < CALM_STEPS:
-                await asyncio.sleep(PAUSE_S)
+            await self._calm.wait()
 
     async def play(self) -> None:
         """Ask the agents, step after step."""
@@ -353,7 +354,9 @@ class Siege:
             self.seen.steps += 1
             late = sum(answer.status != "ok" for answer in honest.values())
             self.seen.late += late
-            self.in_time = 0 if late else self.in_time + 1
+            self._in_time = 0 if late else self._in_time + 1
+            if self._in_time == CALM_STEPS:
+                self._calm.set()
             self.seen.statuses.update(answer.status for answer in honest.values())
             self.seen.forged += sum(FORGED.decode() in (answer.text or "") for answer in honest.values())
             self.seen.slowest_ms = max(self.seen.slowest_ms, took_ms)
