@@ -21,7 +21,7 @@ import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads: these matrices are too small to share
 
@@ -96,20 +96,23 @@ def draw(tests: list[Test], path: Path) -> None:
     maps = list(dict.fromkeys(test.map for test in tests))
     figure = Figure(figsize=(3.4 * len(maps), 3.6), layout="constrained")
     colours = dict(zip(ALGORITHMS, ("C0", "C1"), strict=True))
+    handles: dict[str, Any] = {}  # one entry of the legend for each label
     for axes, name in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
         here = [test for test in tests if test.map == name]
         for algorithm, seed in dict.fromkeys((test.algorithm, test.seed) for test in here):
             run = [test for test in here if (test.algorithm, test.seed) == (algorithm, seed)]
             x = [test.steps / 1e6 for test in run]
             y = [test.won / test.battles for test in run]
-            axes.plot(x, y, colours[algorithm], label=f"{algorithm}, seed {seed}", linewidth=1)
+            axes.plot(x, y, colours[algorithm], label=algorithm, linewidth=1)
         for algorithm, source, share in PUBLISHED.get(name, ()):
             style = ":" if source == DI_ENGINE else "--"
             axes.axhline(share, color=colours[algorithm], linestyle=style, label=f"{algorithm}, {source}", linewidth=1)
         axes.set(xlabel="million steps", ylim=(-0.02, 1.02), title=name)
+        axes.locator_params(axis="x", nbins=5)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=6)
+        handles |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     figure.axes[0].set_ylabel("test battles won")
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=len(handles), frameon=False)
     figure.savefig(path, metadata={"Date": None})
 
 
