@@ -23,7 +23,7 @@ INSTALLED := agents bridge configs khala_sc2 orchestrator protocol simulator
 DISTRIBUTIONS := khala-sc2 khala-sc2-agents khala-sc2-bridge khala-sc2-configs khala-sc2-orchestrator khala-sc2-protocol khala-sc2-simulator
 DIST ?= dist
 
-.PHONY: help install install-tests extras wheels check format types test pysc2 slow interpreted install-standards standards cover test-all demo bench limits scenarios docs golden page picture clean
+.PHONY: help install install-tests extras wheels check format types test test-rest pysc2 slow interpreted install-standards standards cover test-all demo bench limits scenarios docs golden page picture clean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -82,6 +82,9 @@ test: install-tests ## Lint, types, contracts and every short test
 
 pysc2: install ## The long ones of PySC2's own game tests; `make test` runs the others
 	$(RUN)pytest $(PARALLEL) -m slow tests/simulator/live/test_pysc2_own_tests.py
+
+test-rest: TESTS = $(filter-out tests/__pycache__/ $(COVERED_PACKAGES:%=tests/%/),$(wildcard tests/*/))
+test-rest: test ## `make test` without the folders that `make cover` plays
 
 slow: install-tests .venv/.real-model ## All long tests: whole tables, more examples, those of PySC2, random agents, long games, every scenario
 	$(RUN)pytest $(PARALLEL) -m "slow or hypothesis" --hypothesis-profile long

@@ -96,7 +96,7 @@ def draw(tests: list[Test], path: Path) -> None:
     maps = list(dict.fromkeys(test.map for test in tests))
     figure = Figure(figsize=(3.4 * len(maps), 3.6), layout="constrained")
     colours = dict(zip(ALGORITHMS, ("C0", "C1"), strict=True))
-    handles: dict[str, Any] = {}  # one entry of the legend for each label
+    legend: dict[str, Any] = {}  # lines by their labels, each once for all panels
     for axes, name in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):
         here = [test for test in tests if test.map == name]
         for algorithm, seed in dict.fromkeys((test.algorithm, test.seed) for test in here):
@@ -110,9 +110,10 @@ def draw(tests: list[Test], path: Path) -> None:
         axes.set(xlabel="million steps", ylim=(-0.02, 1.02), title=name)
         axes.locator_params(axis="x", nbins=5)
         axes.grid(alpha=0.3)
-        handles |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+        lines, labels = axes.get_legend_handles_labels()
+        legend |= dict(zip(labels, lines, strict=True))
     figure.axes[0].set_ylabel("test battles won")
-    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=len(handles), frameon=False)
+    figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=len(legend), frameon=False)
     figure.savefig(path, metadata={"Date": None})
 
 

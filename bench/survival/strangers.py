@@ -510,10 +510,11 @@ async def attack_here(match: Siege, name: str, *, seconds: float) -> Row:
 
 
 async def row(match: Siege, name: str, tried: Tried) -> Row:
-    """Return the row of an attack that has just ended, once the match has recovered from it."""
+    """Return the row of an attack that has just ended, once the match has recovered: steps are those until its end."""
+    steps = match.seen.steps
     await match.recover()
     seen = match.look()
-    return Row(name, tried.tried, tried.succeeded + seen.forged, seen.steps, seen.late, round(seen.slowest_ms, 1))
+    return Row(name, tried.tried, tried.succeeded + seen.forged, steps, seen.late, round(seen.slowest_ms, 1))
 
 
 async def measure(

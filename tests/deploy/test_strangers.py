@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from bench.survival.strangers import ANSWER_S, ATTACKS, CALM_STEPS, Row, attack_here, siege
+from bench.survival.strangers import ANSWER_S, ATTACKS, Row, attack_here, siege
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,7 +35,7 @@ ALL_S = 400
 def assert_repelled(row: Row) -> None:
     assert row.tried
     assert row.succeeded == 0, row
-    assert row.steps > CALM_STEPS, row
+    assert row.steps > 5, row
     assert row.slowest_ms < 1000 * ANSWER_S + 500, row  # a busy machine is late with it, too
 
 
@@ -82,18 +82,12 @@ def _ip(namespace: str, *arguments: str) -> None:
 @pytest.mark.slow
 @pytest.mark.netns
 @pytest.mark.timeout(2 * ALL_S)
-@pytest.mark.parametrize(
-    ("attacks", "router"),
-    [(tuple(ATTACKS), ()), (REPRESENTATIVES, ("--router",))],
-    ids=["the host is the router", "a router between"],
-)
-async def test_no_attack_from_another_machine_succeeds(
-    machines: tuple[str, str], attacks: tuple[str, ...], router: tuple[str, ...]
-) -> None:
+@pytest.mark.parametrize("topology", ["the host is the router", "a router between"])
+async def test_no_attack_from_another_machine_succeeds(machines: tuple[str, str], topology: str) -> None:
     host, stranger = machines
     command = [sys.executable, "-m", "bench", "strangers", "--json", "--seconds", "1"]
     command += ["--listen", f"tls/{HOST_ADDRESS}:7447", "--through", "ip", "netns", "exec", stranger]
-    command += [*router, "--only", *attacks]
+    command += ["--router"] if topology == "a router between" else []
     process = await asyncio.create_subprocess_exec(
         *("ip", "netns", "exec", host, *command), stdout=subprocess.PIPE, cwd=Path(__file__).parents[2]
     )
@@ -105,6 +99,6 @@ async def test_no_attack_from_another_machine_succeeds(
             process.kill()
             await process.wait()
     rows = [Row(**row) for row in json.loads(said)["rows"]]
-    assert [row.attack for row in rows] == list(attacks)
+    assert [row.attack for row in rows] == list(ATTACKS)
     for row in rows:
         assert_repelled(row)
