@@ -65,8 +65,8 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     made.close()
 
 
-def opened(context: BrowserContext, address: str, wait_for: str = "main h2 >> nth=0") -> Page:
-    """Open an address; wait until something is there."""
+def opened(context: BrowserContext, address: str, wait_for: str = "canvas[data-step]") -> Page:
+    """Open an address; wait until something is there, by default the map of a match. Keys before it move nothing."""
     page = context.new_page()
     page.set_default_timeout(WAIT_MS)
     asked: list[str] = []
@@ -89,7 +89,7 @@ def asked_hosts(page: Page) -> set[str]:
 
 
 def test_a_stranger_sees_who_plays_and_who_wins(context: BrowserContext, golden: Viewer) -> None:
-    page = opened(context, golden.address, "canvas[data-step]")  # when the map is drawn
+    page = opened(context, golden.address)
     for text in (re.compile(r"^(Blue|Opponent) wins: "), re.compile("Army value")):
         page.get_by_text(text).first.wait_for()
     assert {"Blue", "Opponent", "Army value"} <= set(re.split(r"\s*\n\s*|(?<=\d) | (?=\d)", page.inner_text("main")))
@@ -126,7 +126,7 @@ def test_keys_scrub_and_a_link_brings_another_reader_to_the_moment(context: Brow
 def test_a_link_holds_though_the_address_is_written_over_before_the_page_hears_of_it(
     context: BrowserContext, golden: Viewer
 ) -> None:
-    page = opened(context, golden.address, "canvas[data-step]")
+    page = opened(context, golden.address)
     page.evaluate(
         """() => { const old = location.hash
             location.hash = old.replace(/&s=\\d+/, '') + '&s=9'
