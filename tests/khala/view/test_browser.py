@@ -50,11 +50,17 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def golden(view: Callable[..., Viewer], tmp_path_factory: pytest.TempPathFactory) -> Viewer:
-    """The golden battle, in a view of its own."""
+def golden(view: Callable[..., Viewer], browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Viewer:
+    """The golden battle, in a view of its own, which has read all of it: until then keys stop at the last step read."""
     path = tmp_path_factory.mktemp("golden") / "recording.mcap"
     shutil.copy(GOLDEN, path)
-    return view(path)
+    viewer = view(path)
+    last = max(report.step for report in Recording.open(GOLDEN).of(Report))
+    page = browser.new_page()
+    page.goto(viewer.address)
+    page.wait_for_function("last => document.body.innerText.includes(`step 0 of ${last}`)", arg=last)
+    page.close()
+    return viewer
 
 
 @pytest.fixture
