@@ -13,6 +13,7 @@ from khala_simulator.abilities import casting, commands
 from khala_simulator.native import columns
 from khala_simulator.numeric import geometry
 from khala_simulator.tables.action_result import ActionResult
+from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
 
@@ -51,10 +52,25 @@ def _advance(world: World, slot: int) -> None:
     cast = current(world, slot)
     if world.cast_at[slot] <= NOT_BEGUN:
         if not casting.in_range(world, cast, slop=0.0):
+            if _is_stuck(world, slot):
+                _give_up_in_vain(world, cast)
             return
         _begin(world, cast)
     if world.casts[slot] and NOT_BEGUN < world.cast_at[slot] <= world.loop:
         _take_effect(world, cast)
+
+
+def _is_stuck(world: World, slot: int) -> bool:
+    """Return whether a unit has come as near to its aim as it can."""
+    stalled = world.nav_loop[slot] > 0 and world.loop - world.nav_best_loop[slot] > MECHANICS.crowd_stall
+    return bool(world.nav_end[slot] or stalled)
+
+
+def _give_up_in_vain(world: World, cast: Cast) -> None:
+    """Give up if the aim has become impossible, such as a place on which something else stands by now."""
+    why = casting.aim_refusal(world, cast)
+    if why is not ActionResult.SUCCESS:
+        _give_up(world, cast, why)
 
 
 def _begin(world: World, cast: Cast) -> None:

@@ -233,6 +233,16 @@ def test_of_two_builders_with_the_price_of_one_structure_the_later_one_stands_id
     assert not field.world.orders_of(late)
 
 
+def test_builders_whose_place_another_one_has_taken_stand_idle(field: Field) -> None:
+    for x in range(9):
+        order(field, field.put("Drone", 1, 20.0 + x, 20.0), BUILD["Hatchery"], point=(32.0, 32.0))
+    placed(field, "Hatchery")
+    field.play(300)  # they crowd around it, and push each other away from where its edge is nearest to its middle
+    drones = [slot for slot in field.world.live.tolist() if field.world.unit_type(slot).name == "Drone"]
+    assert len(drones) == 8
+    assert not any(field.world.orders_of(drone) for drone in drones)
+
+
 @pytest.mark.parametrize(("name", "hidden"), [("ZerglingBurrowed", True), ("DarkTemplar", True), ("Zergling", False)])
 def test_a_builder_finds_out_on_the_site_what_its_player_does_not_see(field: Field, name: str, *, hidden: bool) -> None:
     probe = field.put("Probe", 1, 20.0, 20.0)
