@@ -15,7 +15,7 @@ from khala_protocol.errors import ConfigError
 from khala_sc2.env.numeric import sizes
 from khala_sc2.env.numeric.maps import smac_map
 from khala_sc2.env.numeric.options import options_of
-from khala_sc2.env.numeric.starcraft2 import StarCraft2Env
+from khala_sc2.env.numeric.starcraft2 import BEGUN, Outcome, StarCraft2Env
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -119,7 +119,7 @@ class Batch:
         self._arrays = arrays
         self._same_step = spec.mode == SAME_STEP
         self.battles = [spec.make() for _ in arrays["action"]]
-        self._ended = [False] * len(self.battles)
+        self._outcomes = [BEGUN] * len(self.battles)
         self._rows = [
             _Row(*(arrays[name][row] for name in ("action", "observation", "action_mask", "state")))
             for row in range(len(self.battles))
@@ -129,43 +129,28 @@ class Batch:
         """Begin an episode of each battle: in a new game where there is a seed, else in the game that goes on."""
         for row, (battle, seed) in enumerate(zip(self.battles, seeds, strict=True)):
             battle.begin(seed)
-            self._ended[row] = False
-            self._note(row, 0.0, {})
+            self._outcomes[row] = BEGUN
             self._see(row)
+        self._note()
 
     def step(self) -> None:
         """Play a step of each battle with the actions of the arrays; one that is not available is replaced by stop."""
         for row, battle in enumerate(self.battles):
-            if self._ended[row]:
+            if battle.over:
                 battle.begin()
-                self._ended[row] = False
-                self._note(row, 0.0, {})
+                self._outcomes[row] = BEGUN
             else:
-                self._play(row, battle)
+                self._outcomes[row] = battle.play(self._rows[row].action)
+                if self._same_step and battle.over:
+                    battle.see(self._arrays["final_observation"][row], self._arrays["final_state"][row])
+                    battle.begin()
             self._see(row)
+        self._note()
 
-    def _play(self, row: int, battle: StarCraft2Env) -> None:
-        reward, ended, info = battle.play(self._rows[row].action)
-        self._note(row, reward, info)
-        if not ended:
-            return
-        if self._same_step:
-            battle.see(self._arrays["final_observation"][row], self._arrays["final_state"][row])
-            battle.begin()
-        else:
-            self._ended[row] = True
-
-    def _note(self, row: int, reward: float, info: dict[str, Any]) -> None:
-        """Write what a step was worth and how it ended."""
-        arrays = self._arrays
-        battle = self.battles[row]
-        timed_out = battle.timed_out
-        arrays["reward"][row] = reward
-        arrays["truncated"][row] = timed_out
-        arrays["terminated"][row] = battle.over and not timed_out
-        arrays["elapsed"][row] = battle.steps
-        for name in ("battle_won", "dead_allies", "dead_enemies"):
-            arrays[name][row] = info.get(name, 0)
+    def _note(self) -> None:
+        """Write what the step was worth to all battles, and how they stand."""
+        for name, column in zip(Outcome._fields, zip(*self._outcomes, strict=True), strict=True):
+            self._arrays[name][:] = column
 
     def _see(self, row: int) -> None:
         """Write what the agents see now and may do."""

@@ -50,9 +50,8 @@ class CentralEnv(gymnasium.Env[Any, Any]):
 
     def step(self, action: Actions) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Play a step."""
-        reward, over, info = self.battles.play(np.asarray(action, dtype=np.int64))
-        timed_out = self.battles.timed_out
-        return self._seen(), reward, over and not timed_out, timed_out, info
+        outcome = self.battles.play(np.asarray(action, dtype=np.int64))
+        return self._seen(), outcome.reward, outcome.terminated, outcome.truncated, self.battles.info()
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return [agents, actions] which actions are available."""

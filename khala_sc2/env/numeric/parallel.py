@@ -70,16 +70,15 @@ class NumericParallelEnv(ParallelEnv[str, Any, int]):  # type: ignore[misc]  # P
         if not self.agents:
             return {}, {}, {}, {}, {}
         numbers = np.array([int(actions.get(agent, 0)) for agent in self.agents])
-        reward, over, info = self.battles.play(numbers)
-        timed_out, agents = self.battles.timed_out, self.agents
-        seen = self._seen()
-        self.agents = [] if over else agents
+        outcome = self.battles.play(numbers)
+        seen, agents = self._seen(), self.agents
+        self.agents = [] if self.battles.over else agents
         return (
             seen,
-            dict.fromkeys(agents, reward),
-            dict.fromkeys(agents, over and not timed_out),
-            dict.fromkeys(agents, timed_out),
-            {agent: dict(info) for agent in agents},
+            dict.fromkeys(agents, outcome.reward),
+            dict.fromkeys(agents, outcome.terminated),
+            dict.fromkeys(agents, outcome.truncated),
+            {agent: self.battles.info() for agent in agents},
         )
 
     def state(self) -> NDArray[np.float32]:

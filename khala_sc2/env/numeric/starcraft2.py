@@ -13,7 +13,7 @@ Below: `khala_sc2.env.numeric.forces`, `khala_sc2.env.numeric.rewards`, `khala_s
 from __future__ import annotations
 
 import secrets
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,25 @@ _OVER: Final = "the episode is over: call reset() first"
 PICTURE_PX: Final = (512, 512)
 
 
+class Outcome(NamedTuple):
+    """What a step was worth, how the episode stands, and the dead of both sides."""
+
+    reward: float
+    terminated: bool
+    """The battle is over."""
+    truncated: bool
+    """The episode ended at its limit."""
+    battle_won: bool
+    dead_allies: int
+    dead_enemies: int
+    elapsed: int
+    """Steps of the episode."""
+
+
+BEGUN: Final = Outcome(0.0, False, False, False, 0, 0, 0)
+"""An episode before its first step."""
+
+
 class StarCraft2Env(SmacNames):
     """One battle after the other on a SMAC map.
 
@@ -77,8 +96,7 @@ class StarCraft2Env(SmacNames):
         self.battles_won = self.battles_game = self.timeouts = 0
         self._seed = self.options.seed
         self._battle: Battle | None = None
-        self._ended = False
-        self._steps = 0
+        self._outcome = BEGUN
         self._layout = _layout(self._spec, self.options, self.n_actions)
         self._board: Board
         self._scene: BattleScene
@@ -125,7 +143,7 @@ class StarCraft2Env(SmacNames):
         if seed is not None:
             self._seed = seed
             self._battle = None
-        self._steps = 0
+        self._outcome = BEGUN
         if self._battle is None:
             self._launch()
         else:
@@ -133,7 +151,6 @@ class StarCraft2Env(SmacNames):
             self.battle.kill(fighters.tag[fighters.alive].tolist())
             self.battle.advance(_RESTART_LOOPS)
             self.battle.forget_past()
-        self._ended = False
         fighters = self._arrivals()
         self.max_reward = rewards.most_reward(fighters, self.options)
         self._scene = BattleScene(self._layout, self._board, fighters)
@@ -164,24 +181,37 @@ class StarCraft2Env(SmacNames):
         """
         numbers = [int(action) for action in actions]
         self._check(numbers)
-        return self.play(np.array(numbers))
+        outcome = self.play(np.array(numbers))
+        return outcome.reward, self.over, self.info()
 
-    def play(self, actions: NDArray[np.int64]) -> tuple[float, bool, dict[str, Any]]:
+    def play(self, actions: NDArray[np.int64]) -> Outcome:
         """Play a step as `step` does; a unit stops in place of an action that is not available."""
-        if self._battle is None or self._ended:
+        if self._battle is None or self.over:
             raise ValueError(_OVER)
         scene = self._scene
         battle = self._battle
         scene.take(actions)
         give_orders(battle.world, scene.fighters, scene.last, self.options.move_amount)
         battle.advance(self.options.step_mul)
-        self._steps += 1
         battle.see(scene.fighters)
         scene.look()
-        return self._outcome()
+        self._outcome = self._judge(scene.fighters)
+        return self._outcome
+
+    def info(self) -> dict[str, Any]:
+        """Return what happened in the last step, as SMAC names it."""
+        last = self._outcome
+        info = {
+            "battle_won": last.battle_won,
+            "dead_allies": last.dead_allies,
+            "dead_enemies": last.dead_enemies,
+        }
+        if last.truncated and self.options.continuing_episode:
+            info["episode_limit"] = True
+        return info
 
     def _check(self, actions: Sequence[int]) -> None:
-        if self._battle is None or self._ended:
+        if self._battle is None or self.over:
             raise ValueError(_OVER)
         if len(actions) != self.n_agents:
             raise ValueError(f"there are {len(actions)} actions for {self.n_agents} agents")
@@ -190,50 +220,40 @@ class StarCraft2Env(SmacNames):
                 can = np.flatnonzero(self._scene.masks[agent]).tolist()
                 raise ValueError(f"agent {agent} cannot perform action {action}: it can perform {can}")
 
-    def _outcome(self) -> tuple[float, bool, dict[str, Any]]:
-        """Return what `step` returns, and count the battle if it is over."""
-        fighters = self._scene.fighters
+    def _judge(self, fighters: Fighters) -> Outcome:
+        """Return what a step was worth and how it ended, and count the battle if it is over."""
+        options = self.options
         ending = fighters.ending()
-        dead_allies, dead_enemies = fighters.counts()
-        info: dict[str, Any] = {
-            "battle_won": ending == WON,
-            "dead_allies": dead_allies,
-            "dead_enemies": dead_enemies,
-        }
+        steps = self.steps + 1
+        timeout = ending == GOES_ON and steps >= self.episode_limit
         self.battles_won += ending == WON
-        timeout = ending == GOES_ON and self._steps >= self.episode_limit
-        if timeout:
-            self.timeouts += 1
-            if self.options.continuing_episode:
-                info["episode_limit"] = True
-        self._ended = timeout or ending != GOES_ON
-        self.battles_game += self._ended
-        reward = rewards.of_step(fighters, ending, self.options)
-        if self.options.reward_scale:
-            reward /= self.max_reward / self.options.reward_scale_rate
-        self.reward = reward
-        return reward, self._ended, info
+        self.timeouts += timeout
+        self.battles_game += timeout or ending != GOES_ON
+        reward = rewards.of_step(fighters, ending, options)
+        if options.reward_scale:
+            reward /= self.max_reward / options.reward_scale_rate
+        return Outcome(reward, ending != GOES_ON, timeout, ending == WON, *fighters.counts(), steps)
+
+    @property
+    def reward(self) -> float:
+        """The reward of the last step."""
+        return self._outcome.reward
 
     @property
     def steps(self) -> int:
         """Steps of the episode so far."""
-        return self._steps
+        return self._outcome.elapsed
 
     @property
     def over(self) -> bool:
         """Whether the episode is over."""
-        return self._ended
-
-    @property
-    def timed_out(self) -> bool:
-        """Whether the episode ended at its limit, and not with the battle."""
-        return self._ended and self._scene.fighters.ending() == GOES_ON
+        return self._outcome.terminated or self._outcome.truncated
 
     # seeing -------------------------------------------------------------------------------------------------------
 
     @property
     def _progress(self) -> float:
-        return self._steps / self.episode_limit
+        return self.steps / self.episode_limit
 
     def see(self, observations: Floats32, state: Floats32) -> None:
         """Write [agents, size] what each agent sees, and [size] the state, into contiguous arrays of these sizes."""
