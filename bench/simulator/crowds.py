@@ -362,7 +362,7 @@ def mirror(seed: int, army: dict[str, int]) -> dict[str, bool] | None:
     for number, (owner, i) in enumerate(jobs):
         if number == len(names):
             for slot in fillers:  # their slots are taken by the units made last
-                world.remove(slot)
+                lifecycle.remove(world, slot)
         dx, dy = places[i]
         place = (x + dx, y + dy) if owner == left else (x - dx, y - dy if turned else y + dy)
         put(world, names[i], owner, [place])

@@ -42,7 +42,7 @@ def base(name: str, workers: Iterable[int] = (), kind: str = "SCV") -> World:
     """Return a melee game whose workers are one of ``kind`` for each of ``workers``, the rank of its field."""
     world = new_game(load_map(name), PLAYERS)
     for slot in world.live[[world.unit_type(slot).worker for slot in world.live.tolist()]].tolist():
-        world.remove(slot)
+        lifecycle.remove(world, slot)
     unit = world.catalog.unit(kind)
     for player in world.players[1:]:
         x, y = player.start or (0.0, 0.0)

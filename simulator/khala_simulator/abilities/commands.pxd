@@ -19,12 +19,13 @@ cdef int64_t SEEKS_FIGHTS
 cdef int64_t NEEDS_TARGET
 
 
-@cython.locals(c=Columns)
+@cython.locals(c=Columns, units=tuple)
 cdef _soon(WorldFields world, int64_t slot)
 @cython.locals(c=Columns, step=double)
 cpdef bint can_move(WorldFields world, int64_t slot) except -1
 @cython.locals(c=Columns, armed=bint)
 cpdef bint can_attack(WorldFields world, int64_t slot) except -1
+@cython.locals(c=Columns, units=tuple)
 cpdef bint can_reach(WorldFields world, int64_t slot, int64_t victim) except -1
 cdef bint _commandable(object unit) except -1
 @cython.locals(c=Columns, waiting=list)

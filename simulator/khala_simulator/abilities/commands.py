@@ -242,7 +242,7 @@ def _soon(world: World, slot: int) -> UnitType:
         if row is not None:
             return world.catalog.units[row]
     units: tuple[UnitType, ...] = world.catalog.units
-    return units[int(c.type[slot])]
+    return units[c.type[slot]]
 
 
 def can_move(world: World, slot: int) -> bool:
@@ -263,7 +263,9 @@ def can_attack(world: World, slot: int) -> bool:
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
     """Return whether the unit has a weapon that it can aim at ``victim`` now."""
-    if world.unit_type(victim).untargetable or not _commandable(world.unit_type(slot)):
+    c = columns.columns_of(world)
+    units = world.catalog.units
+    if units[c.type[victim]].untargetable or not _commandable(units[c.type[slot]]):
         return False
     return targets.weapon_for(world, slot, victim) >= 0
 

@@ -9,6 +9,9 @@ from khala_simulator.world.fields cimport WorldFields
 cdef int64_t NOBODY
 
 
+cpdef refresh(WorldFields world, int64_t slot)
+@cython.locals(c=Columns)
+cdef _note(WorldFields world, int64_t slot)
 @cython.locals(c=Columns, row=int64_t, at=int64_t, kinds=list)
 cpdef body_traits(WorldFields world, int64_t slot)
 cdef _rearm(WorldFields world, int64_t slot, int64_t target)

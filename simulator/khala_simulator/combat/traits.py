@@ -30,7 +30,22 @@ DISGUISE: Final = "Changeling"  # types that look armed and are not
 def refresh(world: World, slot: int) -> None:
     """Write the traits of a slot from its type, its owner, the owner's upgrades and its buffs."""
     body_traits(world, slot)
-    world.note_traits(slot)
+    _note(world, slot)
+
+
+def _note(world: World, slot: int) -> None:
+    """Note a unit's changed traits for the systems that skip worlds without such units."""
+    c = columns.columns_of(world)
+    shields, life, energy = world.regenerating
+    world.regenerating = (
+        shields or c.shield_regen[slot] != 0.0,
+        life or c.life_regen[slot] != 0.0,
+        energy or c.energy_regen[slot] != 0.0,
+    )
+    world.hiding = world.hiding or c.cloaked[slot] or c.burrowed[slot]
+    world.census = world.tally = world.casters = None
+    world.looked_at = -1
+    world.scan_now = True
 
 
 def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:

@@ -73,7 +73,7 @@ def call_off(world: World, slot: int) -> None:
     payments.refund(world, owner, world.invested.get(slot, (0.0, 0.0)), payments.CANCELLED)
     world.deaths.append(Death(world.loop, world.tag_of(slot), unit.id, owner, NO_KILLER))
     drone = unit.structure and unit.race == "zerg" and any(way.producer == "Drone" for way in unit.made_by)
-    world.remove(slot)
+    lifecycle.remove(world, slot)
     if drone:
         lifecycle.spawn(world, world.catalog.unit("Drone"), owner, (x, y))
 

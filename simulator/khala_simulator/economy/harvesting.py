@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.economy import touching
 from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.columns import NOBODY
@@ -167,7 +167,7 @@ def leave(world: World, slot: int) -> None:
         world.work_until[patch] = world.loop + MECHANICS.harvest_handover
     if world.carrier[slot] != NOBODY and world.carrier[slot] == patch:
         x, y = _door(world, slot, patch)
-        world.unstow(slot, (x, y))
+        lifecycle.unstow(world, slot, (x, y))
         world.looks_around[slot] = False
 
 

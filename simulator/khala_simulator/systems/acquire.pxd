@@ -29,6 +29,7 @@ cdef int64_t ANYBODY
 
 
 cdef class _Foes:
+    cdef Py_ssize_t room
     cdef tuple arrays
     cdef int64_t* slot
     cdef Point* place
@@ -42,6 +43,9 @@ cdef class _Foes:
     cdef double* ranges
     cdef bint filters
     cdef bint zones
+
+    @cython.locals(c=Columns, i=Py_ssize_t, slot=int64_t)
+    cdef look(self, WorldFields world, int64_t player)
 
 
 @cython.locals(loop=int64_t, slot=int64_t, player=int64_t)
@@ -57,6 +61,8 @@ cdef double _squared_distance_from_guard(Columns c, int64_t slot) noexcept
 cdef bint _gives_up(Columns c, int64_t slot) noexcept
 @cython.locals(away=bint)
 cdef void _slip_leash(Columns c, int64_t slot) noexcept
+@cython.locals(foes=_Foes)
+cdef _Foes _foes_of(WorldFields world, int64_t player)
 cdef bint is_foe(Columns c, int64_t player, int64_t slot) noexcept
 cdef int64_t _foe_of(Columns c, int64_t slot) noexcept
 @cython.locals(threatens=bint)

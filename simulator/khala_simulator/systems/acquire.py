@@ -136,18 +136,16 @@ def _slip_leash(c: Columns, slot: int) -> None:
 class _Foes:
     """The enemies that a player sees and can aim at."""
 
-    def __init__(self, world: World, player: int) -> None:
-        c = columns.columns_of(world)
-        live = world.live
-        slots = memory.ints(live)
+    def __init__(self, room: int) -> None:
+        self.room = room
         self.arrays = (
-            memory.new_ints(len(live)),
-            memory.new_points(len(live)),
-            memory.new_floats(len(live)),
-            memory.new_ints(len(live)),
-            memory.new_floats(len(live)),
-            memory.new_ints(len(live)),
-            memory.new_ints(len(live)),
+            memory.new_ints(room),
+            memory.new_points(room),
+            memory.new_floats(room),
+            memory.new_ints(room),
+            memory.new_floats(room),
+            memory.new_ints(room),
+            memory.new_ints(room),
         )
         self.slot = memory.ints(self.arrays[0])
         self.place = memory.points(self.arrays[1])
@@ -156,6 +154,16 @@ class _Foes:
         self.rank = memory.floats(self.arrays[4])
         self.threatens = memory.ints(self.arrays[5])  # planes
         self.only = memory.ints(self.arrays[6])  # the slot of the only unit that it threatens, or ANYBODY
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world takes its own."""
+        return type(None), ()
+
+    def look(self, world: World, player: int) -> None:
+        """Find the enemies of a player."""
+        c = columns.columns_of(world)
+        live = world.live
+        slots = memory.ints(live)
         self.count = 0
         self.widest = 0.0
         for i in range(len(live)):
@@ -173,6 +181,15 @@ class _Foes:
         self.ranges = memory.floats(world.stats.range[player])
         self.filters = census.census(world).weapons_with_filters
         self.zones = bool(world.area_effects)
+
+
+def _foes_of(world: World, player: int) -> _Foes:
+    """Return the enemies that a player sees and can aim at, in room that all players use in turn."""
+    foes: _Foes | None = world.foes  # type: ignore[assignment]  # its fields say less
+    if foes is None or foes.room < len(world.live):
+        foes = world.foes = _Foes(2 * len(world.live))
+    foes.look(world, player)
+    return foes
 
 
 def is_foe(c: Columns, player: int, slot: int) -> bool:
@@ -198,7 +215,7 @@ def _seek(world: World, c: Columns, player: int, seekers: list[int]) -> None:
     mine = [slot for slot in seekers if c.owner[slot] == player]
     if not mine:
         return
-    foes = _Foes(world, player)
+    foes = _foes_of(world, player)
     if not foes.count:
         return
     chosen = []

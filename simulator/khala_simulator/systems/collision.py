@@ -160,8 +160,7 @@ def _leave_wall(grid: SurfaceGrid, before: memory.Point, after: memory.Point) ->
 
 def _note_blocked(world: World, crowd: Crowd, c: Columns, slots: Cells) -> None:
     """Count the loops in which walkers made no headway, and send stuck ones around the obstacle."""
-    stuck_slots = memory.new_ints(crowd.count)
-    shifts = memory.new_points(crowd.count)
+    stuck_slots = shifts = None
     stuck = 0
     for i in range(crowd.count):
         slot = slots[i]
@@ -178,8 +177,10 @@ def _note_blocked(world: World, crowd: Crowd, c: Columns, slots: Cells) -> None:
             continue
         c.blocked[slot] += 1
         if c.blocked[slot] % DETOUR_AFTER == 0:
+            if stuck_slots is None or shifts is None:
+                stuck_slots, shifts = memory.new_ints(crowd.count), memory.new_points(crowd.count)
             memory.ints(stuck_slots)[stuck] = slot
             memory.points(shifts)[stuck] = memory.point(x - intended.x, y - intended.y)
             stuck += 1
-    if stuck:
+    if stuck_slots is not None and shifts is not None:
         avoidance.begin(world, stuck_slots[:stuck], shifts[:stuck])

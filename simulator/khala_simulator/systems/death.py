@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_simulator.abilities.registry import DEATHS, FINALS
+from khala_simulator.combat import lifecycle
 from khala_simulator.native import columns, memory
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
@@ -47,15 +48,15 @@ def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
     if len(world.buffs):
         _last_of_buffs(world, slot)
     _note(world, slot, killer)
-    for passenger in world.passengers(slot):
+    for passenger in [other for other in range(world.top) if c.carrier[other] == slot]:
         world.life[passenger] = 0.0
         _note(world, passenger, killer)
-        world.remove(passenger)
+        lifecycle.remove(world, passenger)
     c = columns.columns_of(world)
     for victim in range(world.top):
         if c.attacker[victim] == slot and c.life[victim] <= 0.0:
             killers[victim] = owner
-    world.remove(slot)
+    lifecycle.remove(world, slot)
 
 
 def _last_of_buffs(world: World, slot: int) -> None:

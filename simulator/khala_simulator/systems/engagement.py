@@ -56,9 +56,10 @@ def measure(world: World) -> None:
         follows |= c.needs_target[slot]
         approaches |= c.casts[slot]
         goes_back |= c.returning[slot]
-    fighters = memory.new_ints(fighting)
+    if len(world.fighters) != fighting:
+        world.fighters = memory.new_ints(fighting)
+    fighters = world.fighters
     _note_fighters(c, n, memory.ints(fighters))
-    world.fighters = fighters
     if follows:
         _follow(c, n)
     if approaches:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.abilities import commands
+from khala_simulator.combat import lifecycle
 from khala_simulator.economy import harvesting
 from khala_simulator.economy.harvesting import ORDINARY_TRIP, Phase
 from khala_simulator.native import columns
@@ -98,7 +99,7 @@ def _begin(world: World, slot: int, patch: int) -> None:
     world.harvest[slot] = Phase.AT_RESOURCE
     world.work_until[slot] = world.loop + world.unit_type(patch).harvest_loops * numbers.get("time_factor", 1.0)
     if not _is_field(world, patch):
-        world.stow(slot, patch)
+        lifecycle.stow(world, slot, patch)
         world.order_target[slot] = patch
 
 
@@ -125,7 +126,7 @@ def _take(world: World, slot: int) -> None:
         world.alert(int(world.owner[slot]), "VespeneExhausted" if gas else "MineralsExhausted")
     if world.contents[patch] <= 0 and not gas:
         world.deaths.append(Death(world.loop, world.tag_of(patch), unit.id, int(world.owner[patch]), NO_KILLER))
-        world.remove(patch)
+        lifecycle.remove(world, patch)
 
 
 def _go_home(world: World, slot: int) -> None:

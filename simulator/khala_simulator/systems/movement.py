@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 TURNING_CIRCLES: Final = 4.0  # a flyer this many steps from its goal no longer swings around
 NO_DISTANCE: Final = 1e-12
+NO_CREEP: Final = np.zeros(0, dtype=np.bool_)
 
 
 def move(world: World) -> None:
@@ -123,7 +124,7 @@ def _walk(world: World, c: Columns, walking: int, brakers: bool) -> None:
     walks = _walks_of(world, walking)
     queue = world.queue
     creeps = world.growth.anywhere
-    covered = np.ascontiguousarray(world.creep) if creeps else memory.new_bools(0)
+    covered = np.ascontiguousarray(world.creep) if creeps else NO_CREEP
     creep = memory.bools(covered)
     width, height = world.map.terrain.size
     late = False

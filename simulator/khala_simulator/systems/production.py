@@ -115,7 +115,7 @@ def _put_outside(world: World, slot: int, parent: UnitType, unit: UnitType, rall
     place = placement.free_places(world, unit, (x + across * away, y + along * away), 1)[0]
     new = lifecycle.spawn(world, unit, int(world.owner[slot]), place, math.atan2(along, across))
     if unit.name in STOWED:
-        world.stow(new, slot)
+        lifecycle.stow(world, new, slot)
     return new
 
 

@@ -70,10 +70,10 @@ def act(world: World, action: Action, subject: int) -> None:
     """Carry out one action; ``subject`` is the slot of the unit that was touched, or NOBODY."""
     if isinstance(action, Remove):
         if action.remove == "touched":
-            world.remove(subject)
+            lifecycle.remove(world, subject)
         else:
             for slot in units_like(world, action.remove).tolist():
-                world.remove(slot)
+                lifecycle.remove(world, slot)
         return
     _ACTIONS[type(action)](world, action)
 
@@ -102,7 +102,8 @@ def create(world: World, spec: CreateSpec, *, placed: bool = False) -> list[int]
             world.energy[slot] = min(spec.energy, float(world.energy_max[slot]))
         for name, count in spec.cargo.items():
             for _ in range(count):
-                world.stow(lifecycle.spawn(world, world.catalog.unit(name), spec.player, (x, y), facing), slot)
+                inside = lifecycle.spawn(world, world.catalog.unit(name), spec.player, (x, y), facing)
+                lifecycle.stow(world, inside, slot)
     return slots
 
 
@@ -191,7 +192,7 @@ def _regroup(world: World, spec: RegroupSpec) -> None:
     old = [slot for slot in world.units_of(spec.player).tolist() if world.type[slot] == unit.row]
     lives = [float(world.life[slot]) for slot in old]
     for slot in old:
-        world.remove(slot)
+        lifecycle.remove(world, slot)
     for i, place in enumerate(_spots(world, unit, spec.at, len(lives) + spec.more)):
         slot = lifecycle.spawn(world, unit, spec.player, (place[0], place[1]))
         if i < len(lives):

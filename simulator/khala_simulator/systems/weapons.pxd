@@ -17,8 +17,10 @@ cpdef fire(WorldFields world)
 cdef void _count_down(Columns c, int64_t slot) noexcept
 cdef bint _is_under_way(Columns c, int64_t slot) noexcept
 cdef bint _takes_effect(Columns c, int64_t slot) noexcept
-@cython.locals(i=Py_ssize_t, slot=int64_t, row=int64_t, weapons=int64_t, turrets=bint, delay=double)
+@cython.locals(i=Py_ssize_t, slot=int64_t, turrets=bint)
 cdef _start_attacks(WorldFields world, Columns c)
+@cython.locals(row=int64_t, weapons=int64_t, delay=double)
+cdef _start(WorldFields world, Columns c, int64_t slot)
 cdef double draw_delay(WorldFields world, Point jitter) except? -1.0
 cdef bint _is_aimed(Columns c, int64_t slot) noexcept
 cdef int64_t _choose_weapon(Columns c, int64_t slot) noexcept

@@ -83,26 +83,27 @@ def _start_attacks(world: World, c: Columns) -> None:
     fighters = world.fighters
     slots = memory.ints(fighters)
     turrets = census.census(world).turrets
-    stats = world.stats
-    beam = memory.bools(stats.beam)
-    period = memory.floats(stats.period)
-    damage_point = memory.floats(stats.damage_point)
-    jitter = memory.points(stats.jitter)
-    weapons = stats.weapons
     for i in range(len(fighters)):
         slot = slots[i]
         if turrets and c.turreted[slot]:
             c.turret[slot] = turning.turn(c.turret[slot], c.toward[slot], c.turret_cos[slot], c.turret_sin[slot])
         if not c.in_reach[slot] or c.cooldown[slot] > 0.0 or _is_under_way(c, slot) or not _is_aimed(c, slot):
             continue
-        row = _choose_weapon(c, slot)
-        if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
-            row += weapons
-        delay = 0.0
-        if not beam[row]:
-            delay = draw_delay(world, jitter[row])
-        c.cooldown[slot] += period[c.owner[slot] * weapons + row] / c.attack_rate[slot] + delay
-        c.windup[slot] = damage_point[row] / c.attack_rate[slot]
+        _start(world, c, slot)
+
+
+def _start(world: World, c: Columns, slot: int) -> None:
+    """Begin an attack."""
+    stats = world.stats
+    weapons = stats.weapons
+    row = _choose_weapon(c, slot)
+    if row < 0:  # no weapon: the last of the catalog stands for it, as it always has
+        row += weapons
+    delay = 0.0
+    if not memory.bools(stats.beam)[row]:
+        delay = draw_delay(world, memory.points(stats.jitter)[row])
+    c.cooldown[slot] += memory.floats(stats.period)[c.owner[slot] * weapons + row] / c.attack_rate[slot] + delay
+    c.windup[slot] = memory.floats(stats.damage_point)[row] / c.attack_rate[slot]
 
 
 def draw_delay(world: World, jitter: memory.Point) -> float:

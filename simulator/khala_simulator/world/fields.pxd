@@ -19,6 +19,7 @@ cdef class WorldFields:
     cdef public int64_t loop
     cdef public int64_t top
     cdef public object live
+    cdef public object recycles
     cdef public object visible
     cdef public object visibility
     cdef public list memories
@@ -46,6 +47,7 @@ cdef class WorldFields:
     cdef public int64_t resting_version
     cdef public object bodies
     cdef public object steps
+    cdef public object foes
     cdef public object census
     cdef public list casters
     cdef public int64_t bare_at

@@ -27,6 +27,7 @@ class WorldFields:
         self.resting_version = -1  # the population among which no body touched another when all last stood still
         self.bodies: object | None = None  # room for what is measured between them, for ``contacts``
         self.steps: object | None = None  # room for the steps of those that walk, for ``movement``
+        self.foes: object | None = None  # room for those at whom a player may aim, for ``acquire``
         self.census: object | None = None  # of this population, for ``census``
         self.casters: list[tuple[int, tuple[int, ...]]] | None = None  # who may use what by itself, for ``autocast``
         self.bare_at = -1  # the population in which nothing makes creep or needs it

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.numeric import geometry
-from khala_simulator.numeric.arrays import some, which
+from khala_simulator.numeric.arrays import which
 from khala_simulator.tables.catalog import load_catalog
 from khala_simulator.tables.stats import new_stats
 from khala_simulator.world import shots
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 __all__ = ["NOBODY", "NO_TAG", "Death", "World"]
 
 NO_TAG: Final = 0
-TAG_BASE: Final = 1 << 32
 MOST_UNITS: Final = 4_000
 """Units up to which scripts and debug commands fill a world; tags have room for 16 383, and loops are slow by then."""
 
@@ -147,12 +146,12 @@ class World(UnitColumns, WorldFields):
         self.ended = False
         self.queue: list[list[Order]] = []
         self.live: Ints = np.zeros(0, dtype=np.int64)
-        self._recycles: Ints = np.zeros(0, dtype=np.int64)
+        self.recycles: Ints = np.zeros(0, dtype=np.int64)  # how often each slot was used before
         self.top = 1  # slots from here on were never used; slot 0 stays empty, as in the game
         self.growth = Creep(game_map.terrain, self.catalog.version)
         self.scan_now = True  # a unit lost a target or got an order since the last scan
         self.hurt: list[tuple[int, int]] = []  # (victim, attacker) of this loop's damage
-        self._grow(64)
+        self.make_room(64)
 
     # units --------------------------------------------------------------------------------------------------------
 
@@ -160,77 +159,6 @@ class World(UnitColumns, WorldFields):
     def room(self) -> int:
         """How many more units scripts and debug commands may make."""
         return max(0, MOST_UNITS - int(np.count_nonzero(self.alive)))
-
-    def add(self, unit: UnitType, owner: int, point: tuple[float, float], facing: float) -> int:
-        """Take a free slot for a unit at exactly ``point``; return it. ``lifecycle.spawn`` writes the rest."""
-        slot = self._free_slot()
-        self.clear(slot)
-        self.alive[slot] = True
-        self.tag[slot] = TAG_BASE | slot << INDEX_SHIFT | int(self._recycles[slot])
-        self.type[slot] = unit.row
-        self.owner[slot] = owner
-        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
-        self.heading[slot] = self.turret[slot] = geometry.heading(facing)
-        self.born_loop[slot] = self.loop
-        self.queue[slot] = []
-        return slot
-
-    def remove(self, slot: int) -> None:
-        """Take a unit out of the world; every reference to its slot becomes NOBODY."""
-        self.clear(slot)
-        self._recycles[slot] += 1
-        self.queue[slot] = []
-        self._end_fights_with(slot)
-        for column in (
-            self.target, self.order_target, self.attacker, self.carrier, self.addon, self.home, self.site, self.patch,
-            self.occupant,
-        ):  # fmt: skip
-            column[column == slot] = NOBODY
-        self.buffs.forget(slot)
-        for job in self.jobs.pop(slot, ()):
-            self.players[job.owner].underway.remove(job.makes)
-        self.rallies.pop(slot, None)
-        self.invested.pop(slot, None)
-        self.timers.pop(slot, None)
-        self.autocast.pop(slot, None)
-        self.hurt = [pair for pair in self.hurt if slot not in pair]
-        for missile in self.missiles:
-            missile.shot.forget(slot)
-        for hit in self.pending:
-            hit.shot.forget(slot)
-        for sweep in self.sweeps:
-            sweep.forget(slot)
-        self.ground.unblock(slot)
-        self.population_changed()
-
-    def _end_fights_with(self, slot: int) -> None:
-        """Note that the target of whoever fights a unit goes; workers look again before they end an attack-move."""
-        fighters = self.target == slot
-        self.in_reach[fighters] = False
-        self.scan_loop[fighters & self.defensive] = 0
-
-    def stow(self, slot: int, carrier: int) -> None:
-        """Take a unit out of the world into a carrier: it lives on, unseen and untouchable."""
-        self.carrier[slot] = carrier
-        self.walks[slot] = self.looks_around[slot] = self.holds[slot] = False
-        self.needs_target[slot] = self.casts[slot] = self.channels[slot] = False
-        self.wants[slot] = self.in_reach[slot] = False
-        self.visible[:, slot] = False
-        self._end_fights_with(slot)
-        for column in (self.target, self.order_target):
-            column[column == slot] = NOBODY
-        self.target[slot] = NOBODY
-        self.ground.unblock(slot)
-        self.population_changed()
-
-    def unstow(self, slot: int, point: tuple[float, float]) -> None:
-        """Put a unit from its carrier back into the world."""
-        self.carrier[slot] = NOBODY
-        self.pos[slot] = self.nav_point[slot] = self.guard[slot] = point
-        self.looks_around[slot] = True
-        self.visible[self.owner[slot], slot] = True
-        self.stand(slot)
-        self.population_changed()
 
     def alert(self, player: int, name: str) -> None:
         """Send a player an alert, by its name in the API."""
@@ -354,7 +282,7 @@ class World(UnitColumns, WorldFields):
         sha = hashlib.sha256(self.map.digest.encode())
         sha.update(repr((self.loop, self.ended, self.scan_now, self.hurt, self.rng.bit_generator.state)).encode())
         sha.update(self.state_bytes(self.top))
-        sha.update(self._recycles[: self.top].tobytes())
+        sha.update(self.recycles[: self.top].tobytes())
         sha.update(repr([self.queue[s] for s in self.live.tolist()]).encode())
         sha.update(repr([player.counters() for player in self.players]).encode())
         sha.update(repr(self.script.content()).encode())
@@ -368,46 +296,14 @@ class World(UnitColumns, WorldFields):
         sha.update(repr([list(memory.of_unit.values()) for memory in self.memories]).encode())
         return sha.hexdigest()
 
-    def population_changed(self) -> None:
-        """Note that a unit came, went or changed its type."""
-        self.live = which(self.alive & (self.carrier == NOBODY))
-        self.population += 1
-        self.census = self.tally = self.casters = None
-        self.scan_now = self.orders_changed = True
-        shields, life, energy = self.shield_regen, self.life_regen, self.energy_regen
-        self.regenerating = _any(shields), _any(life), _any(energy)
-        self.mortal = _any(self.expires)
-        self.hiding = some(self.cloaked | self.burrowed)
-
-    def note_traits(self, slot: int) -> None:
-        """Note a unit's changed traits for the systems that skip worlds without such units."""
-        shields, life, energy = self.regenerating
-        self.regenerating = (
-            shields or bool(self.shield_regen[slot]),
-            life or bool(self.life_regen[slot]),
-            energy or bool(self.energy_regen[slot]),
-        )
-        self.hiding = self.hiding or bool(self.cloaked[slot] or self.burrowed[slot])
-        self.census = self.tally = self.casters = None
-        self.looked_at = -1
-        self.scan_now = True
-
-    def _free_slot(self) -> int:
-        free = which(~self.alive[1 : self.top])
-        if free.size:
-            return int(free[0]) + 1
-        if self.top == self.capacity:
-            self._grow(self.capacity * 2)
-        self.top += 1
-        return self.top - 1
-
-    def _grow(self, capacity: int) -> None:
+    def make_room(self, capacity: int) -> None:
+        """Make room for so many slots."""
         visible = np.zeros((len(self.players), capacity), dtype=np.bool_)
         visible[:, : self.capacity] = self.visible
         self.visible = visible
         recycles = np.zeros(capacity, dtype=np.int64)
-        recycles[: self.capacity] = self._recycles
-        self._recycles = recycles
+        recycles[: self.capacity] = self.recycles
+        self.recycles = recycles
         self.queue += [[] for _ in range(capacity - self.capacity)]
         self.grow(capacity)
 
@@ -416,11 +312,6 @@ class World(UnitColumns, WorldFields):
 def _offsets(cells: tuple[tuple[int, int], ...]) -> Ints:
     """Return the cells of a footprint as an array (k, 2)."""
     return np.array(cells, dtype=np.int64)
-
-
-def _any(column: Floats | Ints) -> bool:
-    """Return whether any number is not zero; four times as fast as ``any``."""
-    return bool(np.count_nonzero(column))
 
 
 def _point(column: Floats, slot: int) -> tuple[float, float]:

@@ -138,7 +138,7 @@ def _foe(world: World, point: Point) -> int:
 def _fill(world: World, slot: int) -> None:
     """Put a passenger into the carrier."""
     passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, tuple(world.pos[slot].tolist()))
-    world.stow(passenger, slot)
+    lifecycle.stow(world, passenger, slot)
 
 
 def _man(world: World, slot: int) -> None:
@@ -146,7 +146,7 @@ def _man(world: World, slot: int) -> None:
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     x, y = world.pos[slot].tolist()
     for name in ("Marine", "Marauder"):
-        world.stow(lifecycle.spawn(world, world.catalog.unit(name), 1, (x, y)), slot)
+        lifecycle.stow(world, lifecycle.spawn(world, world.catalog.unit(name), 1, (x, y)), slot)
     for passenger in world.passengers(slot):
         world.pos[passenger] = x, y
         refresh(world, passenger)

@@ -11,7 +11,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.abilities import casting
 from khala_simulator.api.observation import observe
 from khala_simulator.api.sight import Display
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.process.client import command
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tick import advance
@@ -164,7 +164,7 @@ def test_a_transport_tells_who_is_inside(make_table: Any) -> None:
     table = make_table(FEATURES)
     carrier, marine = table.put("Medivac", 1, 10, 16), table.put("Marine", 1, 10, 17)
     tag = table.world.tag_of(marine)
-    table.world.stow(marine, carrier)
+    lifecycle.stow(table.world, marine, carrier)
     (told,) = units(table)
     assert [(p.tag, p.unit_type, p.health) for p in told.passengers] == [(tag, 48, 45.0)]
     assert (told.cargo_space_taken, told.cargo_space_max) == (1, 8)

@@ -11,6 +11,7 @@ from s2clientprotocol import sc2api_pb2 as sc
 from khala_simulator.abilities import casting, commands
 from khala_simulator.api import debug
 from khala_simulator.api.actions import judge, perform
+from khala_simulator.combat import lifecycle
 from khala_simulator.economy import harvesting
 from khala_simulator.process.client import interface
 from khala_simulator.tick import advance
@@ -77,7 +78,7 @@ def test_a_click_on_the_production_panel_calls_a_job_off(table: Table) -> None:
 
 def test_a_transport_with_somebody_inside_has_the_cargo_panel(table: Table) -> None:
     prism, zealot = table.put("WarpPrism", 1, 30.0, 30.0), table.put("Zealot", 1, 30.0, 32.0)
-    table.world.stow(zealot, prism)
+    lifecycle.stow(table.world, zealot, prism)
     select(table, prism)
     ui = table.observe().ui_data
     assert [passenger.unit_type for passenger in ui.cargo.passengers] == [73]

@@ -10,7 +10,7 @@ import pytest
 from khala_simulator.abilities import casting, commands
 from khala_simulator.abilities.registry import SKILLS
 from khala_simulator.abilities.skill import Skill
-from khala_simulator.combat import buffs, traits
+from khala_simulator.combat import buffs, lifecycle, traits
 from khala_simulator.tables.abilities import AbilityAim, Filter, Need
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.casts import Cast
@@ -284,12 +284,12 @@ def test_a_buff_goes_with_its_bearer_and_outlives_its_caster(field: Any, gone: s
 
 def test_a_unit_inside_another_is_out_of_the_world_and_comes_back(field: Any) -> None:
     world, marine, medivac = field.world, field.put("Marine", 1, 10, 16), field.put("Medivac", 1, 10, 18)
-    world.stow(marine, medivac)
+    lifecycle.stow(world, marine, medivac)
     field.play(5)
     assert marine not in world.live
     assert world.passengers(medivac) == [marine]
     assert not world.visible[2, marine]
-    world.unstow(marine, (12.0, 16.0))
+    lifecycle.unstow(world, marine, (12.0, 16.0))
     field.play(5)
     assert marine in world.live
     assert world.visible[2, marine]
@@ -298,7 +298,7 @@ def test_a_unit_inside_another_is_out_of_the_world_and_comes_back(field: Any) ->
 def test_what_a_carrier_holds_dies_with_it(field: Any) -> None:
     world, marine, medivac = field.world, field.put("Marine", 1, 10, 16), field.put("Medivac", 1, 10, 18)
     tag = world.tag_of(marine)
-    world.stow(marine, medivac)
+    lifecycle.stow(world, marine, medivac)
     world.life[medivac] = 0.0
     field.play(1)
     assert world.slot_of(tag) == NOBODY
@@ -308,7 +308,7 @@ def test_what_a_carrier_holds_dies_with_it(field: Any) -> None:
 def test_timed_life_ends(field: Any) -> None:
     slot = field.put("Marine", 1, 10, 16)
     field.world.expires[slot] = 50
-    field.world.population_changed()
+    lifecycle.note_population(field.world)
     field.play(49)
     assert field.world.alive[slot]
     field.play(1)

@@ -82,7 +82,7 @@ def casters(world: World, ability: Ability) -> Iterator[int]:
             slot = lifecycle.spawn(world, unit, 1, CENTRE if not unit.structure else (30.5, 42.5))
             world.energy[slot] = world.energy_max[slot]
             yield slot
-            world.remove(slot)
+            lifecycle.remove(world, slot)
 
 
 def aims(world: World, slot: int, ability: Ability) -> Iterator[tuple[int, Point | None]]:
@@ -125,14 +125,14 @@ def _use(number: int, point: Point = (36.0, 32.0)) -> Callable[[World, int], Non
 def _fill(world: World, slot: int) -> None:
     """Put a passenger into a carrier."""
     passenger = lifecycle.spawn(world, world.catalog.unit("SCV"), 1, CENTRE)
-    world.stow(passenger, slot)
+    lifecycle.stow(world, passenger, slot)
 
 
 def _man(world: World, slot: int) -> None:
     """Put soldiers with stimpacks into a Bunker, and an enemy before it."""
     commands.grant_upgrade(world, 1, world.catalog.upgrade("Stimpack").id)
     for name in ("Marine", "Marauder"):
-        world.stow(lifecycle.spawn(world, world.catalog.unit(name), 1, CENTRE), slot)
+        lifecycle.stow(world, lifecycle.spawn(world, world.catalog.unit(name), 1, CENTRE), slot)
     x, y = world.pos[slot].tolist()
     for passenger in world.passengers(slot):
         world.pos[passenger] = x, y

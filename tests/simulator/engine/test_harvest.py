@@ -232,7 +232,7 @@ def test_twelve_workers_earn_57_to_58_each_a_minute(opening: dict[int, float]) -
 def line(world: World, count: int, kind: str = "SCV") -> list[int]:
     """Put ``count`` workers before the fields of each player of a melee game, and no others; return all of them."""
     for slot in (s for s in world.live.tolist() if world.unit_type(s).worker):
-        world.remove(slot)
+        lifecycle.remove(world, slot)
     made = []
     for player in world.players[1:]:
         assert player.start is not None

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from khala_simulator.abilities import commands
-from khala_simulator.combat import damage
+from khala_simulator.combat import damage, lifecycle
 
 
 def hit_once(field: Any, attacker: str, victim: int) -> None:
@@ -14,7 +14,7 @@ def hit_once(field: Any, attacker: str, victim: int) -> None:
     row = world.catalog.unit(attacker).weapon_against("ground").row
     damage.strike(world, a, 1, victim, world.stats.damage[1][row][0])
     world.hurt.clear()
-    world.remove(a)
+    lifecycle.remove(world, a)
 
 
 def test_shields_come_back_160_loops_after_the_last_damage_at_an_eighth_per_loop(field: Any) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.protoss import carrier as carriers
+from khala_simulator.combat import lifecycle
 from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
@@ -62,7 +63,7 @@ def test_it_needs_the_minerals_and_queues_five_at_most(field: Any) -> None:
     field.world.players[1].minerals = 14.0
     assert field.why_not(slot, ARM) is ActionResult.NOT_ENOUGH_MINERALS
     for lost in carriers.crew_of(field.world, slot):
-        field.world.remove(lost)
+        lifecycle.remove(field.world, lost)
     field.world.players[1].minerals = 500.0
     for _ in range(5):
         field.order(slot, ARM)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from khala_simulator.abilities import commands
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.combat.damage import apply_damage
 from khala_simulator.tables.action_result import ActionResult
 
@@ -92,7 +92,7 @@ def test_a_nova_goes_out_with_its_disruptor(field: Any, how: str) -> None:
     if how == "dead":
         field.world.life[slot] = 0.0
     elif how == "carried":
-        field.world.stow(slot, field.put("WarpPrism", 1, 4.0, 4.0))
+        lifecycle.stow(field.world, slot, field.put("WarpPrism", 1, 4.0, 4.0))
     else:
         buffs.apply(field.world, slot, "GravitonBeam" if how == "lifted" else "OracleStasisTrapTarget", loops=60)
     field.play(40)

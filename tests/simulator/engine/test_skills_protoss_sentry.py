@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from khala_simulator.abilities import commands
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 
@@ -163,7 +163,7 @@ def test_nobody_on_the_ground_walks_through_a_force_field_but_round_it(field: An
     flyer = field.put("Observer", 2, 20.0, 10.5)
     field.order(slot, FORCE_FIELD, point=(16.5, 10.5))
     field.play(2)
-    field.world.remove(slot)
+    lifecycle.remove(field.world, slot)
     commands.move(field.world, [walker, flyer], (13.0, 10.5))
     nearest = math.inf
     passed_over = math.inf
@@ -250,7 +250,7 @@ def test_an_image_takes_double_without_armor_and_deals_none(make_field: Any, ver
     field.play(1)
     image, other = (s for s in field.world.live.tolist() if s != slot)
     for gone in (slot, other):
-        field.world.remove(gone)
+        lifecycle.remove(field.world, gone)
     marine = field.put("Marine", 2, 11.0, 11.0)
     commands.attack_unit(field.world, [image], field.world.tag_of(marine))
     before = field.vitals(image)

@@ -8,7 +8,7 @@ import pytest
 
 from khala_simulator.abilities import casting, commands
 from khala_simulator.abilities.terran.buildings import Radar, radars
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 
@@ -319,7 +319,7 @@ def test_a_burning_structure_burns_down_and_nobody_is_credited(field: Any) -> No
 def test_a_bunker_that_holds_marines_burns_as_well(field: Any) -> None:
     world = field.world
     slot, marine = field.put("Bunker", 1, 10.5, 10.5), field.put("Marine", 1, 14, 10)
-    world.stow(marine, slot)
+    lifecycle.stow(world, marine, slot)
     world.life[slot] = 100.0
     field.play(60)
     assert world.life[slot] < 95.0
@@ -366,7 +366,7 @@ def test_salvage_gives_three_quarters_back_when_it_is_done(field: Any) -> None:
 
 def test_a_bunker_with_somebody_inside_is_not_salvaged(field: Any) -> None:
     slot, marine = field.put("Bunker", 1, 10.5, 10.5), field.put("Marine", 1, 14, 10)
-    field.world.stow(marine, slot)
+    lifecycle.stow(field.world, marine, slot)
     assert field.why_not(slot, SALVAGE) is ActionResult.ERROR
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from khala_simulator.abilities import commands
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.tables.mechanics import MECHANICS
 
@@ -224,7 +224,7 @@ def armed(field: Any) -> int:
     slot: int = field.still("Ghost", 1, 6, 16)
     academy = field.still("GhostAcademy", 1, 4.5, 28.5)
     nuke = field.put("Nuke", 1, 4.5, 28.5)
-    field.world.stow(nuke, academy)
+    lifecycle.stow(field.world, nuke, academy)
     return slot
 
 

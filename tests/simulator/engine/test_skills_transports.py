@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from khala_simulator.abilities import casting, commands
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.tables.action_result import ActionResult
 
 VERSIONS = ("4.10", "5.0.13")
@@ -31,7 +31,7 @@ def fill(field: Any, carrier: int, *names: str) -> list[int]:
     slots = []
     for name in names:
         slot = put(field, name, int(field.world.owner[carrier]), 3.0, 3.0)
-        field.world.stow(slot, carrier)
+        lifecycle.stow(field.world, slot, carrier)
         slots.append(slot)
     return slots
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from khala_simulator.abilities import casting
+from khala_simulator.combat import lifecycle
 from khala_simulator.economy import supply
 from khala_simulator.tables.catalog import load_catalog
 
@@ -33,7 +34,7 @@ def test_two_hundred_is_the_most(field: Field) -> None:
 
 def test_units_inside_others_count_and_hallucinations_do_not(field: Field) -> None:
     prism, zealot = field.put("WarpPrism", 1, 10.0, 10.0), field.put("Zealot", 1, 10.0, 10.0)
-    field.world.stow(zealot, prism)
+    lifecycle.stow(field.world, zealot, prism)
     field.world.hallucination[field.put("Archon", 1, 12.0, 10.0)] = True
     assert supply.in_use(field.world, 1) == 4.0
 

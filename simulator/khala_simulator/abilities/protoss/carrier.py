@@ -45,7 +45,7 @@ def add_interceptor(world: World, carrier: int) -> int:
     x, y = world.pos[carrier].tolist()
     slot = lifecycle.spawn(world, world.catalog.unit(INTERCEPTOR), int(world.owner[carrier]), (x, y))
     world.home[slot] = carrier
-    world.stow(slot, carrier)
+    lifecycle.stow(world, slot, carrier)
     return slot
 
 
@@ -107,7 +107,7 @@ def _launch(world: World, carrier: int, prey: int, ability: Ability) -> None:
         return
     slot = docked[0]
     x, y = world.pos[carrier].tolist()
-    world.unstow(slot, (x, y))
+    lifecycle.unstow(world, slot, (x, y))
     teleport.to(world, slot, (x, y))
     world.heading[slot] = world.heading[carrier]
     refresh(world, slot)
@@ -127,7 +127,7 @@ def _direct(world: World, slot: int, carrier: int, leash: float) -> None:
     elif gap(world, slot, carrier) <= DOCKING_GAP:
         world.queue[slot] = []
         commands.begin(world, slot, None)
-        world.stow(slot, carrier)
+        lifecycle.stow(world, slot, carrier)
         refresh(world, slot)
     elif int(world.order_kind[slot]) != OrderKind.FOLLOW:
         commands.begin(world, slot, Order(OrderKind.FOLLOW, MOVE, target=world.tag_of(carrier)))

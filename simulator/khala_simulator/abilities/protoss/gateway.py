@@ -151,7 +151,7 @@ def _shift(world: World, area: AreaEffect) -> None:
     if shade == NOBODY or not held:
         area.end = world.loop
         if shade != NOBODY:
-            world.remove(shade)
+            lifecycle.remove(world, shade)
         if adept != NOBODY:
             buffs.remove(world, adept, SHIFTING)
     elif world.loop >= area.end:
@@ -162,7 +162,7 @@ def _arrive(world: World, adept: int, shade: int) -> None:
     x, y = world.pos[shade].tolist()
     orders = world.orders_of(shade)
     heading = world.heading[shade].copy()
-    world.remove(shade)
+    lifecycle.remove(world, shade)
     for name in (SHIFTING, *LEFT_BEHIND):
         buffs.remove(world, adept, name)
     teleport.to(world, adept, teleport.spot_near(world, adept, (x, y)) or (x, y))

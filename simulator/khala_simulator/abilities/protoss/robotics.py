@@ -76,7 +76,7 @@ def _burn(world: World, area: AreaEffect) -> None:
     elif world.loop >= area.end:
         _burst(world, area, disruptor, nova)
     if area.end <= world.loop and nova != NOBODY:
-        world.remove(nova)
+        lifecycle.remove(world, nova)
 
 
 def _burst(world: World, area: AreaEffect, disruptor: int, nova: int) -> None:

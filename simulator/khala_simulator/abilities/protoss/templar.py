@@ -100,8 +100,8 @@ def _fuse(world: World, cast: Cast) -> None:
     owner = int(world.owner[cast.slot])
     x, y = ((world.pos[cast.slot] + world.pos[cast.target]) / 2.0).tolist()
     archon = lifecycle.spawn(world, world.catalog.unit(str(cast.ability.numbers["unit"])), owner, (x, y))
-    world.remove(cast.slot)
-    world.remove(cast.target)
+    lifecycle.remove(world, cast.slot)
+    lifecycle.remove(world, cast.target)
     world.build_progress[archon] = 0.0
     refresh(world, archon)
     end = world.loop + cast.ability.loops

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.shared.production import MORPHS
 from khala_simulator.abilities.skill import Skill
+from khala_simulator.combat import lifecycle
 from khala_simulator.economy import building_sites, construction, payments, production
 from khala_simulator.tables import prices
 from khala_simulator.tables.action_result import ActionResult
@@ -44,7 +45,7 @@ def _place(world: World, cast: Cast) -> None:
         unit = _rich(world, unit, geyser)
     point = _where(world, cast, unit)
     if race == "zerg":
-        world.remove(slot)
+        lifecycle.remove(world, slot)
     made = construction.begin(
         world, unit, owner, point, loops=cast.ability.loops, paid=paid, by_itself=race != "terran"
     )

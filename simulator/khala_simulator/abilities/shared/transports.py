@@ -19,6 +19,7 @@ import numpy as np
 from khala_simulator.abilities import commands
 from khala_simulator.abilities.shared import teleport
 from khala_simulator.abilities.skill import Skill, gap
+from khala_simulator.combat import lifecycle
 from khala_simulator.combat.traits import kinds_on, refresh
 from khala_simulator.movement import placement
 from khala_simulator.numeric.arrays import which
@@ -100,7 +101,7 @@ def take_in(world: World, carrier: int, passenger: int) -> None:
     """Put a unit into a carrier at once; it drops its orders."""
     world.queue[passenger] = []
     commands.begin(world, passenger, None)
-    world.stow(passenger, carrier)
+    lifecycle.stow(world, passenger, carrier)
     x, y = world.pos[carrier].tolist()
     teleport.to(world, passenger, (x, y))
     refresh(world, passenger)
@@ -197,7 +198,7 @@ def unload_passenger(world: World, carrier: int, passenger: int) -> bool:
     if not len(places):
         return False
     px, py = places[0].tolist()
-    world.unstow(passenger, (px, py))
+    lifecycle.unstow(world, passenger, (px, py))
     teleport.to(world, passenger, (px, py))
     refresh(world, passenger)
     commands.begin(world, passenger, None)
@@ -266,7 +267,7 @@ def _spill(world: World, slot: int) -> None:
     for passenger in world.passengers(slot):
         if not unload_passenger(world, slot, passenger):
             x, y = world.pos[slot].tolist()
-            world.unstow(passenger, (x, y))
+            lifecycle.unstow(world, passenger, (x, y))
 
 
 def _hand_on(world: World, slot: int) -> None:

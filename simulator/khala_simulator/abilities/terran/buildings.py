@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from khala_simulator.abilities.skill import Skill, number
-from khala_simulator.combat import buffs
+from khala_simulator.combat import buffs, lifecycle
 from khala_simulator.tables.action_result import ActionResult
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.world import Death
@@ -83,7 +83,7 @@ def _take_down(world: World, slot: int, row: np.void) -> None:
     world.players[owner].minerals += minerals * share
     world.players[owner].vespene += vespene * share
     world.deaths.append(Death(world.loop, world.tag_of(slot), world.unit_type(slot).id, owner, NO_KILLER))
-    world.remove(slot)
+    lifecycle.remove(world, slot)
 
 
 # radar ----------------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import numpy as np
 
 from khala_simulator.abilities.shared.cancel import cancelling
 from khala_simulator.abilities.skill import Skill, around, number
+from khala_simulator.combat import lifecycle
 from khala_simulator.combat.damage import apply_damage
 from khala_simulator.world.area_effects import AreaEffect
 from khala_simulator.world.casts import Cast
@@ -31,7 +32,7 @@ def _call(world: World, cast: Cast) -> None:
     nuke = world.catalog.unit("Nuke").row
     armed = np.flatnonzero(world.alive & (world.owner == owner) & (world.type == nuke))
     if armed.size:
-        world.remove(int(armed[0]))
+        lifecycle.remove(world, int(armed[0]))
     down = world.loop + number(cast, "delay_loops")
     strike = AreaEffect(
         "nuke",
