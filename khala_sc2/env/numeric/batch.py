@@ -15,7 +15,7 @@ from khala_protocol.errors import ConfigError
 from khala_sc2.env.numeric import sizes
 from khala_sc2.env.numeric.maps import smac_map
 from khala_sc2.env.numeric.options import options_of
-from khala_sc2.env.numeric.starcraft2 import BEGUN, Outcome, StarCraft2Env
+from khala_sc2.env.numeric.starcraft2 import BEGUN, BattleStep, StarCraft2Env
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -140,8 +140,8 @@ class Batch:
                 battle.begin()
                 self._outcomes[row] = BEGUN
             else:
-                self._outcomes[row] = battle.play(self._rows[row].action)
-                if self._same_step and battle.over:
+                outcome = self._outcomes[row] = battle.play(self._rows[row].action)
+                if self._same_step and outcome.over:
                     battle.see(self._arrays["final_observation"][row], self._arrays["final_state"][row])
                     battle.begin()
             self._see(row)
@@ -149,7 +149,7 @@ class Batch:
 
     def _note(self) -> None:
         """Write what the step was worth to all battles, and how they stand."""
-        for name, column in zip(Outcome._fields, zip(*self._outcomes, strict=True), strict=True):
+        for name, column in zip(BattleStep._fields, zip(*self._outcomes, strict=True), strict=True):
             self._arrays[name][:] = column
 
     def _see(self, row: int) -> None:

@@ -71,7 +71,8 @@ class NumericParallelEnv(ParallelEnv[str, Any, int]):  # type: ignore[misc]  # P
             return {}, {}, {}, {}, {}
         numbers = np.array([int(actions.get(agent, 0)) for agent in self.agents])
         outcome = self.battles.play(numbers)
-        seen, agents = self._seen(), self.agents
+        seen = self._seen()
+        agents = self.agents
         self.agents = [] if self.battles.over else agents
         return (
             seen,

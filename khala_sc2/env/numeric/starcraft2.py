@@ -47,7 +47,7 @@ _OVER: Final = "the episode is over: call reset() first"
 PICTURE_PX: Final = (512, 512)
 
 
-class Outcome(NamedTuple):
+class BattleStep(NamedTuple):
     """What a step was worth, how the episode stands, and the dead of both sides."""
 
     reward: float
@@ -61,8 +61,13 @@ class Outcome(NamedTuple):
     elapsed: int
     """Steps of the episode."""
 
+    @property
+    def over(self) -> bool:
+        """Whether the episode is over."""
+        return self.terminated or self.truncated
 
-BEGUN: Final = Outcome(0.0, False, False, False, 0, 0, 0)
+
+BEGUN: Final = BattleStep(0.0, False, False, False, 0, 0, 0)
 """An episode before its first step."""
 
 
@@ -184,7 +189,7 @@ class StarCraft2Env(SmacNames):
         outcome = self.play(np.array(numbers))
         return outcome.reward, self.over, self.info()
 
-    def play(self, actions: NDArray[np.int64]) -> Outcome:
+    def play(self, actions: NDArray[np.int64]) -> BattleStep:
         """Play a step as `step` does; a unit stops in place of an action that is not available."""
         if self._battle is None or self.over:
             raise ValueError(_OVER)
@@ -220,7 +225,7 @@ class StarCraft2Env(SmacNames):
                 can = np.flatnonzero(self._scene.masks[agent]).tolist()
                 raise ValueError(f"agent {agent} cannot perform action {action}: it can perform {can}")
 
-    def _judge(self, fighters: Fighters) -> Outcome:
+    def _judge(self, fighters: Fighters) -> BattleStep:
         """Return what a step was worth and how it ended, and count the battle if it is over."""
         options = self.options
         ending = fighters.ending()
@@ -232,7 +237,7 @@ class StarCraft2Env(SmacNames):
         reward = rewards.of_step(fighters, ending, options)
         if options.reward_scale:
             reward /= self.max_reward / options.reward_scale_rate
-        return Outcome(reward, ending != GOES_ON, timeout, ending == WON, *fighters.counts(), steps)
+        return BattleStep(reward, ending != GOES_ON, timeout, ending == WON, *fighters.counts(), steps)
 
     @property
     def reward(self) -> float:
@@ -247,7 +252,7 @@ class StarCraft2Env(SmacNames):
     @property
     def over(self) -> bool:
         """Whether the episode is over."""
-        return self._outcome.terminated or self._outcome.truncated
+        return self._outcome.over
 
     # seeing -------------------------------------------------------------------------------------------------------
 

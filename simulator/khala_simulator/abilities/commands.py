@@ -241,8 +241,9 @@ def _soon(world: World, slot: int) -> UnitType:
         row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
         if row is not None:
             return world.catalog.units[row]
-    units: tuple[UnitType, ...] = world.catalog.units
-    return units[c.type[slot]]
+    units = world.catalog.units
+    unit: UnitType = units[c.type[slot]]
+    return unit
 
 
 def can_move(world: World, slot: int) -> bool:

@@ -178,7 +178,8 @@ def _note_blocked(world: World, crowd: Crowd, c: Columns, slots: Cells) -> None:
         c.blocked[slot] += 1
         if c.blocked[slot] % DETOUR_AFTER == 0:
             if stuck_slots is None or shifts is None:
-                stuck_slots, shifts = memory.new_ints(crowd.count), memory.new_points(crowd.count)
+                stuck_slots = memory.new_ints(crowd.count)
+                shifts = memory.new_points(crowd.count)
             memory.ints(stuck_slots)[stuck] = slot
             memory.points(shifts)[stuck] = memory.point(x - intended.x, y - intended.y)
             stuck += 1
