@@ -55,7 +55,7 @@ def test_no_token_takes_more_than_linear_time(token: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_two_tokens_take_more_than_linear_time(seed: int) -> None:
     chance = random.Random(seed)
     units = ("".join(pair) for pair in chance.sample(PAIRS, 40))
@@ -63,7 +63,7 @@ def test_no_two_tokens_take_more_than_linear_time(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_mixture_of_tokens_takes_more_than_linear_time(seed: int) -> None:
     chance = random.Random(seed)
     units = ("".join(chance.choices(TOKENS, k=chance.choice((3, 3, 4, 5)))) for _ in range(50))
@@ -71,7 +71,7 @@ def test_no_mixture_of_tokens_takes_more_than_linear_time(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_many_openings_and_a_far_end_take_linear_time(seed: int) -> None:
     chance = random.Random(seed)
     for token, other in chance.sample(PAIRS, 40):

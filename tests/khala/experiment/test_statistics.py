@@ -226,7 +226,7 @@ def test_bootstrap_intervals_hold_the_truth_nearly_as_often(times: int, noise: f
 
 
 @pytest.mark.parametrize(
-    ("games", "times"), [(5, 60), pytest.param(12, 500, marks=pytest.mark.slow)], ids=["few", "many"]
+    ("games", "times"), [(5, 60), pytest.param(12, 120, marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_tests_find_nothing_where_nothing_is(games: int, times: int) -> None:
     noise = 3 * math.sqrt(0.05 * 0.95 / times)
