@@ -3,7 +3,7 @@ from libc.stdint cimport int64_t
 
 from khala_simulator.combat cimport census
 from khala_simulator.movement cimport turning
-from khala_simulator.native cimport columns, memory
+from khala_simulator.native cimport chance, columns, memory
 from khala_simulator.native.columns cimport Columns
 from khala_simulator.native.memory cimport Point
 from khala_simulator.world.fields cimport WorldFields

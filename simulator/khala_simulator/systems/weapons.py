@@ -15,7 +15,7 @@ import numpy as np
 from khala_simulator.combat import census
 from khala_simulator.combat.launchers import LAUNCHERS
 from khala_simulator.movement import turning
-from khala_simulator.native import columns, memory
+from khala_simulator.native import chance, columns, memory
 from khala_simulator.tables.stats import GROUND_PLANE
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.shots import PendingHit, Shot
@@ -108,7 +108,7 @@ def _start(world: World, c: Columns, slot: int) -> None:
 
 def draw_delay(world: World, jitter: memory.Point) -> float:
     """Return a random delay of a weapon's period in loops, between the two of its ``jitter``."""
-    return jitter.x + (jitter.y - jitter.x) * float(world.rng.random())
+    return jitter.x + (jitter.y - jitter.x) * chance.draw(world.rng)
 
 
 def _is_aimed(c: Columns, slot: int) -> bool:

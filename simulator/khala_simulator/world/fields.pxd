@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 cdef class WorldFields:
     # of `World`
     cdef public object map
+    cdef public object rng
     cdef public object catalog
     cdef public object stats
     cdef public object ground
