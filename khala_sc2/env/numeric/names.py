@@ -77,6 +77,8 @@ class SmacNames:
     n_obs_pathing = len(PATHING_POINTS)
     n_obs_height = len(HEIGHT_POINTS)
     force_restarts = 0
+    reward: float = 0
+    """Of the last step."""
     _spec: SmacMap
 
     def __getattr__(self, name: str) -> Any:

@@ -187,7 +187,7 @@ class StarCraft2Env(SmacNames):
         numbers = [int(action) for action in actions]
         self._check(numbers)
         outcome = self.play(np.array(numbers))
-        return outcome.reward, self.over, self.info()
+        return outcome.reward, outcome.over, self.info()
 
     def play(self, actions: NDArray[np.int64]) -> BattleStep:
         """Play a step as `step` does; a unit stops in place of an action that is not available."""
@@ -201,6 +201,7 @@ class StarCraft2Env(SmacNames):
         battle.see(scene.fighters)
         scene.look()
         self._outcome = self._judge(scene.fighters)
+        self.reward = self._outcome.reward
         return self._outcome
 
     def info(self) -> dict[str, Any]:
@@ -240,11 +241,6 @@ class StarCraft2Env(SmacNames):
         return BattleStep(reward, ending != GOES_ON, timeout, ending == WON, *fighters.counts(), steps)
 
     @property
-    def reward(self) -> float:
-        """The reward of the last step."""
-        return self._outcome.reward
-
-    @property
     def steps(self) -> int:
         """Steps of the episode so far."""
         return self._outcome.elapsed
@@ -253,6 +249,11 @@ class StarCraft2Env(SmacNames):
     def over(self) -> bool:
         """Whether the episode is over."""
         return self._outcome.over
+
+    @property
+    def timed_out(self) -> bool:
+        """Whether the episode ended at its limit, and not with the battle."""
+        return self._outcome.truncated
 
     # seeing -------------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from khala_simulator.combat.targets import take_other_weapon
-from khala_simulator.combat.traits import refresh
+from khala_simulator.combat.traits import check_slot, refresh
 from khala_simulator.native import columns, memory
 from khala_simulator.numeric import geometry
 from khala_simulator.world.columns import INDEX_SHIFT, NOBODY
@@ -27,6 +27,8 @@ FACING: Final = 4.7124  # down, as most units of a map face
 
 def spawn(world: World, unit: UnitType, owner: int, point: tuple[float, float], facing: float = FACING) -> int:
     """Put a complete unit into the world, exactly at ``point``; return its slot."""
+    if not 0 <= owner < len(world.players):
+        raise IndexError(f"there is no player {owner}")
     slot = _free_slot(world)
     world.clear(slot)
     c = columns.columns_of(world)
@@ -75,6 +77,7 @@ def _free_slot(world: World) -> int:
 
 def remove(world: World, slot: int) -> None:
     """Take a unit out of the world; every reference to its slot becomes NOBODY."""
+    check_slot(world, slot)
     world.clear(slot)
     world.recycles[slot] += 1
     world.queue[slot] = []
@@ -127,6 +130,7 @@ def _forget(column: Cells, n: int, slot: int) -> None:
 
 def stow(world: World, slot: int, carrier: int) -> None:
     """Take a unit out of the world into a carrier: it lives on, unseen and untouchable."""
+    check_slot(world, slot)
     c = columns.columns_of(world)
     c.carrier[slot] = carrier
     c.walks[slot] = c.looks_around[slot] = c.holds[slot] = False
@@ -141,6 +145,7 @@ def stow(world: World, slot: int, carrier: int) -> None:
 
 def unstow(world: World, slot: int, point: tuple[float, float]) -> None:
     """Put a unit from its carrier back into the world."""
+    check_slot(world, slot)
     c = columns.columns_of(world)
     x, y = point
     c.carrier[slot] = NOBODY

@@ -9,6 +9,7 @@ from khala_simulator.world.fields cimport WorldFields
 cdef int64_t NOBODY
 
 
+cpdef check_slot(WorldFields world, int64_t slot)
 cpdef refresh(WorldFields world, int64_t slot)
 @cython.locals(c=Columns)
 cdef _note(WorldFields world, int64_t slot)

@@ -59,10 +59,15 @@ def set_weapon(world: World, slot: int, weapon: str, *, on: bool) -> None:
             world.scan_now = True
 
 
+def check_slot(world: World, slot: int) -> None:
+    """Refuse a wrong slot: compiled, a rule would write where it should not."""
+    if not 0 <= slot < world.top:
+        raise IndexError(f"there is no unit in slot {slot}")
+
+
 def body_traits(world: World, slot: int) -> None:
     """Write all traits of a slot; see the traits of ``columns``."""
-    if not 0 <= slot < world.top:  # compiled, a wrong slot would write where it should not
-        raise IndexError(f"there is no unit in slot {slot}")
+    check_slot(world, slot)
     c = columns.columns_of(world)
     unit = world.unit_type(slot)
     kinds = kinds_on(world, slot)

@@ -21,6 +21,7 @@ cdef class ArrivalCrowd:
     cdef double area
 
 
+cpdef bint has_stalled(Columns c, int64_t slot, int64_t loop) noexcept
 cdef bint is_packed(Columns c, ArrivalCrowd crowd, int64_t slot) except -1
 @cython.locals(area=double, enough=double, i=Py_ssize_t, other=int64_t)
 cdef bint _is_filled(Columns c, ArrivalCrowd crowd, int64_t slot, double squared) except -1

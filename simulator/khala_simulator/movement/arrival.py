@@ -39,6 +39,11 @@ class ArrivalCrowd:
                 self.area += c.separation[slot] * c.separation[slot]
 
 
+def has_stalled(c: Columns, slot: int, loop: int) -> bool:
+    """Return whether a unit has come no nearer to its goal for long, since its way was checked after its order."""
+    return c.nav_loop[slot] > 0 and loop - c.nav_best_loop[slot] > CROWD_STALL
+
+
 def is_packed(c: Columns, crowd: ArrivalCrowd, slot: int) -> bool:
     """Return whether a walker has come as near to its goal as the crowd allows.
 
@@ -53,8 +58,8 @@ def is_packed(c: Columns, crowd: ArrivalCrowd, slot: int) -> bool:
         return True
     if not _fills(c, crowd, NOBODY, squared, crowd.area):  # no walker is packed farther out than this
         return False
-    if c.nav_loop[slot] > 0 and crowd.loop - c.nav_best_loop[slot] > CROWD_STALL:
-        return True  # the way has been checked since the order
+    if has_stalled(c, slot, crowd.loop):
+        return True
     return c.blocked[slot] >= BLOCKED_LOOPS and _is_filled(c, crowd, slot, squared)
 
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from khala_simulator.abilities import casting, commands
+from khala_simulator.movement import arrival
 from khala_simulator.native import columns
 from khala_simulator.numeric import geometry
 from khala_simulator.tables.action_result import ActionResult
-from khala_simulator.tables.mechanics import MECHANICS
 from khala_simulator.world.casts import Cast
 from khala_simulator.world.columns import NOBODY
 
@@ -62,8 +62,8 @@ def _advance(world: World, slot: int) -> None:
 
 def _is_stuck(world: World, slot: int) -> bool:
     """Return whether a unit has come as near to its aim as it can."""
-    stalled = world.nav_loop[slot] > 0 and world.loop - world.nav_best_loop[slot] > MECHANICS.crowd_stall
-    return bool(world.nav_end[slot] or stalled)
+    c = columns.columns_of(world)
+    return c.nav_end[slot] or arrival.has_stalled(c, slot, world.loop)
 
 
 def _give_up_in_vain(world: World, cast: Cast) -> None:

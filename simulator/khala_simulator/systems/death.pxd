@@ -12,5 +12,5 @@ cdef int64_t NOBODY
 cpdef bury(WorldFields world)
 @cython.locals(i=Py_ssize_t)
 cdef list _find_dead(WorldFields world)
-@cython.locals(c=Columns, attacker=int64_t, owner=int64_t, killer=int64_t, victim=int64_t, other=int64_t)
+@cython.locals(c=Columns, attacker=int64_t, owner=int64_t, killer=int64_t, victim=int64_t)
 cdef _bury(WorldFields world, int64_t slot, dict killers)

@@ -48,7 +48,7 @@ def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
     if len(world.buffs):
         _last_of_buffs(world, slot)
     _note(world, slot, killer)
-    for passenger in [other for other in range(world.top) if c.carrier[other] == slot]:
+    for passenger in world.passengers(slot):
         world.life[passenger] = 0.0
         _note(world, passenger, killer)
         lifecycle.remove(world, passenger)

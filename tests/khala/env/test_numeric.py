@@ -68,7 +68,7 @@ def test_a_win_is_worth_20_in_all() -> None:
     assert info == {"battle_won": True, "dead_allies": info["dead_allies"], "dead_enemies": 8}
     assert env.max_reward == 8 * 10 + 200 + 8 * 45
     assert total == pytest.approx(20)  # Marines regain nothing
-    assert (env.battles_won, env.battles_game, env.timeouts) == (1, 1, 0)
+    assert (env.battles_won, env.battles_game, env.timed_out) == (1, 1, False)
 
 
 def test_who_only_walks_loses_and_is_worth_nothing() -> None:
