@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import sys
 import time
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from bench.doors.rows import Row
 from khala_agents.scripted.canned import Canned, CannedRequest, Given, completion, refusal
@@ -36,15 +37,6 @@ max_tokens: 100
 try_timeout_s: 0.5
 retry: {tries: 1}
 prices: {prompt: 1.0, completion: 1.0}
-"""
-
-
-GRID: Final = f"""
-name: grid
-fixed: {{task: 2s3z_pair, model: model.yaml, max_steps: {STEPS}, max_wait_s: 2}}
-factors: {{clock: [frozen]}}
-seeds: 1
-retries: 0
 """
 
 
@@ -164,26 +156,42 @@ CASES: Final[dict[str, tuple[Callable[[], Callable[[CannedRequest], Given] | Giv
 }  # fmt: skip
 
 
+GRID: Final = f"""
+name: grid
+fixed: {{task: 2s3z_pair, max_steps: {STEPS}, max_wait_s: 2}}
+factors: {{model: {json.dumps([f"{name}.yaml" for name in CASES])}}}
+seeds: 1
+retries: 0
+"""
+
+
 async def _play(directory: Path, name: str) -> str:
     answer, expected = CASES[name]
     return _fault(await play(directory, *expected.options, answer=answer()), expected)
 
 
-async def _play_experiment(directory: Path, name: str) -> str:
-    """Play a match of an experiment, and look at its row: a match that is not valid must be in no number."""
-    answer, said = CASES[name]
-    async with Canned(answer()) as endpoint:
-        (directory / "model.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url), encoding="utf-8")
+async def _play_experiment(directory: Path) -> str:
+    """Play a match with every model of the table, and look at their rows; one that is not valid is in no number."""
+    async with contextlib.AsyncExitStack() as endpoints:
+        for name, (answer, _) in CASES.items():
+            endpoint = await endpoints.enter_async_context(Canned(answer()))
+            (directory / f"{name}.yaml").write_text(MODEL.replace("BASE_URL", endpoint.base_url), encoding="utf-8")
         (directory / "grid.yaml").write_text(GRID, encoding="utf-8")
         code, _, screen = await _khala(directory, "experiment", "run", "grid.yaml")
-        _, printed, _ = await _khala(directory, "experiment", "status", "grid", "--json")
-    if code != (said.code and NOT_VALID):
+    if code != NOT_VALID:
         return f"exit code {code}: {screen.strip().splitlines()[-1]}"
-    (row,) = json.loads(printed)["cells"]
+    _, printed, _ = await _khala(directory, "experiment", "status", "grid", "--json")
+    rows = json.loads(printed)["cells"]
+    faults = [_row_fault(row, said) for row, (_, said) in zip(rows, CASES.values(), strict=True)]
+    return next(filter(None, faults), "")
+
+
+def _row_fault(row: dict[str, Any], said: Said) -> str:
+    """Return in what a row of an experiment is not as expected; "" if in nothing."""
     if (row["done"], row["invalid"]) != ((1, 0) if said.code == 0 else (0, 1)):
         return f"its row is {row}"
     if said.code and not any(words in cause for cause in row["causes"] for words in said.words):
-        return f"its cause is {row['causes']}"
+        return f"its cause is {row}"
     return ""
 
 
@@ -208,7 +216,7 @@ def _fault(match: Match, expected: Said) -> str:
 def _rows() -> Iterator[Row]:
     for name in CASES:
         yield Row("khala run", f"a model that {name}", partial(_play, name=name), kind="fault")
-        yield Row("khala experiment run", f"a model that {name}", partial(_play_experiment, name=name), kind="fault")
+    yield Row("khala experiment run", "twelve models, of which one plays", _play_experiment, kind="fault")
     yield Row("khala run", "a policy that raises from step 4 on", _raise, kind="fault")
 
 

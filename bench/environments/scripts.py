@@ -23,7 +23,7 @@ from khala_sc2.env.numeric.maps import smac_map
 from khala_simulator.abilities import commands
 from khala_simulator.api.abilities import UnitCommand, judge
 from khala_simulator.api.giving import carry_out
-from khala_simulator.battle import ENEMY, PLAYER, Battle
+from khala_simulator.battle import PLAYER, Battle
 from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import ATTACK
 
@@ -61,7 +61,7 @@ def play(map_name: str, weight: float, episodes: int, seed: int) -> int:
     for _ in range(episodes):
         agents, enemies = _begin(battle, map_name)
         won += _fight(battle, agents, enemies, weight)
-        battle.kill(np.concatenate([battle.tags_of(PLAYER), battle.tags_of(ENEMY)]).tolist())
+        battle.kill(np.concatenate(battle.tags()).tolist())
         battle.advance(LOOPS)
         battle.forget_past()
     return won

@@ -7,7 +7,7 @@ player sees all units at any time. Environments for reinforcement learning are a
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from s2clientprotocol import common_pb2
@@ -109,15 +109,13 @@ def _row(numbers: Floats, number: int) -> Floats:
     return row
 
 
-class BattleWatcher(Protocol):
-    """What keeps in step with a battle; see `Battle.see`."""
-
-    def look(self, world: World, types: Types) -> None:
-        """Take in what has become of its units."""
-
-
 class Battle:
-    """One running game."""
+    """One running game.
+
+    Attributes:
+        world: to which `khala_simulator.smac` gives orders.
+        types: what the API says of the types of units.
+    """
 
     def __init__(
         self,
@@ -148,83 +146,74 @@ class Battle:
         self._game = HostedGame(
             Setup(game_map, b"", map_name, players, seed=seed, disable_fog=False, realtime=False), version
         )
-        self._world = self._game.world
+        self.world: World = self._game.world
+        self.types: Types = self._game.types
         self._seat: PlayerSeat | None = None
 
     @property
     def loop(self) -> int:
         """Game loops since its begin."""
-        return self._world.loop
-
-    @property
-    def world(self) -> World:
-        """The world, to which `khala_simulator.smac.orders` gives orders."""
-        return self._world
+        return self.world.loop
 
     def digest(self) -> str:
         """Return the SHA-256 of everything that decides the future."""
-        return self._world.digest()
+        return self.world.digest()
 
     def ground(self) -> BattleGround:
         """Return the map as it is now."""
-        terrain = self._world.map.terrain
-        structures = known_structures(PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions()))
-        return BattleGround(terrain.size, terrain.playable, paths(self._world, structures), terrain.height)
+        terrain = self.world.map.terrain
+        structures = known_structures(PlayerSeat(self.world, self.types, PLAYER, sc.InterfaceOptions()))
+        return BattleGround(terrain.size, terrain.playable, paths(self.world, structures), terrain.height)
 
     # acting -------------------------------------------------------------------------------------------------------
 
     def kill(self, tags: Iterable[int]) -> None:
         """Kill units of any player; they die in the next loop."""
-        commands.debug_kill(self._world, tags)
+        commands.debug_kill(self.world, tags)
 
     def advance(self, loops: int) -> None:
         """Play a number of game loops."""
-        advance(self._world, loops)
+        advance(self.world, loops)
 
     def forget_past(self) -> None:
         """Drop the lists of past events, which grow in a long game and have no reader here."""
-        world = self._world
+        world = self.world
         world.deaths, world.deaths_seen = world.deaths[world.deaths_seen :], 0
         world.mishaps, world.alerts = [], []
 
     # seeing -------------------------------------------------------------------------------------------------------
 
-    def tags_of(self, player: int) -> Ints:
-        """Return the tags of a player's units, in the order in which an observation has them."""
-        sight = look(self._world, self._game.types, PLAYER, show_cloaked=False)
-        tags: Ints = sight.tag[sight.owner == player]
-        return tags
+    def tags(self) -> tuple[Ints, Ints]:
+        """Return the tags of the player's units and of the enemies, in the order in which an observation has them."""
+        sight = look(self.world, self.types, PLAYER, show_cloaked=False)
+        return sight.tag[sight.owner == PLAYER], sight.tag[sight.owner == ENEMY]
 
     def look(self, tags: Ints) -> tuple[Bools, Units]:
         """Return which of these units are in the world, and all of them; of the others, the numbers mean nothing."""
-        world = self._world
+        world = self.world
         there = np.empty(len(tags), dtype=np.bool_)
         numbers = np.zeros((ROWS, len(tags)))
-        vitals.look(world, self._game.types, np.ascontiguousarray(tags), there, numbers)
+        vitals.look(world, self.types, np.ascontiguousarray(tags), there, numbers)
         rows = world.type[tags >> INDEX_SHIFT & SLOT_BITS]
-        return there, Units(tags, self._game.types.id[rows], numbers)
-
-    def see(self, watcher: BattleWatcher) -> None:
-        """Have a watcher take in what has become of its units."""
-        watcher.look(self._world, self._game.types)
+        return there, Units(tags, self.types.id[rows], numbers)
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Return a picture of the playable part of the map, [height, width, 3] RGB, as a client has it rendered."""
         if self._seat is None or (self._seat.screen.columns, self._seat.screen.rows) != (width, height):
             self._seat = self._camera(width, height)
-        seat, world = self._seat, self._world
+        seat, world = self._seat, self.world
         sight = seat.look()
         nothing = np.zeros(len(sight), dtype=np.bool_)
-        frame = Frame(world, self._game.types, PLAYER, sight, nothing, seat.camera, sight.pos[nothing], fogged=False)
+        frame = Frame(world, self.types, PLAYER, sight, nothing, seat.camera, sight.pos[nothing], fogged=False)
         assert seat.renders is not None
         return seat.renders.screen(frame)
 
     def _camera(self, width: int, height: int) -> PlayerSeat:
         """Return a seat whose camera has the whole playable area in its picture."""
-        x0, y0, x1, y1 = self._world.map.terrain.playable
+        x0, y0, x1, y1 = self.world.map.terrain.playable
         wide = max(x1 - x0, (y1 - y0) * width / height)
         size = common_pb2.Size2DI(x=width, y=height)
         render = sc.SpatialCameraSetup(width=wide, resolution=size, minimap_resolution=size)
-        seat = PlayerSeat(self._world, self._game.types, PLAYER, sc.InterfaceOptions(raw=True, render=render))
+        seat = PlayerSeat(self.world, self.types, PLAYER, sc.InterfaceOptions(raw=True, render=render))
         seat.hands.camera = (x0 + x1) / 2, (y0 + y1) / 2
         return seat

@@ -155,9 +155,7 @@ class Batch:
     def _see(self, row: int) -> None:
         """Write what the agents see now and may do."""
         _, observation, mask, state = self._rows[row]
-        battle = self.battles[row]
-        battle.see(observation, state)
-        mask[:] = battle.masks()
+        self.battles[row].show(observation, state, mask)
 
 
 class _Row(NamedTuple):

@@ -5,20 +5,20 @@ Above: `khala_sc2.env.numeric.starcraft2`. Below: `khala_simulator.battle`, `kha
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from khala_simulator.battle import ENEMY, PLAYER
 from khala_simulator.smac.fighters import Fighters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from khala_sc2.env.numeric.maps import Kind, SmacMap
-    from khala_simulator.battle import Battle, Units
+    from khala_simulator.battle import Battle
 
-    Ints = NDArray[np.int64]
+    Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
 
 STALKER, ZEALOT, COLOSSUS = 74, 73, 4
@@ -59,44 +59,32 @@ def fighters_of(battle: Battle, spec: SmacMap) -> Fighters | None:
 
     The agents' stand in the order of their types and places, the enemies in the order of observations.
     """
-    own, enemy = battle.tags_of(PLAYER), battle.tags_of(ENEMY)
+    own, enemy = battle.tags()
     if (len(own), len(enemy)) != (spec.agents, spec.enemies):
         return None
     _, mine = battle.look(own)
     order = np.lexsort((mine.y, mine.x, mine.type_id))
     _, units = battle.look(np.concatenate((own[order], enemy)))
-    names = _names(units, spec)
-    shields = [_MOST_SHIELDS.get(name, 0) for name in names]
-    charges = [_MOST_COOLDOWN.get(name, OTHER_COOLDOWN) for name in names[: spec.agents]]
-    charges += [OTHER_COOLDOWN] * spec.enemies
-    return Fighters(
-        spec.agents,
-        units.tag,
-        units.type_id,
-        units.numbers,
-        _one_hot(_places(units, spec), spec),
+    sides = units.type_id.tolist()
+    codes = _codes_of(tuple(sides[: spec.agents]), tuple(sides[spec.agents :]), spec)
+    return Fighters(spec.agents, units.tag, units.type_id, units.numbers, *codes)
+
+
+@lru_cache(maxsize=64)
+def _codes_of(own: tuple[int, ...], enemy: tuple[int, ...], spec: SmacMap) -> tuple[Floats, Floats, Floats, Bools]:
+    """Return of units of these types the one-hot codes, what shields and cooldowns are divided by, and who heals."""
+    names = dict(enumerate(_OWN_TYPES[spec.kind], start=min(own)))
+    called = [names.get(number, "") for number in own] + [_ENEMIES.get(number, "") for number in enemy]
+    shields = [_MOST_SHIELDS.get(name, 0) for name in called]
+    charges = [_MOST_COOLDOWN.get(name, OTHER_COOLDOWN) for name in called[: len(own)]]
+    charges += [OTHER_COOLDOWN] * len(enemy)
+    known = _ENEMY_CODES.get(spec.kind, ())
+    places = [number - min(own) for number in own]
+    places += [known.index(number) if number in known else len(known) for number in enemy]
+    one_hot = np.array(places)[:, None] == np.arange(spec.type_bits)
+    return (
+        one_hot.astype(np.float64),
         np.array(shields, dtype=np.float64),
         np.array(charges, dtype=np.float64),
-        np.array([name == "medivac" for name in names]),
+        np.array([name == "medivac" for name in called]),
     )
-
-
-def _names(units: Units, spec: SmacMap) -> list[str]:
-    """Return what SMAC calls the type of each unit; empty if it has no name for it."""
-    numbers = units.type_id.tolist()
-    own = numbers[: spec.agents]
-    names = dict(enumerate(_OWN_TYPES[spec.kind], start=min(own)))
-    return [names.get(number, "") for number in own] + [_ENEMIES.get(n, "") for n in numbers[spec.agents :]]
-
-
-def _places(units: Units, spec: SmacMap) -> Ints:
-    """Return the place of each unit's type in the one-hot code."""
-    own, enemy = units.type_id[: spec.agents], units.type_id[spec.agents :]
-    codes = _ENEMY_CODES.get(spec.kind, ())
-    others = [codes.index(number) if number in codes else len(codes) for number in enemy.tolist()]
-    return np.concatenate((own - own.min(), np.array(others, dtype=np.int64)))
-
-
-def _one_hot(places: Ints, spec: SmacMap) -> Floats:
-    types: Floats = (places[:, None] == np.arange(spec.type_bits)).astype(np.float64)
-    return types

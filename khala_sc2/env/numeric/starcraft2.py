@@ -78,6 +78,7 @@ class StarCraft2Env(SmacNames):
         options: as given.
         n_agents, n_enemies, n_actions, episode_limit: as in SMAC.
         max_reward: of the best episode, before it is scaled; known after the first `reset`.
+        over: whether the episode is over.
     """
 
     def __init__(self, map_name: str = "8m", *, episode_limit: int | None = None, **options: Any) -> None:
@@ -102,6 +103,7 @@ class StarCraft2Env(SmacNames):
         self._seed = self.options.seed
         self._battle: Battle | None = None
         self._outcome = BEGUN
+        self.over = False
         self._layout = _layout(self._spec, self.options, self.n_actions)
         self._board: Board
         self._scene: BattleScene
@@ -149,6 +151,7 @@ class StarCraft2Env(SmacNames):
             self._seed = seed
             self._battle = None
         self._outcome = BEGUN
+        self.over = False
         if self._battle is None:
             self._launch()
         else:
@@ -193,16 +196,15 @@ class StarCraft2Env(SmacNames):
         """Play a step as `step` does; a unit stops in place of an action that is not available."""
         if self._battle is None or self.over:
             raise ValueError(_OVER)
-        scene = self._scene
-        battle = self._battle
+        scene, battle = self._scene, self._battle
         scene.take(actions)
         give_orders(battle.world, scene.fighters, scene.last, self.options.move_amount)
         battle.advance(self.options.step_mul)
-        battle.see(scene.fighters)
-        scene.look()
-        self._outcome = self._judge(scene.fighters)
-        self.reward = self._outcome.reward
-        return self._outcome
+        scene.see(battle.world, battle.types)
+        outcome = self._outcome = self._judge(scene.fighters)
+        self.over = outcome.over
+        self.reward = outcome.reward
+        return outcome
 
     def info(self) -> dict[str, Any]:
         """Return what happened in the last step, as SMAC names it."""
@@ -230,25 +232,22 @@ class StarCraft2Env(SmacNames):
         """Return what a step was worth and how it ended, and count the battle if it is over."""
         options = self.options
         ending = fighters.ending()
-        steps = self.steps + 1
-        timeout = ending == GOES_ON and steps >= self.episode_limit
-        self.battles_won += ending == WON
-        self.timeouts += timeout
-        self.battles_game += timeout or ending != GOES_ON
+        ended = ending != GOES_ON
+        steps = self._outcome.elapsed + 1
+        timeout = not ended and steps >= self.episode_limit
+        if ended or timeout:
+            self.battles_won += ending == WON
+            self.timeouts += timeout
+            self.battles_game += 1
         reward = rewards.of_step(fighters, ending, options)
         if options.reward_scale:
             reward /= self.max_reward / options.reward_scale_rate
-        return BattleStep(reward, ending != GOES_ON, timeout, ending == WON, *fighters.counts(), steps)
+        return BattleStep(reward, ended, timeout, ending == WON, *fighters.counts(), steps)
 
     @property
     def steps(self) -> int:
         """Steps of the episode so far."""
         return self._outcome.elapsed
-
-    @property
-    def over(self) -> bool:
-        """Whether the episode is over."""
-        return self._outcome.over
 
     @property
     def timed_out(self) -> bool:
@@ -259,13 +258,17 @@ class StarCraft2Env(SmacNames):
 
     @property
     def _progress(self) -> float:
-        return self.steps / self.episode_limit
+        return self._outcome.elapsed / self.episode_limit
 
     def see(self, observations: Floats32, state: Floats32) -> None:
         """Write [agents, size] what each agent sees, and [size] the state, into contiguous arrays of these sizes."""
         progress = self._progress
         self._scene.observe(observations, progress)
         self._scene.describe(state, progress)
+
+    def show(self, observations: Floats32, state: Floats32, masks: NDArray[np.int8]) -> None:
+        """Do as `see`, and write [agents, actions] which actions are available."""
+        self._scene.show(observations, state, masks, self._progress)
 
     def observations(self) -> Floats32:
         """Return [agents, size] what each agent sees."""

@@ -19,6 +19,7 @@ from khala_simulator.world.columns import NOBODY
 from khala_simulator.world.orders import (
     ATTACK,
     HOLD_POSITION,
+    KINDS,
     LOOKS_AROUND,
     MOVE,
     NEEDS_TARGET,
@@ -36,26 +37,28 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from khala_simulator.native.columns import Columns
-    from khala_simulator.tables.catalog import UnitType
     from khala_simulator.world.world import World
 
 QUEUE_LIMIT = 32
 IDLE: Final = int(OrderKind.IDLE)
+WALK: Final = int(OrderKind.MOVE)
 ATTACK_UNIT: Final = int(OrderKind.ATTACK_UNIT)
 HOLD: Final = int(OrderKind.HOLD)
 CAST: Final = int(OrderKind.CAST)
 GATHER: Final = int(OrderKind.GATHER)
 RETURN: Final = int(OrderKind.RETURN)
-IDLENESS: Final = Order(OrderKind.IDLE, 0)
-"""The order of a unit without one."""
 
 Point = tuple[float, float]
 
 
 def move(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
     """Walk to a point and ignore everyone on the way."""
-    order = Order(OrderKind.MOVE, MOVE, point=_inside(world, point))
-    return give(world, [s for s in slots if can_move(world, s)], order, queue=queue)
+    return [slot for slot in slots if send(world, slot, point, queue)]
+
+
+def send(world: World, slot: int, point: Point, queue: bool = False) -> bool:
+    """Make one unit walk as in `move`; return whether it took the order."""
+    return can_move(world, slot) and _give(world, slot, WALK, MOVE, NO_TAG, _inside(world, point), None, queue)
 
 
 def follow(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
@@ -80,11 +83,15 @@ def attack_move(world: World, slots: Iterable[int], point: Point, *, queue: bool
 
 def attack_unit(world: World, slots: Iterable[int], target: int, *, queue: bool = False) -> list[int]:
     """Attack one unit (a tag) until it is dead; allies too, if the order says so."""
+    return [slot for slot in slots if set_on(world, slot, target, queue)]
+
+
+def set_on(world: World, slot: int, target: int, queue: bool = False) -> bool:
+    """Make one unit attack as in `attack_unit`; return whether it took the order."""
     victim = tags.slot_of(columns.columns_of(world), target)
-    if victim == NOBODY:
-        return []
-    takers = [s for s in slots if s != victim and can_reach(world, s, victim)]
-    return give(world, takers, Order(OrderKind.ATTACK_UNIT, ATTACK, target=target), queue=queue)
+    if victim in (NOBODY, slot) or not can_reach(world, slot, victim):
+        return False
+    return _give(world, slot, ATTACK_UNIT, ATTACK, target, None, None, queue)
 
 
 def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = False) -> list[int]:
@@ -100,13 +107,19 @@ def patrol(world: World, slots: Iterable[int], point: Point, *, queue: bool = Fa
 
 def stop(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
     """Drop all orders; queued, it ends the queue there."""
-    taken = [s for s in slots if _commandable(world.unit_type(s))]
+    return [slot for slot in slots if halt(world, slot, queue)]
+
+
+def halt(world: World, slot: int, queue: bool = False) -> bool:
+    """Make one unit drop its orders as in `stop`; return whether it took the order."""
+    c = columns.columns_of(world)
+    if not _commandable(world, c.type[slot]):
+        return False
     if not queue:
-        for slot in taken:
-            world.queue[slot] = []
-            if not world.bound[slot]:
-                begin(world, slot, None)
-    return taken
+        world.queue[slot] = []
+        if not c.bound[slot]:
+            begin(world, slot, None)
+    return True
 
 
 def hold(world: World, slots: Iterable[int], *, queue: bool = False) -> list[int]:
@@ -234,39 +247,36 @@ def grant_upgrade(world: World, player: int, upgrade_id: int) -> None:
 # what a unit can do ---------------------------------------------------------------------------------------------------
 
 
-def _soon(world: World, slot: int) -> UnitType:
-    """Return the type of a unit, or the type that it is morphing into."""
+def _soon(world: World, slot: int) -> int:
+    """Return the row of a unit's type, or of the type that it is morphing into."""
     c = columns.columns_of(world)
+    now: int = c.type[slot]
     if c.bound[slot] and c.casts[slot]:
         row = world.catalog.row_of_name.get(world.catalog.ability(int(world.order_ability[slot])).unit)
         if row is not None:
-            return world.catalog.units[row]
-    units = world.catalog.units
-    unit: UnitType = units[c.type[slot]]
-    return unit
+            return int(row)
+    return now
 
 
 def can_move(world: World, slot: int) -> bool:
     """Return whether a unit takes movement orders: its type, or the next one, has a speed or gets one by upgrade."""
-    c = columns.columns_of(world)
-    unit = _soon(world, slot)
+    row = _soon(world, slot)
     stats = world.stats
-    step = memory.floats(stats.step)[c.owner[slot] * stats.types + unit.row]
-    return step > 0.0 and _commandable(unit)
+    step = memory.floats(stats.step)[columns.columns_of(world).owner[slot] * stats.types + row]
+    return step > 0.0 and _commandable(world, row)
 
 
 def can_attack(world: World, slot: int) -> bool:
     """Return whether the unit has a weapon that it can aim now."""
     c = columns.columns_of(world)
     armed = c.ground_weapon[slot] >= 0 or c.air_weapon[slot] >= 0
-    return armed and _commandable(world.unit_type(slot))
+    return armed and _commandable(world, c.type[slot])
 
 
 def can_reach(world: World, slot: int, victim: int) -> bool:
     """Return whether the unit has a weapon that it can aim at ``victim`` now."""
     c = columns.columns_of(world)
-    units = world.catalog.units
-    if units[c.type[victim]].untargetable or not _commandable(units[c.type[slot]]):
+    if memory.bools(world.stats.untargetable)[c.type[victim]] or not _commandable(world, c.type[slot]):
         return False
     return targets.weapon_for(world, slot, victim) >= 0
 
@@ -276,60 +286,54 @@ def is_enemy(world: World, player: int, other: int) -> bool:
     return player != other and 0 not in (player, other) and len(world.players) > max(player, other)
 
 
-def _commandable(unit: UnitType) -> bool:
-    return not unit.uncommandable
+def _commandable(world: World, row: int) -> bool:
+    return not memory.bools(world.stats.uncommandable)[row]
 
 
 def _inside(world: World, point: Point) -> Point:
-    x0, y0, x1, y1 = world.map.terrain.playable
-    return min(max(point[0], x0), x1), min(max(point[1], y0), y1)
+    x, y = point
+    return min(max(x, world.west), world.east), min(max(y, world.south), world.north)
 
 
 def give(world: World, slots: list[int], order: Order, *, queue: bool) -> list[int]:
     """Make an order the units' current one, or append it to their queues; return the slots that took it."""
-    return [slot for slot in slots if _give(world, slot, order, queue)]
+    kind, ability, target, point, origin, _ = order
+    return [slot for slot in slots if _give(world, slot, int(kind), ability, target, point, origin, queue)]
 
 
-def _give(world: World, slot: int, wanted: Order, queue: bool) -> bool:
-    """Give one unit an order; return whether it took it."""
+def _give(
+    world: World,
+    slot: int,
+    kind: int,
+    general: int,
+    target: int,
+    point: Point | None,
+    origin: Point | None,
+    queue: bool,
+) -> bool:
+    """Give one unit an order; return whether it took it. It is a value only while it waits."""
     c = columns.columns_of(world)
     if c.carrier[slot] != NOBODY:
         return False  # a passenger takes no orders
-    order = _of_its_own(world, c.type[slot], wanted)
-    waiting = world.queue
-    if queue and c.order_kind[slot] != IDLE:
-        if len(waiting[slot]) >= QUEUE_LIMIT:
-            return False
-        waiting[slot].append(order)
-    elif c.bound[slot]:
-        waiting[slot] = [order]
+    ability = _of_its_own(world, c.type[slot], kind, general)
+    waits = queue and c.order_kind[slot] != IDLE
+    if waits and len(world.queue[slot]) >= QUEUE_LIMIT:
+        return False
+    if not waits:
+        world.queue[slot] = []
+    if waits or c.bound[slot]:
+        world.queue[slot].append(Order(OrderKind(kind), ability, target, point, origin))
     else:
-        waiting[slot] = []
-        begin(world, slot, order)
+        _begin(world, slot, kind, ability, target, point, origin)
     return True
 
 
-ORDINARY: Final[dict[int, str]] = {
-    int(OrderKind.MOVE): "move",
-    int(OrderKind.FOLLOW): "move",
-    int(OrderKind.ATTACK_MOVE): "attack",
-    ATTACK_UNIT: "attack",
-    HOLD: "hold_position",
-    int(OrderKind.PATROL): "patrol",
-    int(OrderKind.SCAN_MOVE): "scan_move",
-}
-
-
-GENERAL = frozenset({MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK})
-
-
-def _of_its_own(world: World, row: int, order: Order) -> Order:
-    """Return the order with the ability id of a type of units; a Battlecruiser has its own move."""
-    effect = ORDINARY.get(int(order.kind)) if order.ability in GENERAL else None
-    if effect is None:
-        return order
-    own: int = world.catalog.ordinary[row].get(effect, order.ability)
-    return order if own == order.ability else order._replace(ability=own)
+def _of_its_own(world: World, row: int, kind: int, general: int) -> int:
+    """Return the ability id that a type of units has for an order; a Battlecruiser has its own move."""
+    if kind == IDLE or general not in (MOVE, PATROL, HOLD_POSITION, SCAN_MOVE, ATTACK):
+        return general
+    own = memory.ints(world.usual)[row * KINDS + kind]
+    return general if own < 0 else own
 
 
 def begin(world: World, slot: int, order: Order | None) -> None:
@@ -338,21 +342,28 @@ def begin(world: World, slot: int, order: Order | None) -> None:
     An order to seek fights leaves a unit in the one that it has found by itself: an attack-move that is given again
     and again interrupts nothing. A unit that goes around others goes on doing so where that leads to the new goal.
     """
-    order = order or IDLENESS
-    kind = int(order.kind)
+    if order is None:
+        _begin(world, slot, IDLE, 0, NO_TAG, None, None)
+    else:
+        _begin(world, slot, int(order.kind), order.ability, order.target, order.point, order.origin)
+
+
+def _begin(
+    world: World, slot: int, kind: int, ability: int, tag: int, point: Point | None, origin: Point | None
+) -> None:
     c = columns.columns_of(world)
-    target = tags.slot_of(c, order.target)
+    target = tags.slot_of(c, tag)
     opponent = c.target[slot]
     fights_on = SEEKS_FIGHTS >> kind & LOOKS_AROUND >> c.order_kind[slot] & 1 != 0
     if c.harvest[slot]:
         _end_harvest(world, slot)
     c.order_kind[slot] = kind
     c.on_guard[slot] = False
-    c.order_ability[slot] = order.ability
+    c.order_ability[slot] = ability
     c.order_target[slot] = target
-    c.order_point[slot] = _point(order.point, c.pos[slot])
-    c.order_aimed[slot] = order.point is not None
-    c.order_origin[slot] = _point(order.origin, c.pos[slot])
+    c.order_point[slot] = _point(point, c.pos[slot])
+    c.order_aimed[slot] = point is not None
+    c.order_origin[slot] = _point(origin, c.pos[slot])
     attacks = kind == ATTACK_UNIT and target != NOBODY and targets.engage(world, slot, target)
     if not (attacks or fights_on):
         targets.disengage(world, slot)

@@ -9,6 +9,7 @@ One module per group of units. Each offers some of these tables, and here they a
 * ``SMARTS``: what a right click means to some units, called with the slots, the target's slot, the point and whether to
   queue it; returns those that took it
 * ``PASSIVES``: a unit type's name → what units of it do in every loop without an order
+* ``OF_BUFFS``: those of these types whose rule is about their buffs, and has nothing to do while nobody has any
 * ``DEATHS``: a unit type's name → what happens when one dies, called with the slot while it is still there
 
 ``casting`` and the systems look things up here; the modules know the world and nothing above it.
@@ -116,6 +117,7 @@ PASSIVES: Final[dict[str, UnitRule]] = _join(
     zerg_tables.PASSIVES,
     warpgate.PASSIVES,
 )
+OF_BUFFS: Final = gateway.OF_BUFFS
 SMARTS: Final[tuple[SmartRule, ...]] = (
     *construction.SMARTS,
     *battery.SMARTS,

@@ -44,26 +44,30 @@ IMPACTS: Final[dict[str, Callable[[World, int, int, int], None]]] = {}
 
 def hit_with(world: World, shot: Shot) -> None:
     """Carry out one hit: on its target, in the rings around it, or on the units that a second search finds."""
-    damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
+    damage = _damage_of(world, shot)
     hit = damage.hit
-    if hit.kills_self:
+    if damage.plain:
+        hit_target(world, shot)
+    elif hit.kills_self:
         _give_life(world, shot.source)
     elif hit.search is not None and not hit.bounce:
         for slot in found_by(world, hit.search, shot):
             strike(world, shot.source, shot.owner, slot, damage)
-    elif hit.area:
+    else:
         _splash(world, shot, damage)
         if hit.area_affects.not_target:
             hit_target(world, shot)
-    else:
-        hit_target(world, shot)
+
+
+def _damage_of(world: World, shot: Shot) -> Damage:
+    return world.stats.damage[shot.owner][shot.weapon][shot.hit]
 
 
 def hit_target(world: World, shot: Shot) -> None:
     """Carry out a hit on its target alone, if that still lives."""
     if shot.target == NOBODY:
         return
-    damage = world.stats.damage[shot.owner][shot.weapon][shot.hit]
+    damage = _damage_of(world, shot)
     if damage.hit.effect in IMPACTS:
         IMPACTS[damage.hit.effect](world, shot.source, shot.owner, shot.target)
     strike(world, shot.source, shot.owner, shot.target, damage)
@@ -86,8 +90,8 @@ def strike(world: World, source: int, owner: int, victim: int, damage: Damage, f
         if c.bonus_bits[source] & attributes:
             amount += c.bonus_add[source] * fraction
         amount *= c.dealt_factor[source]
-    kind = "splash" if fraction < 1.0 else damage.hit.kind
-    apply_damage(world, source, owner, victim, amount, kind=kind, ignores_armor=damage.hit.ignores_armor)
+    kind = "splash" if fraction < 1.0 else damage.kind
+    apply_damage(world, source, owner, victim, amount, kind=kind, ignores_armor=damage.ignores_armor)
 
 
 def amount_against(damage: Damage, attributes: int) -> float:
@@ -142,7 +146,7 @@ def apply_damage(
     armor = 0.0
     if not ignores_armor:
         numbers = world.stats
-        at = side * len(world.catalog.units) + c.type[victim]
+        at = side * numbers.types + c.type[victim]
         shield_armor = memory.floats(numbers.shield_armor)[at] + c.shield_armor_add[victim]
         armor = memory.floats(numbers.armor)[at] + c.armor_add[victim]
     least = DAMAGE_MIN if amount > 0.0 else 0.0

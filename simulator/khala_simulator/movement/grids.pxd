@@ -4,6 +4,7 @@ from libc.stdint cimport int64_t
 
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport Point, boolean
+from khala_simulator.world.ground cimport BuiltGround
 
 cdef double SIDE_CLEARANCE
 cdef double SAMPLE_STEP
@@ -40,7 +41,8 @@ cdef class Lines:
 
 
 cpdef SurfaceGrid read(object surface)
-cdef SurfaceGrid grid_of(object ground, int64_t layer)
+@cython.locals(grid=SurfaceGrid)
+cdef SurfaceGrid grid_of(BuiltGround ground, int64_t layer)
 @cython.locals(column=int64_t, row=int64_t)
 cdef int64_t cell_at(SurfaceGrid grid, double x, double y) noexcept
 cdef Point centre_of(SurfaceGrid grid, int64_t cell) noexcept

@@ -14,7 +14,6 @@ import numpy as np
 from khala_simulator.movement import grids
 from khala_simulator.native import columns, memory
 from khala_simulator.tables.layers import layer_of
-from khala_simulator.tables.stats import LAYERS, bit_set
 from khala_simulator.world.columns import NOBODY
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def free_places(world: World, unit: UnitType, point: tuple[float, float], count:
 def _places_within(
     world: World, unit: UnitType, point: tuple[float, float], count: int, radius: float
 ) -> list[tuple[float, float]]:
-    bodiless = bit_set(unit.collide, LAYERS) == 0
+    bodiless = memory.ints(world.stats.layer_bits)[unit.row] == 0
     apart = 0.0 if bodiless else 2.0 * unit.radius - ROUNDING
     return [(x, y) for x, y in _search(world, unit, point, radius, NOBODY, count, apart).tolist()]
 
@@ -80,7 +79,7 @@ def _search(
     """
     x0, y0, x1, y1 = world.map.terrain.playable
     grid = grids.grid_of(world.ground, layer_of(unit))
-    bits = bit_set(unit.collide, LAYERS)
+    bits = memory.ints(world.stats.layer_bits)[unit.row]
     bodies = world.live[(world.layer_bits[world.live] & bits) != 0]
     bodies = bodies[bodies != ignoring]
     slots = memory.ints(bodies)

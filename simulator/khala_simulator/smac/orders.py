@@ -18,7 +18,7 @@ from khala_simulator.native import columns, memory
 from khala_simulator.smac.rules import FIRST_MOVE, FIRST_TARGET, MOVES, NO_OP
 from khala_simulator.smac.rules import STOP as STOP_ACTION
 from khala_simulator.world.columns import NOBODY
-from khala_simulator.world.orders import ATTACK, MOVE, STOP
+from khala_simulator.world.orders import ATTACK, KINDS, MOVE, STOP, OrderKind
 from khala_simulator.world.world import NO_TAG
 
 if TYPE_CHECKING:
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     Point = tuple[float, float]
 
 HEAL: Final = 386
-_EFFECTS: Final[dict[int, str]] = {STOP: "stop", MOVE: "move", ATTACK: "attack"}
+IDLE: Final = int(OrderKind.IDLE)
+WALK: Final = int(OrderKind.MOVE)
+ATTACK_UNIT: Final = int(OrderKind.ATTACK_UNIT)
 
 
 def give_orders(world: World, fighters: Fighters, actions: NDArray[np.int64], move_amount: float) -> None:
@@ -77,17 +79,18 @@ def _order(world: World, tag: int, ability: int, target: int, point: Point | Non
     elif c.build_progress[slot] < 1.0:
         return
     elif ability == STOP:
-        commands.stop(world, [slot])
+        commands.halt(world, slot)
     elif point is not None:
-        commands.move(world, [slot], point)
+        commands.send(world, slot, point)
     elif _may_attack(c, target):
-        commands.attack_unit(world, [slot], target)
+        commands.set_on(world, slot, target)
 
 
 def _has(world: World, row: int, ability: int) -> bool:
     """Return whether a type has an ordinary order itself on its card."""
-    effect = _EFFECTS.get(ability)
-    return effect is not None and world.catalog.ordinary[row].get(effect) == ability
+    kind = IDLE if ability == STOP else WALK if ability == MOVE else ATTACK_UNIT
+    usual: int = memory.ints(world.usual)[row * KINDS + kind]
+    return usual == ability
 
 
 def _may_attack(c: Columns, tag: int) -> bool:

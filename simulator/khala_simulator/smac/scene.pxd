@@ -5,6 +5,7 @@ from libc.stdint cimport int64_t
 from khala_simulator.native cimport memory
 from khala_simulator.native.memory cimport boolean
 from khala_simulator.smac.fighters cimport Fighters
+from khala_simulator.world.fields cimport WorldFields
 
 cdef double SHOOT_RANGE
 cdef double SIGHT_RANGE
@@ -65,6 +66,9 @@ cdef class BattleScene:
     @cython.locals(agent=int64_t, action=int64_t)
     cdef void choose(self, int64_t* actions) noexcept
     cpdef take(self, object actions)
+    cpdef see(self, WorldFields world, object types)
+    @cython.locals(i=int64_t)
+    cpdef show(self, object observations, object state, object masks, double progress)
     @cython.locals(cells=cython.p_float, size=int64_t, i=int64_t, agent=int64_t, total=int64_t)
     cpdef observe(self, object out, double progress)
     @cython.locals(action=int64_t, enemy=int64_t, target=int64_t, first=bint, ally=int64_t)

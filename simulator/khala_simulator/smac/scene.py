@@ -30,9 +30,11 @@ from khala_simulator.smac.rules import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from khala_simulator.api.types import Types
     from khala_simulator.native.memory import Cells
     from khala_simulator.smac.board import Board
     from khala_simulator.smac.fighters import Fighters
+    from khala_simulator.world.world import World
 
 
 class SceneLayout(NamedTuple):
@@ -175,7 +177,22 @@ class BattleScene:
         """Do as `choose`, of an array (agents,)."""
         self.choose(memory.ints(actions))
 
+    def see(self, world: World, types: Types) -> None:
+        """Take in what has become of the units in a step, and look at the battle."""
+        self.fighters.look(world, types)
+        self.look()
+
     # observations -------------------------------------------------------------------------------------------------
+
+    def show(
+        self, observations: NDArray[np.float32], state: NDArray[np.float32], masks: NDArray[np.int8], progress: float
+    ) -> None:
+        """Do as `observe` and `describe`, and write (agents, actions) 1 for each action that an agent may take."""
+        self.observe(observations, progress)
+        self.describe(state, progress)
+        cells = memory.uint8s(masks)  # type: ignore[arg-type]  # 0 and 1 are the same in both
+        for i in range(self.agents * self.actions):
+            cells[i] = self.can[i]
 
     def observe(self, out: NDArray[np.float32], progress: float) -> None:
         """Write (agents, size) what each agent sees; `progress` is the part of the episode that is over."""

@@ -41,6 +41,7 @@ cdef class _Foes:
     cdef Py_ssize_t count
     cdef double widest
     cdef double* ranges
+    cdef int64_t first
     cdef bint filters
     cdef bint zones
 

@@ -178,7 +178,8 @@ class _Foes:
                 self.only[self.count] = _foe_of(c, slot) if c.defensive[slot] else ANYBODY
                 self.widest = max(self.widest, c.radius[slot])
                 self.count += 1
-        self.ranges = memory.floats(world.stats.range[player])
+        self.ranges = memory.floats(world.stats.range)
+        self.first = player * world.stats.weapons
         self.filters = census.census(world).weapons_with_filters
         self.zones = bool(world.area_effects)
 
@@ -299,7 +300,7 @@ def _reaches(c: Columns, foes: _Foes, slot: int, foe: int, gap: float) -> bool:
     on_ground = c.plane_bits[foe] & GROUND_PLANE != 0 and c.ground_weapon[slot] >= 0
     row = c.ground_weapon[slot] if on_ground else c.air_weapon[slot]
     touch = c.separation[slot] + c.separation[foe] - c.radius[slot] - c.radius[foe]
-    return gap <= max(foes.ranges[row] + c.range_add[slot], touch)
+    return gap <= max(foes.ranges[foes.first + row] + c.range_add[slot], touch)
 
 
 def _take(world: World, c: Columns, slot: int, target: int) -> None:
@@ -348,7 +349,7 @@ def _turn_on(world: World, c: Columns, slot: int, attacker: int) -> None:
 
 def _flee(world: World, victim: int, attacker: int) -> None:
     """Make an idle unit that does not fight back run away from its attacker; where it ends is its new place."""
-    x0, y0, x1, y1 = world.map.terrain.playable
+    x0, y0, x1, y1 = world.west, world.south, world.east, world.north
     offset = world.pos[victim] - world.pos[attacker]
     away = offset / max(float(np.sqrt(offset[0] ** 2 + offset[1] ** 2)), 1e-9)
     world.guard[victim] = np.clip(world.pos[victim] + away * MECHANICS.flee_distance, (x0, y0), (x1, y1))

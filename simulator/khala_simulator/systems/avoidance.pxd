@@ -31,13 +31,15 @@ cpdef find_headings(WorldFields world)
 cdef bint _flows(Columns c, int64_t slot) noexcept
 @cython.locals(end=int64_t, i=Py_ssize_t, slot=int64_t, beside=double, turn=double, standing=_Standing)
 cpdef begin(WorldFields world, object slots, object shift)
-@cython.locals(loop=int64_t, stalled=int64_t, slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
+@cython.locals(crowd=_Crowd, loop=int64_t, stalled=int64_t, slot=int64_t, x=double, y=double, size=double, grid=SurfaceGrid, turn=int64_t)
 cdef _look(WorldFields world, Columns c, list turning)
 @cython.locals(turn=int64_t)
 cdef int64_t _first_free(Columns c, _Crowd crowd, SurfaceGrid grid, int64_t slot, Point way) noexcept
 cdef Point _heading(Point way, int64_t turn, double side) noexcept
 cdef bint _is_ground(SurfaceGrid grid, Point start, Point heading) noexcept
 cdef int64_t _stripe(double x) noexcept
+@cython.locals(crowd=_Crowd)
+cdef _Crowd _crowd_of(WorldFields world)
 cdef bint _is_body(Columns c, int64_t slot) noexcept
 
 
@@ -53,6 +55,7 @@ cdef class _Standing:
 
 @cython.final
 cdef class _Crowd:
+    cdef Py_ssize_t room
     cdef tuple _arrays
     cdef int64_t* _begin
     cdef int64_t* _slot
@@ -64,6 +67,8 @@ cdef class _Crowd:
     cdef double* _apart
     cdef Py_ssize_t _many
     cdef double _widest
+    @cython.locals(c=Columns, i=Py_ssize_t, slot=int64_t, stripe=int64_t, place=int64_t)
+    cdef look(self, WorldFields world)
     @cython.locals(separation=double, bits=int64_t, farthest=double, many=Py_ssize_t, i=int64_t, x=double, y=double,
                    apart=double, seen=double)
     cdef void look_around(self, Columns c, int64_t slot, Point way) noexcept

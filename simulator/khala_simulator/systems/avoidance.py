@@ -140,7 +140,7 @@ class _Standing:
 
 def _look(world: World, c: Columns, turning: list[int]) -> None:
     """Choose the heading of every walker that follows no flow: the free one that turns it least."""
-    crowd = _Crowd(world)
+    crowd = _crowd_of(world)
     ground = world.ground
     loop = world.loop
     for slot in turning:
@@ -191,19 +191,17 @@ def _stripe(x: float) -> int:
 class _Crowd:
     """The bodies that may be in somebody's way, sorted by stripes of the map; then those near one walker."""
 
-    def __init__(self, world: World) -> None:
-        c = columns.columns_of(world)
-        live = world.live
-        slots = memory.ints(live)
+    def __init__(self, room: int) -> None:
+        self.room = room
         self._arrays = (
             memory.new_ints(STRIPES + 1),
-            memory.new_ints(len(live)),
-            memory.new_ints(len(live)),
-            memory.new_points(len(live)),
-            memory.new_points(len(live)),
-            memory.new_floats(len(live)),
-            memory.new_points(len(live)),
-            memory.new_floats(len(live)),
+            memory.new_ints(room),
+            memory.new_ints(room),
+            memory.new_points(room),
+            memory.new_points(room),
+            memory.new_floats(room),
+            memory.new_points(room),
+            memory.new_floats(room),
         )
         self._begin = memory.ints(self._arrays[0])  # of each stripe
         self._slot = memory.ints(self._arrays[1])
@@ -213,6 +211,16 @@ class _Crowd:
         self._separation = memory.floats(self._arrays[5])
         self._offset = memory.points(self._arrays[6])  # from the walker
         self._apart = memory.floats(self._arrays[7])  # distance to keep
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Return what makes None: a copy of a world takes its own."""
+        return type(None), ()
+
+    def look(self, world: World) -> None:
+        """List the bodies as they stand now."""
+        c = columns.columns_of(world)
+        live = world.live
+        slots = memory.ints(live)
         self._many = 0  # near the walker
         self._widest = 0.0
         for i in range(STRIPES + 1):
@@ -268,6 +276,15 @@ class _Crowd:
             if along > 0.0 and across * across + reach * reach < self._apart[i] * self._apart[i]:
                 return False
         return True
+
+
+def _crowd_of(world: World) -> _Crowd:
+    """Return the bodies as they stand now, in room that is kept."""
+    crowd: _Crowd | None = world.crowd  # type: ignore[assignment]  # its fields say less
+    if crowd is None or crowd.room < len(world.live):
+        crowd = world.crowd = _Crowd(2 * len(world.live))
+    crowd.look(world)
+    return crowd
 
 
 def _is_body(c: Columns, slot: int) -> bool:

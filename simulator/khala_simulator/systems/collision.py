@@ -85,7 +85,7 @@ def separate(world: World) -> None:
 def _keep_on_surfaces(world: World, crowd: Crowd, c: Columns, slots: Cells) -> None:
     """Put every body that has moved where its layer allows."""
     ground = world.ground
-    x0, y0, x1, y1 = world.map.terrain.playable
+    x0, y0, x1, y1 = world.west, world.south, world.east, world.north
     grid = None
     last = AIR
     for i in range(crowd.count):

@@ -20,22 +20,24 @@ NO_KILLER = -1
 
 def bury(world: World) -> None:
     """Remove every unit without life, in the order of slots, and those that their deaths kill in turn."""
-    dead = _find_dead(world)
-    if not dead:
+    if not _count_dead(world):
         return
     killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
-    while dead:
-        for slot in dead:
+    while _count_dead(world):
+        c = columns.columns_of(world)
+        for slot in [slot for slot in world.live.tolist() if c.life[slot] <= 0.0]:
             _bury(world, slot, killers)
-        dead = _find_dead(world)
 
 
-def _find_dead(world: World) -> list[int]:
-    """Return the units without life, in the order of slots."""
+def _count_dead(world: World) -> int:
+    """Return how many units are without life."""
     c = columns.columns_of(world)
     live = world.live
     slots = memory.ints(live)
-    return [slots[i] for i in range(len(live)) if c.life[slots[i]] <= 0.0]
+    dead = 0
+    for i in range(len(live)):
+        dead += c.life[slots[i]] <= 0.0
+    return dead
 
 
 def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
@@ -48,15 +50,25 @@ def _bury(world: World, slot: int, killers: dict[int, int]) -> None:
     if len(world.buffs):
         _last_of_buffs(world, slot)
     _note(world, slot, killer)
-    for passenger in world.passengers(slot):
-        world.life[passenger] = 0.0
-        _note(world, passenger, killer)
-        lifecycle.remove(world, passenger)
+    if _carries(world, slot):
+        for passenger in world.passengers(slot):
+            world.life[passenger] = 0.0
+            _note(world, passenger, killer)
+            lifecycle.remove(world, passenger)
     c = columns.columns_of(world)
     for victim in range(world.top):
         if c.attacker[victim] == slot and c.life[victim] <= 0.0:
             killers[victim] = owner
     lifecycle.remove(world, slot)
+
+
+def _carries(world: World, slot: int) -> bool:
+    """Return whether a unit has passengers."""
+    c = columns.columns_of(world)
+    for other in range(world.top):  # noqa: SIM110  # a loop that is compiled
+        if c.carrier[other] == slot:
+            return True
+    return False
 
 
 def _last_of_buffs(world: World, slot: int) -> None:

@@ -13,6 +13,8 @@ cdef int64_t NOBODY
 
 @cython.locals(loop=int64_t, pending=PendingHit, source=int64_t, c=Columns)
 cpdef fall_due(WorldFields world)
+@cython.locals(pending=PendingHit)
+cdef bint _any_due(list hits, int64_t loop) noexcept
 cdef bint _is_due(PendingHit pending, int64_t loop) noexcept
 cdef void _follow(Columns c, boolean* kamikaze, PendingHit pending) noexcept
 cdef _carry_out(WorldFields world, PendingHit pending)

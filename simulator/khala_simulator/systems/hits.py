@@ -26,9 +26,9 @@ def fall_due(world: World) -> None:
     if not world.pending:
         return
     loop = world.loop
-    due = [pending for pending in world.pending if _is_due(pending, loop)]
-    if not due:
+    if not _any_due(world.pending, loop):
         return
+    due = [pending for pending in world.pending if _is_due(pending, loop)]
     c = columns.columns_of(world)
     kamikaze = memory.bools(world.stats.kamikaze)
     bursts = memory.bools(world.stats.bursts)
@@ -40,6 +40,13 @@ def fall_due(world: World) -> None:
         if source != NOBODY and not (bursts[pending.shot.weapon] and not c.bursting[source]):
             _carry_out(world, pending)
             c = columns.columns_of(world)
+
+
+def _any_due(hits: list[PendingHit], loop: int) -> bool:
+    for pending in hits:  # noqa: SIM110  # a loop that is compiled
+        if _is_due(pending, loop):
+            return True
+    return False
 
 
 def _is_due(pending: PendingHit, loop: int) -> bool:

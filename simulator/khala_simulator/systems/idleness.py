@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from khala_simulator.native import columns, memory
 from khala_simulator.tables.catalog import LOOPS_PER_NORMAL_SECOND
 from khala_simulator.world.orders import OrderKind
 
@@ -30,17 +31,20 @@ def count(world: World) -> None:
     if world.loop % LOOPS_PER_NORMAL_SECOND:
         return
     works, trains = _rows(world.catalog)
-    if world.hands_at != world.population:
-        rows = world.type[world.live]
-        world.hands = world.live[works[rows] | trains[rows]]
-        world.hands_at = world.population
-    hands = world.hands
-    if not hands.size:
-        return
-    slots = hands[(world.order_kind[hands] == IDLE) & (world.build_progress[hands] >= 1.0)]
-    for slot in slots.tolist():
-        score = world.players[int(world.owner[slot])].score
-        if works[world.type[slot]]:
+    works_by_row = memory.bools(works)
+    trains_by_row = memory.bools(trains)
+    c = columns.columns_of(world)
+    live = world.live
+    slots = memory.ints(live)
+    for i in range(len(live)):
+        slot = slots[i]
+        works_here = works_by_row[c.type[slot]]
+        if not works_here and not trains_by_row[c.type[slot]]:
+            continue
+        if c.order_kind[slot] != IDLE or c.build_progress[slot] < 1.0:
+            continue
+        score = world.players[c.owner[slot]].score
+        if works_here:
             score.idle_worker_s += 1.0
         elif slot not in world.jobs:
             score.idle_production_s += 1.0

@@ -11,6 +11,7 @@ from khala_simulator.world.fields cimport WorldFields
 
 cdef double TURNING_CIRCLES
 cdef double NO_DISTANCE
+cdef object NO_CREEP
 
 
 @cython.final

@@ -124,9 +124,12 @@ def _walk(world: World, c: Columns, walking: int, brakers: bool) -> None:
     walks = _walks_of(world, walking)
     queue = world.queue
     creeps = world.growth.anywhere
-    covered = np.ascontiguousarray(world.creep) if creeps else NO_CREEP
+    covered = NO_CREEP
+    width = height = 0
+    if creeps:
+        covered = np.ascontiguousarray(world.creep)
+        width, height = world.map.terrain.size
     creep = memory.bools(covered)
-    width, height = world.map.terrain.size
     late = False
     i = 0
     for slot in range(world.top):

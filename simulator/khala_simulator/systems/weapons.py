@@ -135,10 +135,10 @@ def _take_effect(world: World, attackers: list[int]) -> None:
         users.setdefault(c.weapon[slot], []).append(slot)
     for row, slots in users.items():
         weapon = world.catalog.weapons[row]
-        is_beam = bool(world.stats.beam[row])
-        backswing = float(weapon.backswing_loops)
-        for index in range(len(weapon.hits)):
-            _lay(world, weapon, index, slots)
+        is_beam = memory.bools(world.stats.beam)[row]
+        backswing = memory.floats(world.stats.backswing)[row]
+        for index in range(len(world.stats.damage[0][row])):
+            _lay(world, row, index, slots)
         for slot in slots:
             c.backswing[slot] = backswing
             c.beaming[slot] = is_beam
@@ -152,25 +152,24 @@ def _take_effect(world: World, attackers: list[int]) -> None:
         c.windup[slot] = NOT_STARTED
 
 
-def _lay(world: World, weapon: Weapon, index: int, attackers: list[int]) -> None:
+def _lay(world: World, row: int, index: int, attackers: list[int]) -> None:
     """Put one hit of the attacks of some units with one weapon into ``pending``."""
-    hit = weapon.hits[index]
-    if hit.bounce:  # these follow from the hit before
+    damage = world.stats.damage[0][row][index]  # when it comes is the same for every player
+    if damage.follows:
         return
-    if hit.when:
+    if damage.conditional:
         sources = np.array(attackers)
-        attackers = sources[branch(world, hit, weapon, sources, world.target[sources])].tolist()
+        weapon = world.catalog.weapons[row]
+        attackers = sources[branch(world, damage.hit, weapon, sources, world.target[sources])].tolist()
     c = columns.columns_of(world)
-    row = weapon.row
-    delay = 0.0 if hit.sweep is not None else hit.delay_loops
-    is_kamikaze = bool(world.stats.kamikaze[row])
+    is_kamikaze = memory.bools(world.stats.kamikaze)[row]
     pending = world.pending
     loop = world.loop
     for slot in attackers:
         target = c.target[slot]
         at = slot if is_kamikaze or target == NOBODY else target  # a suicide attacker is the middle of it
         shot = _shoot(c, slot, at, row, index)
-        pending.append(PendingHit(shot, (loop + c.windup[slot]) + delay))
+        pending.append(PendingHit(shot, (loop + c.windup[slot]) + damage.delay))
 
 
 def _shoot(c: Columns, slot: int, at: int, weapon: int, hit: int) -> Shot:

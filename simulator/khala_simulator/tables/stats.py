@@ -10,7 +10,6 @@ import copy
 import dataclasses
 import functools
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -68,13 +67,38 @@ def reads(change: Change) -> bool:
     return bonus or change.field in READ.get(change.catalog, ())
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """A hit's amounts after upgrades: base, and ``(attribute bit, amount)`` for each bonus."""
+CHANGED: Final = (
+    "life_max", "shields_max", "energy_max", "energy_start", "armor", "shield_armor", "sight", "step", "creep_factor",
+    "step_gain", "life_regen", "shield_regen", "energy_regen", "range", "scan", "period",
+)  # fmt: skip
+"""What upgrades change, of those with a row for each player."""
 
-    hit: Hit
-    amount: float
-    bonus: tuple[tuple[int, float], ...]
+
+class Damage:
+    """A hit's amounts after upgrades.
+
+    Attributes:
+        hit: As the catalog has it.
+        amount: Without bonus.
+        bonus: ``(attribute bit, amount)`` for each.
+        kind: Of the hit.
+        ignores_armor: Of the hit.
+        plain: Whether it hurts its target alone.
+        follows: Whether it bounces from the hit before.
+        delay: Loops after the damage point; none for a sweep, whose points have their own.
+        conditional: Whether the game's own switch decides about it.
+    """
+
+    def __init__(self, hit: Hit, amount: float, bonus: tuple[tuple[int, float], ...]) -> None:
+        self.hit = hit
+        self.amount = amount
+        self.bonus = bonus
+        self.kind = hit.kind
+        self.ignores_armor = hit.ignores_armor
+        self.follows = hit.bounce
+        self.delay = 0.0 if hit.sweep is not None else hit.delay_loops
+        self.conditional = bool(hit.when)
+        self.plain = not (hit.kills_self or hit.area or (hit.search is not None and not hit.bounce))
 
 
 def bit_set(names: Iterable[str], order: tuple[str, ...]) -> int:
@@ -114,6 +138,7 @@ class Stats:
         self.beam: NDArray[np.bool_] = np.array([w.is_beam for w in catalog.weapons])
         self.bursts: NDArray[np.bool_] = np.array([w.bursts for w in catalog.weapons])
         self.kamikaze: NDArray[np.bool_] = np.array([w.is_kamikaze for w in catalog.weapons])
+        self.backswing: Floats = np.array([w.backswing_loops for w in catalog.weapons], dtype=np.float64)
         self.damage_point: Floats = np.array([w.damage_point_loops for w in catalog.weapons], dtype=np.float64)
         self.least_range: Floats = np.array([w.min_range for w in catalog.weapons], dtype=np.float64)
         self.slop: Floats = np.array([w.slop for w in catalog.weapons], dtype=np.float64)
@@ -125,6 +150,8 @@ class Stats:
         self.has_beam: NDArray[np.bool_] = _have(catalog, self.beam)
         self.has_rolling_gun: NDArray[np.bool_] = _have(catalog, self.rolling)
         self.unturnable: NDArray[np.bool_] = np.array([u.unturnable for u in catalog.units])
+        self.uncommandable: NDArray[np.bool_] = np.array([u.uncommandable for u in catalog.units])
+        self.untargetable: NDArray[np.bool_] = np.array([u.untargetable for u in catalog.units])
         self.jitter: Floats = np.array([w.jitter_loops for w in catalog.weapons], dtype=np.float64)  # (weapons, 2)
         self._changes: list[_Changes] = [_Changes(catalog, ()) for _ in range(players)]
         self._abilities: list[dict[int, Ability]] = [{} for _ in range(players)]
@@ -132,13 +159,13 @@ class Stats:
             self.apply(player, ())
 
     def copy(self) -> Stats:
-        """Return stats of their own with the same numbers."""
-        twin = copy.copy(self)
-        for name, part in vars(self).items():
-            if isinstance(part, np.ndarray):
-                setattr(twin, name, part.copy())
-            elif isinstance(part, list):  # one entry for each player
-                setattr(twin, name, [copy.copy(of_player) for of_player in part])
+        """Return stats of their own with the same numbers; what no upgrade changes is shared."""
+        twin: Stats = copy.copy(self)
+        for name in CHANGED:
+            setattr(twin, name, getattr(self, name).copy())
+        twin._changes = self._changes.copy()
+        twin.damage = [weapons.copy() for weapons in self.damage]
+        twin._abilities = [abilities.copy() for abilities in self._abilities]
         return twin
 
     def apply(self, player: int, upgrades: Iterable[int]) -> None:

@@ -1,20 +1,29 @@
 from libc.stdint cimport int64_t
 
+from khala_simulator.tables.stats cimport Stats
+from khala_simulator.world.active_buffs cimport ActiveBuffs
+from khala_simulator.world.ground cimport BuiltGround
+
 
 cdef class WorldFields:
     # of `World`
     cdef public object map
     cdef public object rng
     cdef public object catalog
-    cdef public object stats
-    cdef public object ground
+    cdef public Stats stats
+    cdef public BuiltGround ground
     cdef public object growth
+    cdef public object usual
     cdef public object script
     cdef public bint watches
     cdef public frozenset moments
     cdef public tuple periods
-    cdef public object buffs
+    cdef public ActiveBuffs buffs
     cdef public list players
+    cdef public double west
+    cdef public double south
+    cdef public double east
+    cdef public double north
     cdef public bint fog
     cdef public bint ended
     cdef public int64_t loop
@@ -49,6 +58,7 @@ cdef class WorldFields:
     cdef public object bodies
     cdef public object steps
     cdef public object foes
+    cdef public object crowd
     cdef public object census
     cdef public list casters
     cdef public int64_t bare_at
@@ -60,8 +70,6 @@ cdef class WorldFields:
     cdef public bint hiding
     cdef public list natures
     cdef public int64_t natures_at
-    cdef public object hands
-    cdef public int64_t hands_at
     cdef public tuple opponents
     cdef public tuple taken
     cdef public object eyes

@@ -28,6 +28,7 @@ class WorldFields:
         self.bodies: object | None = None  # room for what is measured between them, for ``contacts``
         self.steps: object | None = None  # room for the steps of those that walk, for ``movement``
         self.foes: object | None = None  # room for those at whom a player may aim, for ``acquire``
+        self.crowd: object | None = None  # room for the bodies that are in the way of others, for ``avoidance``
         self.census: object | None = None  # of this population, for ``census``
         self.casters: list[tuple[int, tuple[int, ...]]] | None = None  # who may use what by itself, for ``autocast``
         self.bare_at = -1  # the population in which nothing makes creep or needs it
@@ -39,8 +40,6 @@ class WorldFields:
         self.hiding = False  # whether any unit is cloaked or burrowed
         self.natures: list[tuple[str, list[int]]] = []  # types with a nature, and their slots, for ``passives``
         self.natures_at = -1  # the population for which this was written
-        self.hands: Ints = np.zeros(0, dtype=np.int64)  # slots of workers and of structures that train
-        self.hands_at = -1  # the population for which this was written
         self.opponents: tuple[int, ...] | None = None  # computer players that lead a side, once looked up
         self.taken: tuple[int, Bools] | None = None  # the cells with structures on them, and for which population
         self.eyes: object | None = None  # with what the players saw last, for ``vision``

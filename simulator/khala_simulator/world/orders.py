@@ -7,7 +7,14 @@ creates them from a player's commands, ``systems.orders`` carries them out.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Final, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from khala_simulator.tables.catalog import Catalog
+    from khala_simulator.world.columns import Ints
 
 
 class OrderKind(IntEnum):
@@ -35,6 +42,27 @@ WALKS: Final = bits(OrderKind.MOVE, OrderKind.ATTACK_MOVE, OrderKind.SCAN_MOVE, 
 SEEKS_FIGHTS: Final = bits(OrderKind.ATTACK_MOVE, OrderKind.HOLD, OrderKind.PATROL)
 LOOKS_AROUND: Final = SEEKS_FIGHTS | bits(OrderKind.IDLE)
 NEEDS_TARGET: Final = bits(OrderKind.ATTACK_UNIT, OrderKind.FOLLOW)
+
+
+@lru_cache(maxsize=4)
+def usual_abilities(catalog: Catalog) -> Ints:
+    """Return (types, ``KINDS``) the ability with which a type of units has an order of a kind, -1 without one."""
+    found = [[card.get(_USUAL.get(kind, ""), -1) for kind in OrderKind] for card in catalog.ordinary]
+    return np.array(found, dtype=np.int64)
+
+
+KINDS: Final = len(OrderKind)
+_USUAL: Final[dict[OrderKind, str]] = {
+    OrderKind.IDLE: "stop",
+    OrderKind.MOVE: "move",
+    OrderKind.FOLLOW: "move",
+    OrderKind.ATTACK_MOVE: "attack",
+    OrderKind.ATTACK_UNIT: "attack",
+    OrderKind.HOLD: "hold_position",
+    OrderKind.PATROL: "patrol",
+    OrderKind.SCAN_MOVE: "scan_move",
+}
+"""What the tables call the abilities of orders; a Battlecruiser has its own move."""
 
 SMART: Final = 1
 STOP: Final = 4

@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from khala_simulator.world.columns import INDEX_SHIFT, NOBODY, SLOT_BITS, Bools,
 from khala_simulator.world.creep import Creep
 from khala_simulator.world.fields import WorldFields
 from khala_simulator.world.ground import BuiltGround
-from khala_simulator.world.orders import ATTACK, Order, OrderKind
+from khala_simulator.world.orders import ATTACK, Order, OrderKind, usual_abilities
 from khala_simulator.world.players import NEUTRAL, GameResult, PlayerSetup, WorldPlayer
 from khala_simulator.world.script_memory import ScriptMemory
 from khala_simulator.world.snapshots import FogMemory
@@ -52,8 +52,7 @@ MOST_UNITS: Final = 4_000
 """Units up to which scripts and debug commands fill a world; tags have room for 16 383, and loops are slow by then."""
 
 
-@dataclass(frozen=True, slots=True)
-class Death:
+class Death(NamedTuple):
     """A unit that died: its loop, tag, type and owner, and the killer's owner (-1 for none)."""
 
     loop: int
@@ -109,12 +108,14 @@ class World(UnitColumns, WorldFields):
         UnitColumns.__init__(self)
         WorldFields.__init__(self)
         self.map: GameMap = game_map
+        self.west, self.south, self.east, self.north = map(float, game_map.terrain.playable)
         self.catalog: Catalog = catalog or load_catalog(data=game_map.scenario.data)
         self.seed = seed
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.loop = 0
         self.players: list[WorldPlayer] = [WorldPlayer(NEUTRAL, "neutral", "none")]
         self.players += [WorldPlayer(p.id, p.race, p.control, p.name, p.difficulty, p.build) for p in players]
+        self.usual = usual_abilities(self.catalog)
         self.stats = new_stats(self.catalog, len(self.players))
         self.ground = BuiltGround(game_map.terrain)
         self.fog: bool = fog and game_map.scenario.visibility.fog

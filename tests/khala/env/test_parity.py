@@ -130,7 +130,7 @@ def mirrored(door: Door) -> type[Battle]:
             assert seen.game_loop == self.loop
             for player in (PLAYER, ENEMY):
                 theirs = [unit for unit in seen.raw_data.units if unit.owner == player]
-                there, ours = self.look(self.tags_of(player))
+                there, ours = self.look(self.tags()[player == ENEMY])
                 assert there.all()
                 np.testing.assert_array_equal(columns(ours, own=player == PLAYER), read(theirs, own=player == PLAYER))
 

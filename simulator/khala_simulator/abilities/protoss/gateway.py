@@ -97,8 +97,6 @@ def _cant_charge(world: World, cast: Cast) -> ActionResult:
 
 def _strike_home(world: World, slots: list[int]) -> None:
     """End the charges whose Zealots begin to strike, with the blow of the impact."""
-    if not len(world.buffs):
-        return
     rows = world.buffs.rows
     row = world.catalog.buff(CHARGING).row
     for slot in rows["slot"][rows["buff"] == row].tolist():
@@ -201,3 +199,4 @@ SKILLS: Final = {
 }
 AREA_EFFECTS: Final = {"phase_shift": _shift}
 PASSIVES: Final[dict[str, UnitRule]] = {"Zealot": _strike_home}
+OF_BUFFS: Final = frozenset(PASSIVES)
