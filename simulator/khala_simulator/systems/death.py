@@ -20,8 +20,6 @@ NO_KILLER = -1
 
 def bury(world: World) -> None:
     """Remove every unit without life, in the order of slots, and those that their deaths kill in turn."""
-    if not _count_dead(world):
-        return
     killers: dict[int, int] = {}  # slot of a dying unit -> player, where the killer itself is gone already
     while _count_dead(world):
         c = columns.columns_of(world)
